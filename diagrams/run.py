@@ -1,0 +1,203 @@
+"""Joins a station and a servo, advances them, and keeps the record."""
+
+import time
+from collections.abc import Callable
+
+import numpy as np
+from pydrake.systems.analysis import ApplySimulatorConfig, Simulator, SimulatorConfig
+from pydrake.systems.framework import Context, Diagram, DiagramBuilder, OutputPort
+from pydrake.systems.primitives import LogVectorOutput
+
+from diagrams.log import GuardEvent, RunLog
+from diagrams.scenario import Scenario, ScenarioError
+from diagrams.servo import Servo
+from diagrams.station import SimulatedStation
+from robots.inverse_kinematics import InverseKinematics
+from robots.model import NUM_JOINTS, RobotModel, load_robot
+from robots.plant import PlantRobot
+from systems.guard import KINDS
+from systems.paths import CartesianPath
+from systems.sample_ports import SampleVectors
+from systems.servo import LawConfig
+
+# Beyond this rate the explicit runge_kutta3 takes more time in tiny steps than the implicit radau3 in its own.
+_EXPLICIT_RATE_LIMIT = 4000.0  # 1/s
+_CHUNK = 0.2  # s of simulated time between two reports of progress
+
+
+def run(
+    scenario: Scenario,
+    law: str,
+    robot: RobotModel | None = None,
+    seed: int | None = None,
+    progress: Callable[[float], None] | None = None,
+) -> RunLog:
+    """Runs one law through a scenario, from rest at the start of the path to the end of the dwell.
+
+    Args:
+        scenario: what to do.
+        law: which law to use.
+        robot: the nominal robot; None for the one that the scenario names.
+        seed: of the camera's noise; None for the scenario's.
+        progress: is called now and then with the share that is done, 0 to 1.
+
+    Raises:
+        ScenarioError: if the nominal robot cannot follow the path.
+        ValueError: if a part refuses its configuration.
+    """
+    experiment = Experiment(scenario, law, robot, seed)
+    experiment.advance(progress=progress)
+    return experiment.log()
+
+
+class Experiment:
+    """A station under a servo, ready to be advanced."""
+
+    def __init__(
+        self, scenario: Scenario, law: str, robot: RobotModel | None = None, seed: int | None = None
+    ) -> None:
+        """Builds the diagram and puts everything at rest at the start. Raises what `run` raises."""
+        self.scenario, self.law = scenario, law
+        self.seed = scenario.seed if seed is None else seed
+        robot = robot or load_robot(scenario.robot)
+        builder = DiagramBuilder()
+        drive = scenario.servo.laws.get(law, LawConfig()).drive
+        self.station = builder.AddNamedSystem("station", SimulatedStation(robot, scenario.station, drive))
+        self.servo = builder.AddNamedSystem("servo", Servo(robot, scenario, law))
+        for name in ("position_command", "velocity_command"):
+            builder.Connect(self.servo.GetOutputPort(name), self.station.GetInputPort(name))
+        for name in ("joint_sample", "pose_sample"):
+            builder.Connect(self.station.GetOutputPort(name), self.servo.GetInputPort(name))
+        self._logs = _add_logs(builder, self.station, self.servo, scenario.station.period)
+        self.diagram = builder.Build()
+        self.diagram.set_name("truetip")
+        self.path = self.servo.reference.path
+        self.simulator = Simulator(self.diagram)
+        self.context = self.simulator.get_mutable_context()
+        self.station.set_at_rest(self.context, start_position(robot, scenario, self.path), self.seed)
+        scheme = scenario.integrator.scheme
+        if scheme == "auto":
+            explicit = self.station.fastest_rate(self.context) < _EXPLICIT_RATE_LIMIT
+            scheme = "runge_kutta3" if explicit else "radau3"
+        ApplySimulatorConfig(
+            SimulatorConfig(
+                integration_scheme=scheme,
+                max_step_size=scenario.integrator.max_step,
+                accuracy=scenario.integrator.accuracy,
+                use_error_control=True,
+            ),
+            self.simulator,
+        )
+        self.simulator.Initialize()
+        self._wall_time = 0.0
+
+    def advance(self, until: float | None = None, progress: Callable[[float], None] | None = None) -> None:
+        """Advances to a time in s, or to the end of the path."""
+        end = self.path.duration if until is None else until
+        # Chunks that end on a tick cost nothing: the integrator stops there anyway.
+        ticks = max(1, round(_CHUNK / self.scenario.station.period))
+        started = time.perf_counter()
+        done = round(self.context.get_time() / self.scenario.station.period)
+        while self.context.get_time() < end:
+            done += ticks
+            self.simulator.AdvanceTo(min(end, done * self.scenario.station.period))
+            if progress:
+                progress(self.context.get_time() / end)
+        self._wall_time += time.perf_counter() - started
+
+    def log(self) -> RunLog:
+        """The record of what has happened so far."""
+        found = {name: sink.FindLog(self.context) for name, sink in self._logs.items()}
+        times = found["state"].sample_times()
+        data = {name: log.data().T for name, log in found.items()}
+        counts = np.round(data["guard_status"]).astype(int)
+        return RunLog(
+            law=self.law,
+            seed=self.seed,
+            time=times,
+            X_WE_desired=self.path.sample(times)[0],
+            X_WE_true=_tool_poses(self.station.robot, data["state"]),
+            X_WE_measured=_by_exposure(data["pose"], times),
+            joint_position=data["joints"][:, 1 : 1 + NUM_JOINTS],
+            joint_effort=data["joints"][:, 1 + 2 * NUM_JOINTS :],
+            link_position=self.station.robot.link_positions(data["state"]),
+            position_command=data["position_command"],
+            velocity_command=data["velocity_command"],
+            correction=data["correction"],
+            guard_counts=dict(zip(KINDS, counts[-1].tolist(), strict=True)),
+            guard_events=_events(times, counts),
+            path_start=self.path.path_start,
+            dwell_start=self.path.dwell_start,
+            path_end=self.path.duration,
+            wall_time=self._wall_time,
+        )
+
+
+def start_position(robot: RobotModel, scenario: Scenario, path: CartesianPath) -> np.ndarray:
+    """Motor positions in rad at which the nominal robot stands off the start by the initial error.
+
+    The whole path is tried first, so that an unreachable one is refused before anything moves.
+
+    Raises:
+        ScenarioError: if the start or the path is out of reach.
+    """
+    inverse = InverseKinematics(robot)
+    home = np.deg2rad(scenario.home_deg)
+    times = np.arange(0.0, path.duration, 4e-3)
+    try:
+        q_path = inverse.along(path.sample(times)[0], home)
+        X_WE = path.sample(0.0)[0].copy()
+        # The error is wanted minus true.
+        X_WE[:3, 3] -= 1e-3 * scenario.initial_error_mm
+        return inverse.nearest(X_WE, q_path[0])
+    except ValueError as error:
+        raise ScenarioError(f"{robot.name} cannot follow the path '{scenario.reference.path}': {error}") from error
+
+
+def _add_logs(builder: DiagramBuilder, station: Diagram, servo: Diagram, period: float) -> dict:
+    vectors = builder.AddNamedSystem("samples", SampleVectors())
+    for name in ("joint_sample", "pose_sample"):
+        builder.Connect(station.GetOutputPort(name), vectors.GetInputPort(name))
+    ports: dict[str, OutputPort] = {"state": station.GetOutputPort("truth.state")}
+    ports |= {name: vectors.GetOutputPort(name) for name in ("joints", "pose")}
+    ports |= {
+        name: servo.GetOutputPort(name)
+        for name in ("position_command", "velocity_command", "correction", "guard_status")
+    }
+    return {name: LogVectorOutput(port, builder, period) for name, port in ports.items()}
+
+
+def _tool_poses(robot: PlantRobot, states: np.ndarray) -> np.ndarray:
+    """Tool poses (n, 4, 4) of plant states (n, .)."""
+    context: Context = robot.plant.CreateDefaultContext()
+    poses = np.empty((len(states), 4, 4))
+    for pose, state in zip(poses, states, strict=True):
+        robot.plant.SetPositionsAndVelocities(context, state)
+        pose[:] = robot.tool.CalcPoseInWorld(context).GetAsMatrix4()
+    return poses
+
+
+def _by_exposure(samples: np.ndarray, times: np.ndarray) -> np.ndarray:
+    """Puts camera samples (n, 13) beside the log times at which they were exposed; NaN elsewhere."""
+    poses = np.full((len(times), 4, 4), np.nan)
+    samples = samples[np.isfinite(samples[:, 0])]
+    if len(samples) == 0:
+        return poses
+    nearest = np.searchsorted(times, samples[:, 0] - 1e-9)
+    exact = nearest < len(times)
+    exact[exact] &= np.abs(times[nearest[exact]] - samples[exact, 0]) < 1e-9
+    poses[nearest[exact], :3] = samples[exact, 1:].reshape(-1, 3, 4)
+    poses[nearest[exact], 3] = [0.0, 0.0, 0.0, 1.0]
+    return poses
+
+
+def _events(times: np.ndarray, counts: np.ndarray) -> list[GuardEvent]:
+    """One event for each unbroken run of ticks in which a kind was counted."""
+    events = []
+    increments = np.diff(counts, axis=0, prepend=0) > 0
+    for column, kind in enumerate(KINDS):
+        edges = np.diff(increments[:, column].astype(int), prepend=0, append=0)
+        for start, stop in zip(np.flatnonzero(edges == 1), np.flatnonzero(edges == -1), strict=True):
+            length = times[stop - 1] - times[start]
+            events.append(GuardEvent(float(times[start]), kind, f"for {1e3 * length:.0f} ms, {stop - start} ticks"))
+    return sorted(events, key=lambda event: event.time)

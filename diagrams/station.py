@@ -1,0 +1,111 @@
+"""The robot cell as a diagram with the ports of the contract."""
+
+import numpy as np
+from pydrake.common import RandomDistribution, RandomGenerator
+from pydrake.multibody.plant import MultibodyPlant
+from pydrake.systems.framework import Context, Diagram, DiagramBuilder
+from pydrake.systems.primitives import ConstantVectorSource, RandomSource, Selector, SelectorParams
+
+from diagrams.scenario import StationConfig
+from robots.model import NUM_JOINTS, RobotModel
+from robots.plant import add_robot
+from systems.camera import PoseCamera
+from systems.drive import Drive
+from systems.joint_sensor import JointSensor
+from systems.tip_pose import TipPose
+
+
+class SimulatedStation(Diagram):
+    """An elastic robot with its drives and a camera.
+
+    Ports, the same as those of a real cell:
+        in  ``position_command``  vector 6 in rad
+        in  ``velocity_command``  vector 6 in rad/s
+        out ``joint_sample``      JointSample
+        out ``pose_sample``       PoseSample
+
+    Only a simulated station has these; nothing but logs and metrics may use them:
+        out ``truth.X_WE``          RigidTransform
+        out ``truth.state``         state of the plant
+        out ``truth.motor_torque``  vector 6 in N m, joint side
+    """
+
+    def __init__(self, robot: RobotModel, config: StationConfig, drive: str) -> None:
+        """Builds the cell.
+
+        Args:
+            robot: the nominal robot; the true one differs from it by ``config.errors``.
+            config: the station part of a scenario.
+            drive: ``"position"``, ``"velocity"`` or ``"cascade"``.
+
+        Raises:
+            ValueError: if a part refuses its configuration.
+        """
+        super().__init__()
+        builder = DiagramBuilder()
+        self.plant = builder.AddNamedSystem("plant", MultibodyPlant(0.0))
+        self.robot = add_robot(self.plant, robot, config.elasticity, config.payload, config.errors)
+        self.plant.Finalize()
+        self.drive = builder.AddNamedSystem("drive", Drive(robot, drive, config.drive, config.period, config.payload))
+        motor_state = builder.AddNamedSystem("motor_state", _selector(self.plant, self.robot.motor_indices()))
+        no_torque = builder.AddNamedSystem("no_feedforward", ConstantVectorSource(np.zeros(NUM_JOINTS)))
+        sensor = builder.AddNamedSystem("joint_sensor", JointSensor())
+        tip = builder.AddNamedSystem("tip", TipPose(self.robot))
+        camera = builder.AddNamedSystem("camera", PoseCamera(config.camera))
+        self._noise = builder.AddNamedSystem(
+            "noise", RandomSource(RandomDistribution.kGaussian, camera.GetInputPort("noise").size(), config.camera.period)
+        )
+
+        state = self.plant.get_state_output_port()
+        torque = self.drive.GetOutputPort("motor_torque")
+        builder.Connect(state, motor_state.get_input_port())
+        builder.Connect(motor_state.get_output_port(), self.drive.GetInputPort("motor_state"))
+        builder.Connect(no_torque.get_output_port(), self.drive.GetInputPort("torque_feedforward"))
+        builder.Connect(self.drive.GetOutputPort("joint_torque"), self.plant.get_actuation_input_port())
+        builder.Connect(motor_state.get_output_port(), sensor.GetInputPort("motor_state"))
+        builder.Connect(torque, sensor.GetInputPort("motor_torque"))
+        builder.Connect(state, tip.GetInputPort("state"))
+        builder.Connect(tip.GetOutputPort("X_WE"), camera.GetInputPort("X_WE"))
+        builder.Connect(self._noise.get_output_port(), camera.GetInputPort("noise"))
+
+        for name in ("position_command", "velocity_command"):
+            builder.ExportInput(self.drive.GetInputPort(name), name)
+        builder.ExportOutput(sensor.GetOutputPort("joint_sample"), "joint_sample")
+        builder.ExportOutput(camera.GetOutputPort("pose_sample"), "pose_sample")
+        builder.ExportOutput(tip.GetOutputPort("X_WE"), "truth.X_WE")
+        builder.ExportOutput(state, "truth.state")
+        builder.ExportOutput(torque, "truth.motor_torque")
+        builder.BuildInto(self)
+        self.set_name("station")
+
+    def set_at_rest(self, root_context: Context, theta: np.ndarray, seed: int) -> None:
+        """Puts the motors at theta (rad, shape (6,)), everything at rest, and seeds the camera's noise."""
+        self.robot.set_at_rest(self.plant.GetMyMutableContextFromRoot(root_context), theta)
+        self.drive.set_at_rest(root_context, theta)
+        # Not SetRandomContext of the diagram: that would draw the friction parameters too.
+        self._noise.SetRandomContext(self._noise.GetMyMutableContextFromRoot(root_context), RandomGenerator(seed))
+
+    def fastest_rate(self, root_context: Context) -> float:
+        """The largest eigenvalue in magnitude, in 1/s, of plant and drive linearised about a state of rest."""
+        context = self.plant.GetMyContextFromRoot(root_context)
+        stiffness, damping = self.drive.linear_gains()
+        motors = [joint.position_start() for joint in self.robot.motors]
+        n = self.plant.num_positions()
+        K, D = np.zeros(n), np.zeros(n)
+        K[motors], D[motors] = stiffness, damping
+        for joint, spring in zip(self.robot.deflections, self.robot.springs, strict=True):
+            K[joint.position_start()] += spring.default_stiffness()
+        for joint in (*self.robot.motors, *self.robot.deflections):
+            D[joint.velocity_start()] += joint.default_damping()
+        M_inverse = np.linalg.inv(self.plant.CalcMassMatrix(context))
+        A = np.block([[np.zeros((n, n)), np.eye(n)], [-M_inverse * K, -M_inverse * D]])
+        return float(np.abs(np.linalg.eigvals(A)).max())
+
+
+def _selector(plant: MultibodyPlant, indices: list[int]) -> Selector:
+    """Picks entries of the plant's state."""
+    params = SelectorParams()
+    params.inputs = [SelectorParams.InputPortParams(name="state", size=plant.num_multibody_states())]
+    selections = [SelectorParams.OutputSelection(input_port_index=0, input_offset=i) for i in indices]
+    params.outputs = [SelectorParams.OutputPortParams(name="motor_state", selections=selections)]
+    return Selector(params)

@@ -1,0 +1,290 @@
+"""The report of a comparison: one HTML file that opens offline and explains itself."""
+
+import json
+from collections.abc import Mapping
+from html import escape
+from pathlib import Path
+from typing import Any
+
+from plotly.offline import get_plotlyjs
+
+from experiments.metrics import Comparison, best_law
+from experiments.report_data import norm, plot_data
+from experiments.report_files import write_text
+from experiments.report_page import page
+from experiments.report_script import SCRIPT
+from experiments.report_style import law_colors, law_title
+from experiments.tables import AXES, KINDS, error_row, format_cell, is_best, smallest_of_columns
+
+MAGNIFICATIONS = (1, 2, 5, 10, 20, 50, 100, 200, 500)
+MAGNIFIED_SHARE = 0.25  # of the path's extent that the largest deviation may fill when the page opens
+LISTED_EVENTS = 100  # per law
+
+
+def write_report(
+    path: str | Path,
+    scenario_text: str,
+    summary: Mapping[str, Any],
+    timing: Mapping[str, Any],
+    logs: Comparison,
+) -> None:
+    """Writes the report as one self-contained HTML file, atomically.
+
+    Args:
+        scenario_text: the scenario as YAML, shown as it is.
+        summary: `metrics.summary` of the logs.
+        timing: `metrics.timing` of the logs.
+        logs: law -> one log per cycle; the first cycle is drawn.
+
+    Raises:
+        OSError: if the folder is missing or cannot be written.
+    """
+    data = plot_data(summary, logs)
+    title = f"{summary['scenario']}: visual servoing compared"
+    sections = [
+        _header(summary, logs),
+        _errors(summary),
+        _plots(summary, data),
+        _guard(summary, logs),
+        _transient(summary),
+        _iso(summary),
+        _timing(timing),
+        _scenario(scenario_text),
+        "<footer>Made by truetip. Errors are e = wanted − attained in the world frame, the rotation as axis "
+        "times angle: Probst (2024), eqs. (2.36) and (2.37).</footer>",
+    ]
+    # "</script>" or "<!--" inside the data would end or swallow the script element that carries it.
+    safe = json.dumps(data, allow_nan=False, separators=(",", ":")).replace("<", "\\u003c")
+    write_text(path, page(escape(title), "\n".join(filter(None, sections)), get_plotlyjs(), safe, SCRIPT))
+
+
+def verdict(summary: Mapping[str, Any]) -> str:
+    """The result in one or two sentences of plain text."""
+    best, runs = best_law(summary), summary["runs"]
+    numbers = runs[best]["true"]
+    text = (
+        f"{law_title(best)} keeps the true tip within {_text(numbers['max_norm_mm'])} mm and "
+        f"{_text(numbers['max_angle_deg'])}° of the wanted path and comes to rest "
+        f"{_text(norm(numbers['static_mm']))} mm and {_text(norm(numbers['static_deg']))}° from it."
+    )
+    if "open_loop" in runs and best != "open_loop":
+        baseline = runs["open_loop"]["true"]
+        text += (
+            f" Without the camera the tip is off by up to {_text(baseline['max_norm_mm'])} mm and "
+            f"{_text(baseline['max_angle_deg'])}°, and by {_text(norm(baseline['static_mm']))} mm at rest."
+        )
+    return text
+
+
+def _header(summary: Mapping[str, Any], logs: Comparison) -> str:
+    colors = law_colors(logs)
+    facts = "".join(
+        f'<div class="fact" style="--law:{colors[law]}"><span class="name">{escape(law_title(law))}</span>'
+        f"<b>{_text(run['true']['max_norm_mm'])} <small>mm largest</small></b>"
+        f"<span>{_text(norm(run['true']['static_mm']))} mm at rest · "
+        f"{_text(run['true']['max_angle_deg'])}° largest</span></div>"
+        for law, run in summary["runs"].items()
+    )
+    return (
+        '<header><p class="eyebrow">truetip · visual servoing compared</p>'
+        f"<h1>Scenario {escape(summary['scenario'])}</h1>"
+        f'<p class="verdict">{escape(verdict(summary))}</p></header>'
+        f'<div class="facts">{facts}</div>'
+    )
+
+
+def _errors(summary: Mapping[str, Any]) -> str:
+    return _card(
+        "Largest and static error per axis",
+        "From the start of the path to its end, in world axes. Static is the mean over the last half second "
+        "of the dwell. The smallest number of each column is marked.",
+        '<div class="pair">'
+        f"<div><h3>True: what a perfect instrument would see</h3>{_error_table(summary, 'true')}</div>"
+        f"<div><h3>Measured: what the camera says</h3>{_error_table(summary, 'measured')}</div></div>",
+    )
+
+
+def _error_table(summary: Mapping[str, Any], source: str) -> str:
+    colors, body = law_colors(summary["runs"]), ""
+    for kind, kind_title in KINDS.items():
+        rows = {law: error_row(run[source], kind) for law, run in summary["runs"].items()}
+        smallest = smallest_of_columns(list(rows.values()))
+        body += f'<tr class="kind"><td colspan="7">{kind_title}</td></tr>'
+        for law, row in rows.items():
+            cells = "".join(
+                f'<td class="best">{format_cell(value)}</td>'
+                if is_best(value, best)
+                else f"<td>{format_cell(value)}</td>"
+                for value, best in zip(row, smallest, strict=True)
+            )
+            body += f"<tr>{_law_cell(law, colors)}{cells}</tr>"
+    return _table(["", *AXES], body)
+
+
+def _plots(summary: Mapping[str, Any], data: Mapping[str, Any]) -> str:
+    chips = "".join(
+        f'<button type="button" aria-pressed="true" data-law="{escape(law["id"])}"><i class="dot" '
+        f'style="--law:{law["color"]}"></i>{escape(law["title"])}</button>'
+        for law in data["laws"]
+    )
+    chips += '<button type="button" aria-pressed="true" data-measured="yes">Measured samples</button>'
+    chosen = _magnification(data)
+    options = "".join(
+        f'<option value="{factor}"{" selected" if factor == chosen else ""}>×{factor}</option>'
+        for factor in MAGNIFICATIONS
+    )
+    path_plot = (
+        f'<p class="inline"><label>Deviations magnified <select id="magnification">{options}</select>'
+        "</label></p>"
+        '<div class="plot" id="path"></div>'
+    )
+    bars = "".join(f'<div class="plot bar" id="bars-{unit}"></div>' for unit in ("mm", "deg"))
+    bars = f'<div class="pair">{bars}</div>'
+    axes_note = (
+        "Lines are true, faint dots are camera samples (thinned out). The range fits the laws; double-click "
+        "for the full range."
+    )
+    return "\n".join(
+        [
+            f'<div class="chips">{chips}</div>',
+            _card(
+                "Error at a glance",
+                "Largest on the path and static, true distance and angle, on a logarithmic scale.",
+                bars,
+            ),
+            _card(
+                "Path",
+                "Wanted path (thin) and true paths with equal axes. The deviation at each instant is drawn "
+                "magnified.",
+                path_plot,
+            ),
+            _card(
+                "Distance and angle from the wanted pose",
+                "True errors on a logarithmic scale, so that tens of millimetres and a few micrometres share "
+                "a picture.",
+                '<div class="plot" id="distance"></div>',
+            ),
+            _card("Position error per axis", axes_note, '<div class="plot" id="position"></div>'),
+            _card("Orientation error per axis", axes_note, '<div class="plot" id="orientation"></div>'),
+        ]
+    )
+
+
+def _magnification(data: Mapping[str, Any]) -> int:
+    """The largest factor at which every deviation stays a modest share of the path's extent."""
+    wanted = data["laws"][0]["path"]["wanted"]
+    extent = max((max(axis) - min(axis) for axis in wanted if axis), default=0.0)
+    deviation = max(
+        (abs(value) for law in data["laws"] for axis in law["path"]["deviation"] for value in axis),
+        default=0.0,
+    )
+    fitting = [factor for factor in MAGNIFICATIONS if factor * deviation <= MAGNIFIED_SHARE * extent]
+    return fitting[-1] if fitting else 1
+
+
+def _guard(summary: Mapping[str, Any], logs: Comparison) -> str:
+    runs, colors = summary["runs"], law_colors(logs)
+    kinds = sorted({kind for run in runs.values() for kind, count in run["guard"].items() if count})
+    if not kinds:
+        return _card("Guard", "No intervention: every command passed as the law wanted it.", "")
+    counts = ""
+    for law, run in runs.items():
+        cells = "".join(f"<td>{run['guard'].get(kind, 0)}</td>" for kind in kinds)
+        counts += f"<tr>{_law_cell(law, colors)}{cells}</tr>"
+    rows = "".join(
+        f"<tr>{_law_cell(law, colors)}<td>{event.time:.3f}</td>"
+        f'<td class="text">{escape(event.kind.replace("_", " "))}</td>'
+        f'<td class="text">{escape(event.detail)}</td></tr>'
+        for law, cycles in logs.items()
+        for event in cycles[0].guard_events[:LISTED_EVENTS]
+    )
+    listed = _table(["law", "time in s", "kind", "what"], rows)
+    return _card(
+        "Guard",
+        "How often the guard changed a command, and when. Only the first events of a run are kept in full.",
+        _table(["", *(escape(kind.replace("_", " ")) for kind in kinds)], counts)
+        + '<div class="plot" id="events"></div>'
+        f"<details><summary>First events in words</summary>{listed}</details>",
+    )
+
+
+def _transient(summary: Mapping[str, Any]) -> str:
+    runs, colors = summary["runs"], law_colors(summary["runs"])
+    rows = ""
+    for law, run in runs.items():
+        numbers = run["true"]
+        if numbers["settling_s"] is not None:
+            overshoot = [*numbers["overshoot_mm"], *numbers["overshoot_deg"]]
+            cells = "".join(f"<td>{format_cell(value)}</td>" for value in overshoot)
+            rows += f"<tr>{_law_cell(law, colors)}<td>{format_cell(numbers['settling_s'])}</td>{cells}</tr>"
+    if not rows:
+        return ""
+    return _card(
+        "Initial error",
+        "Settling time to 5 % of the initial distance, and how far each axis went past zero. Runs that never "
+        "settle are left out. True errors.",
+        _table(["", "settling s", *AXES], rows),
+    )
+
+
+def _iso(summary: Mapping[str, Any]) -> str:
+    runs, colors = summary["runs"], law_colors(summary["runs"])
+    keys = {"AP_mm": "AP mm", "RP_mm": "RP mm", "AT_mm": "AT mm", "RT_mm": "RT mm", "AP_deg": "AP °"}
+
+    def table(source: str) -> str:
+        body = "".join(
+            f"<tr>{_law_cell(law, colors)}"
+            + "".join(f"<td>{format_cell(run[source]['iso_9283'][key])}</td>" for key in keys)
+            + "</tr>"
+            for law, run in runs.items()
+        )
+        return _table(["", *keys.values()], body)
+
+    cycles = max(run["true"]["iso_9283"]["cycles"] for run in runs.values())
+    note = (
+        "Accuracy and repeatability of the end pose (AP, RP) and of the path (AT, RT). Paths are compared as "
+        f"curves, so that lag along the path does not count. {cycles} "
+        + ("cycle per law" if cycles == 1 else "cycles per law")
+        + ("; repeatability needs at least two." if cycles == 1 else ".")
+    )
+    tables = f"<div><h3>True</h3>{table('true')}</div><div><h3>Measured</h3>{table('measured')}</div>"
+    return _card("ISO 9283", note, f'<div class="pair">{tables}</div>')
+
+
+def _timing(timing: Mapping[str, Any]) -> str:
+    colors = law_colors(timing["runs"])
+    body = "".join(
+        f"<tr>{_law_cell(law, colors)}<td>{_text(run['wall_s'])}</td><td>{_text(run['simulated_s'])}</td>"
+        f"<td>{_text(run['real_time_factor'])}</td></tr>"
+        for law, run in timing["runs"].items()
+    )
+    head = ["", "wall s", "simulated s", "real-time factor"]
+    return _card("Time", "Of the simulation alone.", _table(head, body))
+
+
+def _scenario(text: str) -> str:
+    fold = f"<details><summary>Scenario file</summary><pre>{escape(text)}</pre></details>"
+    return f'<section class="card">{fold}</section>'
+
+
+def _card(title: str, note: str, content: str) -> str:
+    return f'<section class="card"><h2>{title}</h2><p class="note">{note}</p>{content}</section>'
+
+
+def _table(head: list[str], body: str) -> str:
+    cells = "".join(f"<th>{name}</th>" for name in head)
+    return f'<div class="scroll"><table><thead><tr>{cells}</tr></thead><tbody>{body}</tbody></table></div>'
+
+
+def _law_cell(law: str, colors: Mapping[str, str]) -> str:
+    return f'<td><i class="dot" style="--law:{colors[law]}"></i>{escape(law_title(law))}</td>'
+
+
+def _text(value: float | None) -> str:
+    """Two digits after the point, two significant ones below 0.01, a dash for nothing."""
+    if value is None:
+        return "–"
+    if 0.0 < value < 1e-4:
+        return "<0.0001"
+    digits = 2 if value >= 0.01 or value == 0.0 else 3 if value >= 1e-3 else 4
+    return f"{value:.{digits}f}"

@@ -1,0 +1,277 @@
+"""What a six-axis robot is: geometry, limits, masses and drive trains, read from one YAML file.
+
+A robot file is the dataclass tree below, field for field. Every part carries a ``source``: where its
+numbers come from, or the word ``assumed``. Angles in the file are in degrees and say so in the name
+of their field; the arrays that `RobotModel` offers to the rest of the code are in SI units.
+
+Frames: W is the world, B the robot's base, link i is moved by joint i, F is the flange (the frame of
+the last link) and E the tool. At zero joint angles the frame of link i sits at
+``translation`` in the frame of link i-1, turned by ``rotation_zyx_deg``.
+"""
+
+import math
+from dataclasses import dataclass, field, fields, is_dataclass
+from functools import cached_property
+from importlib.resources import files
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from pydrake.common.yaml import yaml_load_typed
+from pydrake.math import RigidTransform, RotationMatrix
+
+from robots.pose import rotation_from_zyx
+
+NUM_JOINTS = 6
+
+
+class RobotFileError(ValueError):
+    """A robot file is missing, cannot be parsed, or describes an impossible robot."""
+
+
+@dataclass
+class Placement:
+    """A frame in its parent: translation in m, ZYX Euler angles (alpha, beta, gamma) in degrees."""
+
+    translation: np.ndarray = field(default_factory=lambda: np.zeros(3))
+    zyx_deg: np.ndarray = field(default_factory=lambda: np.zeros(3))
+    source: str = ""
+
+    def pose(self) -> RigidTransform:
+        """The placement as a transform, child in parent."""
+        R = RotationMatrix(rotation_from_zyx(np.deg2rad(self.zyx_deg)))
+        return RigidTransform(R, self.translation)
+
+
+@dataclass
+class JointLimits:
+    """Range and largest speed of one joint."""
+
+    lower_deg: float = 0.0
+    upper_deg: float = 0.0
+    speed_deg_s: float = 0.0
+    source: str = ""
+
+
+@dataclass
+class DriveTrain:
+    """Motor, gear and friction of one joint.
+
+    The friction coefficients act on the motor side: a joint-side torque is ``ratio`` times the Coulomb
+    part and ``ratio**2`` times the viscous part, see `RobotModel.joint_viscous_friction`.
+    """
+
+    ratio: float = 1.0
+    rotor_inertia: float = 0.0  # kg m^2, about the motor's axis
+    stiffness: float = 0.0  # N m / rad, joint side
+    damping: float = 0.0  # N m s / rad, joint side, parallel to the stiffness
+    viscous_friction: float = 0.0  # N m s / rad, motor side
+    coulomb_friction: float = 0.0  # N m, motor side
+    coulomb_velocity: float = 0.01  # rad/s on the joint side, width of the tanh transition
+    source: str = ""
+
+
+@dataclass
+class Joint:
+    """A revolute joint and the frame of the link that it moves."""
+
+    axis: np.ndarray = field(default_factory=lambda: np.array([0.0, 0.0, 1.0]))
+    placement: Placement = field(default_factory=Placement)
+    limits: JointLimits = field(default_factory=JointLimits)
+    drive_train: DriveTrain = field(default_factory=DriveTrain)
+
+
+@dataclass
+class Link:
+    """A rigid body; ``inertia`` holds the principal moments about the centre of mass."""
+
+    mass: float = 0.0  # kg
+    inertia: np.ndarray = field(default_factory=lambda: np.zeros(3))  # kg m^2, along x, y, z
+    source: str = ""
+    center_of_mass: np.ndarray = field(default_factory=lambda: np.zeros(3))  # m, in the link frame
+    center_of_mass_source: str = ""
+    radius: float = 0.05  # m, of the capsules that picture the link
+    radius_source: str = ""
+
+
+@dataclass
+class PayloadLimits:
+    """The largest mass at the flange, with the centre of mass and the inertia of that mass.
+
+    The inertia of a smaller payload is taken in proportion to its mass.
+    """
+
+    largest_mass: float = 0.0  # kg
+    inertia: np.ndarray = field(default_factory=lambda: np.zeros(3))  # kg m^2, about its centre
+    source: str = ""
+    center_of_mass: np.ndarray = field(default_factory=lambda: np.zeros(3))  # m, in the flange frame
+    center_of_mass_source: str = ""
+
+
+@dataclass
+class RobotModel:
+    """A six-axis serial robot. Load one with `load_robot`."""
+
+    name: str = ""
+    base: Placement = field(default_factory=Placement)
+    joints: list[Joint] = field(default_factory=list)
+    tool: Placement = field(default_factory=Placement)
+    base_link: Link = field(default_factory=Link)
+    links: list[Link] = field(default_factory=list)
+    payload: PayloadLimits = field(default_factory=PayloadLimits)
+
+    def _drive_train(self, name: str) -> np.ndarray:
+        return np.array([getattr(joint.drive_train, name) for joint in self.joints])
+
+    def _limit(self, name: str) -> np.ndarray:
+        return np.deg2rad([getattr(joint.limits, name) for joint in self.joints])
+
+    @cached_property
+    def axes(self) -> np.ndarray:
+        """Joint axes in the frames of their links, shape (6, 3)."""
+        return np.array([joint.axis / np.linalg.norm(joint.axis) for joint in self.joints])
+
+    @cached_property
+    def lower(self) -> np.ndarray:
+        """Lower joint limits in rad, shape (6,)."""
+        return self._limit("lower_deg")
+
+    @cached_property
+    def upper(self) -> np.ndarray:
+        """Upper joint limits in rad, shape (6,)."""
+        return self._limit("upper_deg")
+
+    @cached_property
+    def speed(self) -> np.ndarray:
+        """Largest joint speeds in rad/s, shape (6,)."""
+        return self._limit("speed_deg_s")
+
+    @cached_property
+    def gear_ratio(self) -> np.ndarray:
+        """Gear ratios, shape (6,)."""
+        return self._drive_train("ratio")
+
+    @cached_property
+    def reflected_inertia(self) -> np.ndarray:
+        """Rotor inertias seen on the link side of the gear in kg m^2, shape (6,)."""
+        return self.gear_ratio**2 * self._drive_train("rotor_inertia")
+
+    @cached_property
+    def joint_stiffness(self) -> np.ndarray:
+        """Stiffness of the gears in N m / rad, joint side, shape (6,)."""
+        return self._drive_train("stiffness")
+
+    @cached_property
+    def joint_viscous_friction(self) -> np.ndarray:
+        """Viscous friction of the motors in N m s / rad on the link side, Probst (2024) eq. (2.63)."""
+        return self.gear_ratio**2 * self._drive_train("viscous_friction")
+
+    @cached_property
+    def joint_coulomb_friction(self) -> np.ndarray:
+        """Coulomb friction of the motors in N m on the link side, Probst (2024) eq. (2.64)."""
+        return self.gear_ratio * self._drive_train("coulomb_friction")
+
+    @cached_property
+    def coulomb_velocity(self) -> np.ndarray:
+        """Joint velocity over which the Coulomb friction changes its sign in rad/s, shape (6,)."""
+        return self._drive_train("coulomb_velocity")
+
+
+def shipped_robots() -> list[str]:
+    """The names of the robots that come with the package."""
+    names = [entry.name for entry in _data_folder().iterdir()]
+    return sorted(name.removesuffix(".yaml") for name in names if name.endswith(".yaml"))
+
+
+def load_robot(name: str) -> RobotModel:
+    """Reads a shipped robot by name (``"irb1200"``) or any robot file by its path.
+
+    Raises:
+        RobotFileError: if there is no such robot, or its file is not a valid robot.
+    """
+    path = Path(name) if name.endswith((".yaml", ".yml")) else Path(str(_data_folder() / f"{name}.yaml"))
+    if not path.is_file():
+        raise RobotFileError(
+            f"robot '{name}': no file {path}; "
+            f"give the path of a YAML file or one of {', '.join(shipped_robots())}"
+        )
+    try:
+        robot = yaml_load_typed(schema=RobotModel, filename=str(path))
+    except Exception as error:  # the parser raises a dozen types, all of them about this file
+        raise RobotFileError(f"robot file {path}: {' '.join(str(error).split())}") from error
+    problem = _problem(robot)
+    if problem:
+        raise RobotFileError(f"robot file {path}: {problem}")
+    return robot
+
+
+def _data_folder():
+    return files("robots") / "data"
+
+
+def _problem(robot: RobotModel) -> str:
+    """The first reason why the robot is impossible, or an empty string."""
+    if len(robot.joints) != NUM_JOINTS or len(robot.links) != NUM_JOINTS:
+        return f"needs {NUM_JOINTS} joints and links, got {len(robot.joints)} and {len(robot.links)}"
+    problems = [_malformed_number(robot, "")]
+    problems += [_joint_problem(joint, number) for number, joint in enumerate(robot.joints, 1)]
+    bodies = {"base_link": robot.base_link} | {f"link {n}": link for n, link in enumerate(robot.links, 1)}
+    for label, link in bodies.items():
+        problems.append(_not_positive(label, {"mass": link.mass, "radius": link.radius}))
+        problems.append(_inertia_problem(label, link.inertia))
+    if robot.payload.largest_mass < 0.0:
+        problems.append(f"payload: largest_mass must not be negative, got {robot.payload.largest_mass}")
+    if robot.payload.largest_mass > 0.0:
+        problems.append(_inertia_problem("payload", robot.payload.inertia))
+    return next(filter(None, problems), "")
+
+
+def _malformed_number(part: Any, where: str) -> str:
+    """The first number below ``part`` that is not finite, or vector that is not three long."""
+    if isinstance(part, float) and not math.isfinite(part):
+        return f"{where} must be finite, got {part}"
+    if isinstance(part, np.ndarray) and not (part.shape == (3,) and np.isfinite(part).all()):
+        return f"{where} must be three finite numbers, got {part.tolist()}"
+    below = []
+    if isinstance(part, list):
+        below = [(f"{where}[{number}]", item) for number, item in enumerate(part, 1)]
+    elif is_dataclass(part):
+        below = [(f"{where}.{item.name}".lstrip("."), getattr(part, item.name)) for item in fields(part)]
+    return next(filter(None, (_malformed_number(item, name) for name, item in below)), "")
+
+
+def _joint_problem(joint: Joint, number: int) -> str:
+    limits, train = joint.limits, joint.drive_train
+    if not np.linalg.norm(joint.axis) > 0.0:
+        return f"joint {number}: axis must have a direction, got {joint.axis.tolist()}"
+    if not limits.lower_deg < limits.upper_deg:
+        lower, upper = limits.lower_deg, limits.upper_deg
+        return f"joint {number}: lower limit {lower} deg is not below the upper {upper} deg"
+    for label in ("damping", "viscous_friction", "coulomb_friction"):
+        if getattr(train, label) < 0.0:
+            return f"joint {number}: {label} must not be negative, got {getattr(train, label)}"
+    positive = {
+        "speed_deg_s": limits.speed_deg_s,
+        "ratio": train.ratio,
+        "rotor_inertia": train.rotor_inertia,
+        "stiffness": train.stiffness,
+        "coulomb_velocity": train.coulomb_velocity,
+    }
+    return _not_positive(f"joint {number}", positive)
+
+
+def _not_positive(where: str, values: dict[str, float]) -> str:
+    for label, value in values.items():
+        if not value > 0.0:
+            return f"{where}: {label} must be positive, got {value}"
+    return ""
+
+
+def _inertia_problem(where: str, inertia: np.ndarray) -> str:
+    # No body has a principal moment larger than the sum of the two others; Drake refuses it as well, later.
+    if inertia.min() > 0.0 and 2.0 * inertia.max() <= inertia.sum() * (1.0 + 1e-9):
+        return ""
+    return (
+        f"{where}: inertia must be three positive moments, none above the sum of the others, "
+        f"got {inertia.tolist()}"
+    )

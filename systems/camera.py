@@ -1,0 +1,111 @@
+"""A pose camera: it sees the tool in regular exposures and reports each one late, with noise, or not at all."""
+
+from dataclasses import dataclass, field
+
+import numpy as np
+from pydrake.common import RandomDistribution
+from pydrake.common.value import Value
+from pydrake.math import RigidTransform, RotationMatrix
+from pydrake.systems.framework import Context, DiscreteValues, LeafSystem
+from scipy.stats import norm
+
+from robots.kinematics import rotation_about
+from systems.samples import PoseSample
+
+_WIDTH = 14  # time, valid, then the rows of the 3 x 4 pose matrix
+_EPSILON = 1e-9  # s, a sample that is due at a tick arrives at it in spite of rounding
+
+
+@dataclass
+class CameraConfig:
+    """What a pose camera needs to know; read from a scenario file."""
+
+    period: float = 4e-3  # s, between exposures
+    delay: float = 4e-3  # s, transport delay: from exposure to arrival
+    position_sigma: float = 0.0  # m, standard deviation of one sample along each axis
+    orientation_sigma_deg: float = 0.0  # standard deviation of one sample about each axis
+    dropout_probability: float = 0.0  # of a single sample to be lost
+    dropouts: list[list[float]] = field(default_factory=list)  # s, windows [start, end) without a sample
+
+
+class PoseCamera(LeafSystem):
+    """Measures the pose of the tool at t = 0, period, 2 period, ...
+
+    Ports:
+        in  ``X_WE``         RigidTransform, the true tool in the world
+        in  ``noise``        vector 7, standard normal (wired by ``AddRandomInputs``)
+        out ``pose_sample``  PoseSample, the newest one that has arrived; a lost exposure arrives as invalid
+
+    Orientation noise is a small rotation about a random axis of the world.
+    """
+
+    def __init__(self, config: CameraConfig) -> None:
+        """Checks the configuration.
+
+        Raises:
+            ValueError: if a time, a standard deviation or a probability is out of its range.
+        """
+        super().__init__()
+        _check(config)
+        self._config = config
+        self._rotation_sigma = float(np.deg2rad(config.orientation_sigma_deg))
+        self._lost_below = norm.ppf(config.dropout_probability)
+        self._X_WE = self.DeclareAbstractInputPort("X_WE", Value(RigidTransform()))
+        self._noise = self.DeclareVectorInputPort("noise", 7, RandomDistribution.kGaussian)
+        in_flight = int(np.floor(config.delay / config.period + _EPSILON)) + 2
+        empty = np.concatenate([[-np.inf, 0.0], np.eye(4)[:3].ravel()])
+        self._pipeline = self.DeclareDiscreteState(np.tile(empty, in_flight))
+        self.DeclareAbstractOutputPort(
+            "pose_sample",
+            lambda: Value(PoseSample()),
+            self._calc_sample,
+            {self.time_ticket(), self.discrete_state_ticket(self._pipeline)},
+        )
+        self.DeclarePeriodicDiscreteUpdateEvent(config.period, 0.0, self._expose)
+
+    def _expose(self, context: Context, discrete_state: DiscreteValues) -> None:
+        time = context.get_time()
+        noise = self._noise.Eval(context)
+        lost = noise[6] < self._lost_below or any(a <= time < b for a, b in self._config.dropouts)
+        X_WE = self._X_WE.Eval(context).GetAsMatrix34()
+        if self._rotation_sigma > 0.0:
+            turn = self._rotation_sigma * noise[:3]
+            angle = float(np.sqrt(turn @ turn))
+            X_WE[:, :3] = rotation_about(turn / (angle or 1.0), angle) @ X_WE[:, :3]
+        X_WE[:, 3] += self._config.position_sigma * noise[3:6]
+        entry = np.empty(_WIDTH)
+        entry[0], entry[1], entry[2:] = time, not lost, X_WE.ravel()
+        older = context.get_discrete_state(self._pipeline).value()[:-_WIDTH]
+        discrete_state.set_value(np.concatenate([entry, older]))
+
+    def _calc_sample(self, context: Context, output) -> None:
+        due = context.get_time() - self._config.delay + _EPSILON
+        pipeline = context.get_discrete_state(self._pipeline).value().reshape(-1, _WIDTH)
+        for entry in pipeline:
+            if entry[0] <= due:
+                output.set_value(_decode(entry, self._config.position_sigma))
+                return
+        raise AssertionError("the camera's pipeline always ends with a sample that has arrived")
+
+
+def _decode(entry: np.ndarray, residual: float) -> PoseSample:
+    pose = entry[2:].reshape(3, 4)
+    X_WE = RigidTransform(RotationMatrix(pose[:, :3]), pose[:, 3])
+    return PoseSample(float(entry[0]), X_WE, bool(entry[1]), residual)
+
+
+def _check(config: CameraConfig) -> None:
+    if not config.period > 0.0:
+        raise ValueError(f"camera: period must be positive, got {config.period} s")
+    if not config.delay >= 0.0:
+        raise ValueError(f"camera: delay must not be negative, got {config.delay} s")
+    if not (config.position_sigma >= 0.0 and config.orientation_sigma_deg >= 0.0):
+        raise ValueError(
+            "camera: position_sigma and orientation_sigma_deg must not be negative, got "
+            f"{config.position_sigma} m and {config.orientation_sigma_deg} deg"
+        )
+    if not 0.0 <= config.dropout_probability < 1.0:
+        raise ValueError(f"camera: dropout_probability must be in [0, 1), got {config.dropout_probability}")
+    for window in config.dropouts:
+        if len(window) != 2 or not window[0] < window[1]:
+            raise ValueError(f"camera: a drop-out must be [start, end] with start < end, got {window}")

@@ -1,0 +1,195 @@
+"""The last word before the robot: limits, missing commands, lost measurements and the smooth stop."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from pydrake.common.value import Value
+from pydrake.systems.framework import BasicVector, Context, DiscreteValues, LeafSystem, ValueProducer
+
+from robots.model import NUM_JOINTS, RobotModel
+from systems.samples import JointSample
+
+KINDS = (
+    "velocity_limit",  # a joint would have moved faster than it may; all joints are slowed alike
+    "position_limit",  # a joint would have left its range
+    "correction_limit",  # the law's correction stands at its limit
+    "no_command",  # the law gave no finite command; the last one is held
+    "measurement_refused",  # a sample too far from the path to be true
+    "measurement_held",  # no usable sample for a while; the law holds its correction
+    "stopped",  # no usable sample or no command for too long; the robot is brought to rest and stays there
+)
+_VELOCITY, _POSITION, _CORRECTION, _NO_COMMAND, _REFUSED, _HELD, _STOPPED = range(len(KINDS))
+
+# The state: what was issued last (NaN before the first command), the velocity from which a braking
+# began, the counts, the mode, the times of the first tick and of the last command and the refused samples counted so far.
+_ISSUED_POSITION, _ISSUED_VELOCITY, _BRAKING_FROM = slice(0, 6), slice(6, 12), slice(12, 18)
+_COUNTS = slice(18, 18 + len(KINDS))
+_MODE, _FIRST_TICK, _LAST_COMMAND, _REFUSED_SEEN = range(_COUNTS.stop, _COUNTS.stop + 4)
+_WIDTH = _REFUSED_SEEN + 1
+_GOING, _HOLDING, _STOPPING = 0.0, 1.0, 2.0
+
+
+@dataclass
+class GuardConfig:
+    """What the guard allows; read from a scenario file."""
+
+    hold_after: float = 0.05  # s without a usable sample: the correction is held, the path goes on
+    stop_after: float = 0.5  # s without a usable sample or command: smooth stop
+    stop_time: float = 0.25  # s from full motion to rest
+    speed_share: float = 1.0  # of the robot's largest joint speeds
+    largest_deviation: float = 0.2  # m from the path: a sample further away is taken for a false detection
+    largest_deviation_deg: float = 40.0
+
+
+class CommandGuard(LeafSystem):
+    """Passes a law's command on, made safe.
+
+    Ports:
+        in  ``position_command``  vector 6 in rad, NaN where the law has no answer
+        in  ``velocity_command``  vector 6 in rad/s
+        in  ``correction``        vector 6 in rad and m, rotation first
+        in  ``measurement``       vector 2: time of the last usable sample in s, number of refused samples
+        in  ``joint_sample``      JointSample
+        out ``position_command``  vector 6 in rad: always finite, in range, within the speed limits
+        out ``velocity_command``  vector 6 in rad/s, likewise
+        out ``guard_status``      vector: how many ticks each of `KINDS` has happened, in that order
+
+    The command that was issued last is the state; the output is computed from it and the law's newest
+    command, without delay. Before the first command the output is the measured position.
+    """
+
+    def __init__(
+        self,
+        robot: RobotModel,
+        config: GuardConfig,
+        period: float,
+        correction_limit: float,
+        correction_limit_deg: float,
+        uses_camera: bool = True,
+    ) -> None:
+        """Args:
+            robot: whose limits count.
+            config: what is allowed.
+            period: time between commands in s.
+            correction_limit: the law's limit in m; reaching it is counted.
+            correction_limit_deg: the same for the orientation.
+            uses_camera: False for a law that does without samples, so that a blind camera does not stop it.
+
+        Raises:
+            ValueError: if a time is not positive, or the stop would come before the hold.
+        """
+        super().__init__()
+        if not 0.0 < config.hold_after < config.stop_after:
+            raise ValueError(
+                f"guard: 0 < hold_after < stop_after is needed, got {config.hold_after} s and {config.stop_after} s"
+            )
+        if not (config.stop_time > 0.0 and 0.0 < config.speed_share <= 1.0):
+            raise ValueError(
+                "guard: stop_time must be positive and speed_share in (0, 1], got "
+                f"{config.stop_time} s and {config.speed_share}"
+            )
+        self._config, self._period, self._uses_camera = config, period, uses_camera
+        self._lower, self._upper = robot.lower, robot.upper
+        self._speed = config.speed_share * robot.speed
+        # A hundred-thousandth below, because a law's own clipping rounds.
+        self._correction_limit = (1.0 - 1e-5) * correction_limit
+        self._correction_angle = (1.0 - 1e-5) * np.deg2rad(correction_limit_deg)
+        self._inputs = [
+            self.DeclareVectorInputPort(name, size)
+            for name, size in (
+                ("position_command", NUM_JOINTS),
+                ("velocity_command", NUM_JOINTS),
+                ("correction", 6),
+                ("measurement", 2),
+            )
+        ]
+        self._joints = self.DeclareAbstractInputPort("joint_sample", Value(JointSample()))
+        unknown = np.zeros(_WIDTH)
+        unknown[:12], unknown[_FIRST_TICK], unknown[_LAST_COMMAND] = np.nan, np.inf, -np.inf
+        self._state = self.DeclareDiscreteState(unknown)
+        inputs = {port.ticket() for port in self._inputs} | {self._joints.ticket()}
+        inputs |= {self.discrete_state_ticket(self._state)}
+        # One entry computes everything; the ports are slices of it.
+        self._next = self.DeclareCacheEntry(
+            "next", ValueProducer(Value[object], self._calc_next), inputs
+        )
+        for name, part in (
+            ("position_command", _ISSUED_POSITION),
+            ("velocity_command", _ISSUED_VELOCITY),
+            ("guard_status", _COUNTS),
+        ):
+            size = part.stop - part.start
+            self.DeclareVectorOutputPort(name, size, self._slice(part), {self._next.ticket()})
+        self.DeclarePeriodicDiscreteUpdateEvent(period, 0.0, self._remember)
+
+    def _slice(self, part: slice):
+        def calc(context: Context, output: BasicVector) -> None:
+            output.set_value(self._next.Eval(context)[part])
+
+        return calc
+
+    def _calc_next(self, context: Context, value) -> None:
+        state = context.get_discrete_state(self._state).value().copy()
+        position, velocity, correction, measurement = (port.Eval(context) for port in self._inputs)
+        counts = state[_COUNTS]
+        if np.isnan(state[0]):
+            state[_ISSUED_POSITION], state[_ISSUED_VELOCITY] = self._joints.Eval(context).position, 0.0
+        if state[_MODE] == _STOPPING:
+            counts[_STOPPED] += 1.0
+            self._brake(state)
+        elif not np.isfinite(position.sum() + velocity.sum()):
+            # Before the first command a law is silent by right.
+            counts[_NO_COMMAND] += state[_LAST_COMMAND] > -np.inf
+            self._brake(state)
+        else:
+            self._follow(state, position, velocity, counts)
+        counts[_HELD] += state[_MODE] == _HOLDING
+        counts[_REFUSED] += measurement[1] - state[_REFUSED_SEEN]
+        state[_REFUSED_SEEN] = measurement[1]
+        turned, shifted = correction[:3], correction[3:]
+        if turned @ turned > self._correction_angle**2 or shifted @ shifted > self._correction_limit**2:
+            counts[_CORRECTION] += 1.0
+        value.set_value(state)
+
+    def _follow(self, state: np.ndarray, position: np.ndarray, velocity: np.ndarray, counts: np.ndarray) -> None:
+        """Goes to the law's command as far as the limits allow."""
+        step = position - state[_ISSUED_POSITION]
+        excess = max(
+            float((np.abs(step) / self._speed).max()) / self._period, float((np.abs(velocity) / self._speed).max())
+        )
+        if excess > 1.0 + 1e-9:
+            counts[_VELOCITY] += 1.0
+            position, velocity = state[_ISSUED_POSITION] + step / excess, velocity / excess
+        if (position < self._lower).any() or (position > self._upper).any():
+            counts[_POSITION] += 1.0
+            inside = np.minimum(np.maximum(position, self._lower), self._upper)
+            velocity = np.where((position - inside) * velocity > 0.0, 0.0, velocity)
+            position = inside
+        state[_ISSUED_POSITION], state[_ISSUED_VELOCITY], state[_BRAKING_FROM] = position, velocity, velocity
+
+    def _brake(self, state: np.ndarray) -> None:
+        """Slows all joints down evenly, from full motion to rest in ``stop_time``."""
+        start, last = state[_BRAKING_FROM], state[_ISSUED_VELOCITY]
+        top = float(np.abs(start).max())
+        share = max(0.0, float(np.abs(last).max()) / top - self._period / self._config.stop_time) if top else 0.0
+        velocity = share * start
+        position = state[_ISSUED_POSITION] + 0.5 * self._period * (last + velocity)
+        state[_ISSUED_POSITION] = np.minimum(np.maximum(position, self._lower), self._upper)
+        state[_ISSUED_VELOCITY] = velocity
+
+    def _remember(self, context: Context, discrete_state: DiscreteValues) -> None:
+        """Makes the issued command the state and decides from the clocks how the next tick will go."""
+        state = self._next.Eval(context).copy()
+        time = context.get_time()
+        if np.isfinite(self._inputs[0].Eval(context)[0]) or state[_LAST_COMMAND] == -np.inf:
+            state[_LAST_COMMAND] = time
+        # A camera that has not spoken yet is not lost: its time starts with the guard's first tick.
+        state[_FIRST_TICK] = min(state[_FIRST_TICK], time)
+        last_sample = self._inputs[3].Eval(context)[0]
+        age = time - max(last_sample, state[_FIRST_TICK]) if self._uses_camera else 0.0
+        silence = time - state[_LAST_COMMAND]
+        if state[_MODE] == _STOPPING or max(age, silence) >= self._config.stop_after - 1e-9:
+            state[_MODE] = _STOPPING
+        else:
+            state[_MODE] = _HOLDING if age >= self._config.hold_after - 1e-9 else _GOING
+        discrete_state.set_value(state)

@@ -1,0 +1,201 @@
+"""What all visual-servo laws share: their ports, the comparison with the camera, and what is never trusted."""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from pydrake.common.value import Value
+from pydrake.math import RigidTransform
+from pydrake.systems.framework import Context, DiscreteValues, LeafSystem
+
+from robots.inverse_kinematics import JointLimitError, UnreachableError
+from robots.kinematics import rotation_about
+from robots.model import NUM_JOINTS, RobotModel
+from systems.guard import GuardConfig
+from systems.samples import JointSample, PoseSample
+
+_ENTRY = 19  # a moment of the path: time, the rows of the 3 x 4 pose matrix, the twist
+_NO_COMMAND = np.full(NUM_JOINTS, np.nan)
+
+
+@dataclass
+class LawConfig:
+    """Gains and limits of a law; read from a scenario file."""
+
+    translation: float = 5.0  # 1/s
+    rotation: float = 5.0  # 1/s
+    drive: str = "position"  # the drive that the law commands: position, velocity or cascade
+    correction_limit: float = 0.1  # m, the largest correction of the position
+    correction_limit_deg: float = 20.0  # the largest correction of the orientation
+    correction_speed_limit_deg_s: float = 30.0  # of one joint, where a law corrects velocities
+
+
+@dataclass(frozen=True)
+class Moment:
+    """What a law sees at one tick. Poses are homogeneous matrices (4, 4)."""
+
+    X_WD: np.ndarray  # wanted pose
+    V_WD: np.ndarray  # wanted twist
+    position: np.ndarray  # measured joint positions, rad
+    measured: tuple[np.ndarray, np.ndarray] | None  # (wanted, seen) pose at the exposure; None: do not correct
+
+
+@dataclass(frozen=True)
+class Step:
+    """What a law answers: a command, its correction so far and its memory for the next tick."""
+
+    position: np.ndarray  # rad
+    velocity: np.ndarray  # rad/s
+    correction: np.ndarray  # rad and m, rotation first, as a pose error in the world
+    memory: np.ndarray
+
+
+class ServoLaw(LeafSystem):
+    """The frame of a visual-servo law; a law adds `_start` and `_step`.
+
+    Ports:
+        in  ``X_WE_desired``      RigidTransform, the wanted pose at t + preview
+        in  ``V_WE_desired``      vector 6, the wanted twist at t + preview
+        in  ``joint_sample``      JointSample
+        in  ``pose_sample``       PoseSample
+        out ``position_command``  vector 6 in rad, NaN before the first tick and where the law has no answer
+        out ``velocity_command``  vector 6 in rad/s, likewise
+        out ``correction``        vector 6 in rad and m, rotation first: what the law has added to the path
+        out ``measurement``       vector 2: time of the last usable sample in s, number of refused samples
+
+    A sample is compared with the path at the instant of its exposure, so that transport delay does not
+    look like an error. For that a law remembers the last ``memory_span`` seconds of the path.
+    """
+
+    def __init__(
+        self,
+        robot: RobotModel,
+        config: LawConfig,
+        guard: GuardConfig,
+        period: float,
+        preview: float = 0.0,
+        memory_span: float = 0.25,
+    ) -> None:
+        """Args:
+            robot: the nominal robot.
+            config: gains and limits.
+            guard: when to use a sample.
+            period: tick of the law in s.
+            preview: how far ahead of time the wanted pose at the input port is, in s.
+            memory_span: the oldest exposure that can still be compared, in s.
+
+        Raises:
+            ValueError: if a gain or a limit is not positive.
+        """
+        super().__init__()
+        for label in ("translation", "rotation", "correction_limit", "correction_limit_deg"):
+            if not getattr(config, label) > 0.0:
+                raise ValueError(f"servo law: {label} must be positive, got {getattr(config, label)}")
+        self.robot, self.config, self.period = robot, config, period
+        self._guard, self._preview = guard, preview
+        self._largest_angle = np.deg2rad(guard.largest_deviation_deg)
+        self._X_WD = self.DeclareAbstractInputPort("X_WE_desired", Value(RigidTransform()))
+        self._V_WD = self.DeclareVectorInputPort("V_WE_desired", 6)
+        self._joints = self.DeclareAbstractInputPort("joint_sample", Value(JointSample()))
+        self._camera = self.DeclareAbstractInputPort("pose_sample", Value(PoseSample()))
+        self._outputs = [
+            self.DeclareDiscreteState(_NO_COMMAND),
+            self.DeclareDiscreteState(_NO_COMMAND),
+            self.DeclareDiscreteState(np.zeros(6)),
+            self.DeclareDiscreteState(np.array([-np.inf, 0.0])),
+        ]
+        self._history = self.DeclareDiscreteState(
+            np.full((int(np.ceil((memory_span + preview) / period)) + 2) * _ENTRY, np.nan)
+        )
+        self._memory = self.DeclareDiscreteState(self.memory_size)
+        for name, state in zip(
+            ("position_command", "velocity_command", "correction", "measurement"), self._outputs, strict=True
+        ):
+            self.DeclareStateOutputPort(name, state)
+        self.DeclarePeriodicDiscreteUpdateEvent(period, 0.0, self._tick)
+
+    memory_size = 1  # numbers that a law remembers; a law overrides it
+
+    def _start(self, moment: Moment) -> np.ndarray:
+        """The memory with which the law begins, so that its first command moves nothing."""
+        raise NotImplementedError
+
+    def _step(self, moment: Moment, memory: np.ndarray) -> Step:
+        """One tick of the law."""
+        raise NotImplementedError
+
+    def _tick(self, context: Context, discrete_state: DiscreteValues) -> None:
+        time = context.get_time()
+        X_WD = self._X_WD.Eval(context).GetAsMatrix4()
+        V_WD = self._V_WD.Eval(context)
+        joints: JointSample = self._joints.Eval(context)
+        sample: PoseSample = self._camera.Eval(context)
+        last_used, refused = context.get_discrete_state(self._outputs[3]).value()
+
+        entry = np.empty(_ENTRY)
+        entry[0], entry[1:13], entry[13:] = time + self._preview, X_WD[:3].ravel(), V_WD
+        history = np.concatenate([entry, context.get_discrete_state(self._history).value()[:-_ENTRY]])
+
+        measured = None
+        if sample.valid and time - sample.time <= self._guard.hold_after + 1e-9:
+            wanted = self._path_at(history, sample.time)
+            seen = sample.X_WE.GetAsMatrix4()
+            if wanted is not None and self._is_plausible(wanted, seen):
+                measured = (wanted, seen)
+                last_used = sample.time
+            elif wanted is not None and sample.time > last_used:
+                refused += 1.0
+
+        moment = Moment(X_WD, V_WD, joints.position, measured)
+        first_tick = np.isnan(history[_ENTRY])
+        memory = self._start(moment) if first_tick else context.get_discrete_state(self._memory).value()
+        try:
+            step = self._step(moment, memory)
+        except (UnreachableError, JointLimitError):
+            # No command is an answer too: the guard holds the robot and counts it.
+            correction = context.get_discrete_state(self._outputs[2]).value()
+            step = Step(_NO_COMMAND, _NO_COMMAND, correction, memory)
+        discrete_state.set_value(0, step.position)
+        discrete_state.set_value(1, step.velocity)
+        discrete_state.set_value(2, step.correction)
+        discrete_state.set_value(3, np.array([last_used, refused]))
+        discrete_state.set_value(4, history)
+        discrete_state.set_value(5, step.memory)
+
+    def _path_at(self, history: np.ndarray, time: float) -> np.ndarray | None:
+        """The wanted pose at an earlier time, None if it is too long ago."""
+        steps_ago = max(0, round((history[0] - time) / self.period))
+        if steps_ago * _ENTRY >= history.size:
+            return None
+        if np.isnan(history[steps_ago * _ENTRY]):
+            # Before the first tick the path was where it was then: it starts at rest.
+            steps_ago = np.count_nonzero(~np.isnan(history[::_ENTRY])) - 1
+        entry = history[steps_ago * _ENTRY : (steps_ago + 1) * _ENTRY]
+        X_WD = np.eye(4)
+        X_WD[:3] = entry[1:13].reshape(3, 4)
+        if abs(time - entry[0]) > 1e-6:
+            move_pose(X_WD, (time - entry[0]) * entry[13:])
+        return X_WD
+
+    def _is_plausible(self, wanted: np.ndarray, seen: np.ndarray) -> bool:
+        """Whether a sample can be this tool on this path rather than a false detection."""
+        gap = seen[:3, 3] - wanted[:3, 3]
+        cosine = 0.5 * (float(np.vdot(seen[:3, :3], wanted[:3, :3])) - 1.0)
+        return (
+            float(gap @ gap) <= self._guard.largest_deviation**2
+            and math.acos(min(1.0, max(-1.0, cosine))) <= self._largest_angle
+        )
+
+
+def move_pose(X: np.ndarray, step: np.ndarray) -> None:
+    """Moves a pose (4, 4) in place by a small spatial displacement (rad, m) in world axes."""
+    angle = math.sqrt(float(step[:3] @ step[:3]))
+    if angle > 0.0:
+        X[:3, :3] = rotation_about(step[:3] / angle, angle) @ X[:3, :3]
+    X[:3, 3] += step[3:]
+
+
+def limit_norm(vector: np.ndarray, limit: float) -> np.ndarray:
+    """The vector, shortened to the limit if it is longer."""
+    norm = math.sqrt(float(vector @ vector))
+    return vector if norm <= limit else vector * (limit / norm)

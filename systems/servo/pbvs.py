@@ -1,0 +1,51 @@
+"""Position-based visual servoing: joint velocities from the difference of the poses in Euler angles."""
+
+import math
+
+import numpy as np
+
+from robots.inverse_kinematics import InverseKinematics
+from robots.kinematics import Kinematics, robust_inverse
+from robots.model import RobotModel
+from robots.pose import euler_rate_matrix, pose_error, wrap_angle, zyx_from_rotation
+from systems.guard import GuardConfig
+from systems.servo.law import LawConfig, Moment, ServoLaw, Step
+
+
+class Pbvs(ServoLaw):
+    """Commands dq/dt = J^+(q_d) V_d + J^+(q) T(z) K (z_d - z_m), Probst (2024) eq. (5.14).
+
+    Corrected: every angle difference is wrapped to (-180, 180] degrees, because alpha runs through 180
+    degrees at both ends of the path; without that the source keeps a static error of 6 degrees.
+
+    The correcting joint velocity is limited. The memory holds q_d, the nominal joint positions on the path.
+    """
+
+    memory_size = 6
+
+    def __init__(self, robot: RobotModel, config: LawConfig, guard: GuardConfig, period: float, **options) -> None:
+        super().__init__(robot, config, guard, period, **options)
+        self._kinematics = Kinematics(robot)
+        self._inverse = InverseKinematics(robot)
+        self._speed_limit = math.radians(config.correction_speed_limit_deg_s)
+
+    def _start(self, moment: Moment) -> np.ndarray:
+        return moment.position
+
+    def _step(self, moment: Moment, memory: np.ndarray) -> Step:
+        q_d = self._inverse.nearest(moment.X_WD, memory)
+        velocity = robust_inverse(self._kinematics.jacobian(q_d)) @ moment.V_WD
+        X_WE, J = self._kinematics.forward_and_jacobian(moment.position)
+        if moment.measured is not None:
+            correction = robust_inverse(J) @ self._feedback(*moment.measured)
+            velocity = velocity + correction * min(1.0, self._speed_limit / max(np.abs(correction).max(), 1e-12))
+        position = moment.position + self.period * velocity
+        return Step(position, velocity, pose_error(X_WE, moment.X_WD), q_d)
+
+    def _feedback(self, wanted: np.ndarray, seen: np.ndarray) -> np.ndarray:
+        zyx = zyx_from_rotation(seen[:3, :3])
+        rates = self.config.rotation * wrap_angle(zyx_from_rotation(wanted[:3, :3]) - zyx)
+        twist = np.empty(6)
+        twist[:3] = euler_rate_matrix(zyx) @ rates
+        twist[3:] = self.config.translation * (wanted[:3, 3] - seen[:3, 3])
+        return twist

@@ -1,0 +1,68 @@
+"""The error system on position level: the wanted pose, shifted by the integral of its error."""
+
+import math
+
+import numpy as np
+
+from robots.inverse_kinematics import InverseKinematics
+from robots.kinematics import Kinematics, robust_inverse
+from robots.model import RobotModel
+from robots.pose import euler_rate_matrix, rotation_from_zyx, wrap_angle, zyx_from_rotation
+from systems.guard import GuardConfig
+from systems.servo.law import LawConfig, Moment, ServoLaw, Step, limit_norm
+
+
+class PositionLevel(ServoLaw):
+    """Commands q(z_d + c) with dc/dt = K (z_d - z_m), Probst (2024) eqs. (5.18), (5.19).
+
+    Corrected: c starts at minus the initial error, so that the first command is where the robot stands
+    (the source adds the error and jumps by twice of it), and Euler angle differences are wrapped.
+    The initial error is taken from the nominal kinematics, because that is what makes the start smooth
+    also for a robot whose geometry is wrong. The correction is limited.
+
+    The memory holds c (Euler angles alpha, beta, gamma in rad, then the position in m) and the last joint
+    positions, which choose the branch.
+    """
+
+    memory_size = 12
+
+    def __init__(self, robot: RobotModel, config: LawConfig, guard: GuardConfig, period: float, **options) -> None:
+        super().__init__(robot, config, guard, period, **options)
+        self._kinematics = Kinematics(robot)
+        self._inverse = InverseKinematics(robot)
+        self._angle_limit = math.radians(config.correction_limit_deg)
+
+    def _start(self, moment: Moment) -> np.ndarray:
+        X_WE = self._kinematics.forward(moment.position)
+        return np.concatenate([_euler_difference(X_WE, moment.X_WD), moment.position])
+
+    def _step(self, moment: Moment, memory: np.ndarray) -> Step:
+        c, q = memory[:6], memory[6:]
+        rate = np.zeros(6)
+        if moment.measured is not None:
+            wanted, seen = moment.measured
+            rate = _euler_difference(wanted, seen)
+            rate[:3] *= self.config.rotation
+            rate[3:] *= self.config.translation
+        c = c + self.period * rate
+        c[:3] = limit_norm(c[:3], self._angle_limit)
+        c[3:] = limit_norm(c[3:], self.config.correction_limit)
+
+        wanted_zyx = zyx_from_rotation(moment.X_WD[:3, :3])
+        zyx = wanted_zyx + c[:3]
+        X_WC = moment.X_WD.copy()
+        X_WC[:3, :3] = rotation_from_zyx(zyx)
+        X_WC[:3, 3] += c[3:]
+        q = self._inverse.nearest(X_WC, q)
+        T = euler_rate_matrix(zyx)
+        correction = np.concatenate([T @ c[:3], c[3:]])
+        V = moment.V_WD + rate
+        V[:3] = T @ (rate[:3] + np.linalg.solve(euler_rate_matrix(wanted_zyx), moment.V_WD[:3]))
+        velocity = robust_inverse(self._kinematics.jacobian(q)) @ V
+        return Step(q, velocity, correction, np.concatenate([c, q]))
+
+
+def _euler_difference(X_WD: np.ndarray, X_WE: np.ndarray) -> np.ndarray:
+    """z_d - z with wrapped angles (alpha, beta, gamma) in rad, then the position in m, eq. (5.10)."""
+    angles = wrap_angle(zyx_from_rotation(X_WD[:3, :3]) - zyx_from_rotation(X_WE[:3, :3]))
+    return np.concatenate([angles, X_WD[:3, 3] - X_WE[:3, 3]])

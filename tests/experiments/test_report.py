@@ -1,0 +1,151 @@
+"""The report, the replay and the table of a comparison, as a reader meets them."""
+
+import dataclasses
+import re
+import socket
+
+import numpy as np
+import pytest
+from rich.console import Console
+
+from experiments.metrics import summary, timing
+from experiments.replay import write_replay
+from experiments.report import verdict, write_report
+from experiments.report_style import TITLES, law_colors
+from experiments.tables import print_summary
+from robots.model import load_robot
+from tests.experiments.browser import open_page, screenshot
+from tests.experiments.synthetic import comparison, displaced, make_log, rectangle
+
+HOSTILE = "name: misaligned\nnote: '</script><script>document.title = \"broken\"</script> & <b>'\n"
+SERIOUS = re.compile("Uncaught|Error|Failed|Refused|not allowed|Not allowed")
+
+
+@pytest.fixture(scope="module")
+def logs():
+    return comparison(cycles=2, with_joints=True)
+
+
+@pytest.fixture(scope="module")
+def report(logs, tmp_path_factory):
+    path = tmp_path_factory.mktemp("report") / "report.html"
+    write_report(path, HOSTILE, summary("misaligned", logs), timing(logs), logs)
+    return path
+
+
+@pytest.fixture(scope="module")
+def replay(logs, tmp_path_factory):
+    path = tmp_path_factory.mktemp("replay") / "replay.html"
+    write_replay(path, load_robot("irb1200"), {law: cycles[0] for law, cycles in logs.items()})
+    return path
+
+
+def test_the_report_draws_every_plot_without_an_error(report):
+    opened = open_page(report)
+    assert not [line for line in opened.console if SERIOUS.search(line)]
+    for plot in ("path", "distance", "position", "orientation", "bars-mm", "bars-deg", "events"):
+        # plotly gives an element this class once it has drawn into it.
+        assert re.search(
+            rf'class="[^"]*js-plotly-plot[^"]*"[^>]*id="{plot}"|id="{plot}"[^>]*js-plotly-plot', opened.dom
+        )
+    assert 'data-drawn="yes"' in opened.dom
+    for title in TITLES.values():
+        assert title in opened.dom
+    assert (
+        "<title>misaligned: visual servoing compared</title>" in opened.dom
+    )  # the scenario's script did not run
+
+
+def test_the_report_is_small_and_asks_the_network_for_nothing(report):
+    html = report.read_text()
+    assert len(html) < 10e6
+    assert not re.search(r'<(script|img|iframe)[^>]* src=|<link[^>]* href="http', html)
+    assert "</script><script>document.title" not in html
+
+
+def test_the_verdict_names_the_best_law_and_the_baseline():
+    numbers = {
+        "max_norm_mm": 2.0,
+        "max_angle_deg": 0.5,
+        "static_mm": [0.003, 0.004, 0.0],
+        "static_deg": [0.0, 0.0, 0.03],
+    }
+    worse = dict(numbers, max_norm_mm=25.0, static_mm=[0.0, 3.0, 4.0])
+    text = verdict(
+        {"runs": {"open_loop": {"true": worse}, "pbvs": {"true": numbers}, "numerical_ik": {"true": worse}}}
+    )
+    assert text.startswith("PBVS keeps the true tip within 2.00 mm and 0.50° of the wanted path")
+    assert "comes to rest 0.005 mm and 0.03° from it" in text
+    assert "off by up to 25.00 mm and 0.50°, and by 5.00 mm at rest" in text
+
+
+def test_one_law_alone_makes_a_report(logs, tmp_path):
+    alone = {"my_law": [dataclasses.replace(logs["pbvs"][0], law="my_law", guard_events=[], guard_counts={})]}
+    write_report(tmp_path / "report.html", "", summary("s", alone), timing(alone), alone)
+    html = (tmp_path / "report.html").read_text()
+    assert "my law keeps the true tip" in html
+    assert "No intervention" in html
+
+
+def test_a_report_that_cannot_be_written_leaves_nothing(logs, tmp_path):
+    with pytest.raises(OSError):
+        write_report(tmp_path / "missing" / "report.html", "", summary("s", logs), timing(logs), logs)
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_the_replay_opens_in_a_browser_and_names_the_laws(replay):
+    opened = open_page(replay)
+    assert not [line for line in opened.console if SERIOUS.search(line)]
+    assert "<canvas" in opened.dom
+    for title in TITLES.values():
+        assert title in opened.dom
+    assert replay.stat().st_size < 10e6
+
+
+def test_the_replay_moves_by_itself(replay, tmp_path):
+    for seconds in (2, 9):
+        screenshot(replay, tmp_path / f"{seconds}.png", 320, 240, milliseconds=1000 * seconds)
+    assert (tmp_path / "2.png").read_bytes() != (tmp_path / "9.png").read_bytes()
+
+
+def test_an_initial_error_that_settles_has_a_section(tmp_path):
+    time = np.arange(0.0, 6.0, 0.01)
+    X = rectangle(time)
+    e = np.exp(-10.0 * time)[:, None] * np.array([0.0, 0.0, 0.0, 0.01, 0.01, 0.01])
+    logs = {"pbvs": [make_log(time, X, displaced(X, e))]}
+    write_report(tmp_path / "report.html", "", summary("nominal", logs), timing(logs), logs)
+    html = (tmp_path / "report.html").read_text()
+    # log(20) / 10 = 0.2996 s, found at the next sample of 10 ms.
+    assert re.search(r"Initial error.*?PBVS</td><td>0\.300</td><td>0\.000</td>", html, re.DOTALL)
+
+
+def test_the_replay_needs_no_particular_port(logs, tmp_path):
+    with socket.socket() as taken:
+        try:
+            taken.bind(("127.0.0.1", 7000))
+            taken.listen()
+        except OSError:
+            pass  # somebody else holds it, which serves as well
+        write_replay(tmp_path / "replay.html", load_robot("irb1200"), {"pbvs": logs["pbvs"][0]})
+    assert "</html>" in (tmp_path / "replay.html").read_text()[-200:]
+
+
+def test_a_replay_of_a_law_that_did_not_run_is_refused(logs, tmp_path):
+    with pytest.raises(ValueError, match="no log of law 'mpc', there are pbvs"):
+        write_replay(tmp_path / "r.html", load_robot("irb1200"), {"pbvs": logs["pbvs"][0]}, shown_law="mpc")
+
+
+def test_the_table_fits_a_terminal_of_100_columns(logs):
+    console = Console(width=100, record=True, file=open("/dev/null", "w"))
+    print_summary(console, summary("misaligned", logs))
+    lines = console.export_text().splitlines()
+    assert max(map(len, lines)) <= 100
+    assert not any("…" in line for line in lines)
+    # Twice largest and static errors of each law, and a row of guard counts.
+    for title in TITLES.values():
+        assert sum(title in line for line in lines) == 5
+
+
+def test_every_law_has_its_own_colour():
+    colors = law_colors([*TITLES, "mine", "yours"])
+    assert len(set(colors.values())) == 6
