@@ -1,11 +1,12 @@
 """Joins a station and a servo, advances them, and keeps the record."""
 
+import gc
 import time
 from collections.abc import Callable
 
 import numpy as np
 from pydrake.systems.analysis import ApplySimulatorConfig, Simulator, SimulatorConfig
-from pydrake.systems.framework import Context, Diagram, DiagramBuilder, OutputPort
+from pydrake.systems.framework import DiagramBuilder
 from pydrake.systems.primitives import LogVectorOutput
 
 from diagrams.log import GuardEvent, RunLog
@@ -13,11 +14,9 @@ from diagrams.scenario import Scenario, ScenarioError
 from diagrams.servo import Servo
 from diagrams.station import SimulatedStation
 from robots.inverse_kinematics import InverseKinematics
-from robots.model import NUM_JOINTS, RobotModel, load_robot
-from robots.plant import PlantRobot
+from robots.model import RobotModel, load_robot
 from systems.guard import KINDS
 from systems.paths import CartesianPath
-from systems.sample_ports import SampleVectors
 from systems.servo import LawConfig
 
 # Beyond this rate the explicit runge_kutta3 takes more time in tiny steps than the implicit radau3 in its own.
@@ -68,21 +67,26 @@ class Experiment:
             builder.Connect(self.servo.GetOutputPort(name), self.station.GetInputPort(name))
         for name in ("joint_sample", "pose_sample"):
             builder.Connect(self.station.GetOutputPort(name), self.servo.GetInputPort(name))
-        self._logs = _add_logs(builder, self.station, self.servo, scenario.station.period)
+        self._logs = {
+            name: LogVectorOutput(self.servo.GetOutputPort(name), builder, scenario.station.period)
+            for name in ("position_command", "velocity_command", "correction", "guard_status")
+        }
         self.diagram = builder.Build()
         self.diagram.set_name("truetip")
         self.path = self.servo.reference.path
         self.simulator = Simulator(self.diagram)
         self.context = self.simulator.get_mutable_context()
         self.station.set_at_rest(self.context, start_position(robot, scenario, self.path), self.seed)
-        scheme = scenario.integrator.scheme
+        scheme, max_step = scenario.integrator.scheme, scenario.integrator.max_step
         if scheme == "auto":
             explicit = self.station.fastest_rate(self.context) < _EXPLICIT_RATE_LIMIT
             scheme = "runge_kutta3" if explicit else "radau3"
+            # Whole fractions of a tick, so that no step has to be cut short.
+            max_step = scenario.station.period / (3 if explicit else 2)
         ApplySimulatorConfig(
             SimulatorConfig(
                 integration_scheme=scheme,
-                max_step_size=scenario.integrator.max_step,
+                max_step_size=max_step,
                 accuracy=scenario.integrator.accuracy,
                 use_error_control=True,
             ),
@@ -97,35 +101,44 @@ class Experiment:
         # Chunks that end on a tick cost nothing: the integrator stops there anyway.
         ticks = max(1, round(_CHUNK / self.scenario.station.period))
         started = time.perf_counter()
+        # No cycles of objects arise in a run, but a full search for them takes 40 ms with Drake loaded.
+        collecting = gc.isenabled()
+        gc.disable()
+        try:
+            self._advance(end, ticks, progress)
+        finally:
+            if collecting:
+                gc.enable()
+        self._wall_time += time.perf_counter() - started
+
+    def _advance(self, end: float, ticks: int, progress: Callable[[float], None] | None) -> None:
         done = round(self.context.get_time() / self.scenario.station.period)
         while self.context.get_time() < end:
             done += ticks
             self.simulator.AdvanceTo(min(end, done * self.scenario.station.period))
             if progress:
                 progress(self.context.get_time() / end)
-        self._wall_time += time.perf_counter() - started
 
     def log(self) -> RunLog:
         """The record of what has happened so far."""
-        found = {name: sink.FindLog(self.context) for name, sink in self._logs.items()}
-        times = found["state"].sample_times()
-        data = {name: log.data().T for name, log in found.items()}
+        data = {name: sink.FindLog(self.context).data().T for name, sink in self._logs.items()}
+        record = self.station.record(self.context)
         counts = np.round(data["guard_status"]).astype(int)
         return RunLog(
             law=self.law,
             seed=self.seed,
-            time=times,
-            X_WE_desired=self.path.sample(times)[0],
-            X_WE_true=_tool_poses(self.station.robot, data["state"]),
-            X_WE_measured=_by_exposure(data["pose"], times),
-            joint_position=data["joints"][:, 1 : 1 + NUM_JOINTS],
-            joint_effort=data["joints"][:, 1 + 2 * NUM_JOINTS :],
-            link_position=self.station.robot.link_positions(data["state"]),
+            time=record.time,
+            X_WE_desired=self.path.sample(record.time)[0],
+            X_WE_true=record.X_WE_true,
+            X_WE_measured=record.X_WE_measured,
+            joint_position=record.joint_position,
+            joint_effort=record.joint_effort,
+            link_position=record.link_position,
             position_command=data["position_command"],
             velocity_command=data["velocity_command"],
             correction=data["correction"],
             guard_counts=dict(zip(KINDS, counts[-1].tolist(), strict=True)),
-            guard_events=_events(times, counts),
+            guard_events=_events(record.time, counts),
             path_start=self.path.path_start,
             dwell_start=self.path.dwell_start,
             path_end=self.path.duration,
@@ -152,43 +165,6 @@ def start_position(robot: RobotModel, scenario: Scenario, path: CartesianPath) -
         return inverse.nearest(X_WE, q_path[0])
     except ValueError as error:
         raise ScenarioError(f"{robot.name} cannot follow the path '{scenario.reference.path}': {error}") from error
-
-
-def _add_logs(builder: DiagramBuilder, station: Diagram, servo: Diagram, period: float) -> dict:
-    vectors = builder.AddNamedSystem("samples", SampleVectors())
-    for name in ("joint_sample", "pose_sample"):
-        builder.Connect(station.GetOutputPort(name), vectors.GetInputPort(name))
-    ports: dict[str, OutputPort] = {"state": station.GetOutputPort("truth.state")}
-    ports |= {name: vectors.GetOutputPort(name) for name in ("joints", "pose")}
-    ports |= {
-        name: servo.GetOutputPort(name)
-        for name in ("position_command", "velocity_command", "correction", "guard_status")
-    }
-    return {name: LogVectorOutput(port, builder, period) for name, port in ports.items()}
-
-
-def _tool_poses(robot: PlantRobot, states: np.ndarray) -> np.ndarray:
-    """Tool poses (n, 4, 4) of plant states (n, .)."""
-    context: Context = robot.plant.CreateDefaultContext()
-    poses = np.empty((len(states), 4, 4))
-    for pose, state in zip(poses, states, strict=True):
-        robot.plant.SetPositionsAndVelocities(context, state)
-        pose[:] = robot.tool.CalcPoseInWorld(context).GetAsMatrix4()
-    return poses
-
-
-def _by_exposure(samples: np.ndarray, times: np.ndarray) -> np.ndarray:
-    """Puts camera samples (n, 13) beside the log times at which they were exposed; NaN elsewhere."""
-    poses = np.full((len(times), 4, 4), np.nan)
-    samples = samples[np.isfinite(samples[:, 0])]
-    if len(samples) == 0:
-        return poses
-    nearest = np.searchsorted(times, samples[:, 0] - 1e-9)
-    exact = nearest < len(times)
-    exact[exact] &= np.abs(times[nearest[exact]] - samples[exact, 0]) < 1e-9
-    poses[nearest[exact], :3] = samples[exact, 1:].reshape(-1, 3, 4)
-    poses[nearest[exact], 3] = [0.0, 0.0, 0.0, 1.0]
-    return poses
 
 
 def _events(times: np.ndarray, counts: np.ndarray) -> list[GuardEvent]:

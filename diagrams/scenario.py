@@ -46,11 +46,15 @@ class ServoConfig:
 
 @dataclass
 class IntegratorConfig:
-    """How the plant is integrated. ``auto`` is runge_kutta3, or radau3 where that one would need tiny steps."""
+    """How the plant is integrated.
 
-    scheme: str = "auto"
-    accuracy: float = 1e-4
-    max_step: float = 4e-3  # s
+    ``auto`` is runge_kutta3 with at most a third of the tick, or radau3 with at most half of it where the
+    other would need tiny steps. The bench shows that the tip is then right to less than a micrometre.
+    """
+
+    scheme: str = "auto"  # or any name of Drake's GetIntegrationSchemes
+    accuracy: float = 1e-3
+    max_step: float = 4e-3  # s, of a scheme chosen by name
 
 
 @dataclass

@@ -1,10 +1,18 @@
 """The robot cell as a diagram with the ports of the contract."""
 
+from dataclasses import dataclass
+
 import numpy as np
 from pydrake.common import RandomDistribution, RandomGenerator
 from pydrake.multibody.plant import MultibodyPlant
 from pydrake.systems.framework import Context, Diagram, DiagramBuilder
-from pydrake.systems.primitives import ConstantVectorSource, RandomSource, Selector, SelectorParams
+from pydrake.systems.primitives import (
+    ConstantVectorSource,
+    LogVectorOutput,
+    RandomSource,
+    Selector,
+    SelectorParams,
+)
 
 from diagrams.scenario import StationConfig
 from robots.model import NUM_JOINTS, RobotModel
@@ -13,6 +21,18 @@ from systems.camera import PoseCamera
 from systems.drive import Drive
 from systems.joint_sensor import JointSensor
 from systems.tip_pose import TipPose
+
+
+@dataclass(frozen=True)
+class StationRecord:
+    """The measurements of a run and, of a simulated station, the truth; n samples."""
+
+    time: np.ndarray  # (n,) s
+    joint_position: np.ndarray  # (n, 6) rad
+    joint_effort: np.ndarray  # (n, 6) N m, joint side
+    X_WE_measured: np.ndarray  # (n, 4, 4), NaN where there is no valid sample
+    X_WE_true: np.ndarray  # (n, 4, 4)
+    link_position: np.ndarray  # (n, 6) rad, behind the elastic gears
 
 
 class SimulatedStation(Diagram):
@@ -70,6 +90,15 @@ class SimulatedStation(Diagram):
 
         for name in ("position_command", "velocity_command"):
             builder.ExportInput(self.drive.GetInputPort(name), name)
+        self._logs = {
+            name: LogVectorOutput(port, builder, config.period)
+            for name, port in (
+                ("state", state),
+                ("motor_state", motor_state.get_output_port()),
+                ("motor_torque", torque),
+                ("exposure", camera.GetOutputPort("exposure")),
+            )
+        }
         builder.ExportOutput(sensor.GetOutputPort("joint_sample"), "joint_sample")
         builder.ExportOutput(camera.GetOutputPort("pose_sample"), "pose_sample")
         builder.ExportOutput(tip.GetOutputPort("X_WE"), "truth.X_WE")
@@ -100,6 +129,32 @@ class SimulatedStation(Diagram):
         M_inverse = np.linalg.inv(self.plant.CalcMassMatrix(context))
         A = np.block([[np.zeros((n, n)), np.eye(n)], [-M_inverse * K, -M_inverse * D]])
         return float(np.abs(np.linalg.eigvals(A)).max())
+
+
+    def record(self, root_context: Context) -> StationRecord:
+        """What the station has measured, and the truth beside it, since the start."""
+        found = {name: log.FindLog(root_context) for name, log in self._logs.items()}
+        state, motor_state, torque, exposure = (log.data().T for log in found.values())
+        times = found["state"].sample_times()
+        return StationRecord(
+            time=times,
+            joint_position=motor_state[:, :NUM_JOINTS],
+            joint_effort=torque,
+            X_WE_measured=_by_exposure(exposure, times),
+            X_WE_true=self.robot.tool_poses(state),
+            link_position=self.robot.link_positions(state),
+        )
+
+
+def _by_exposure(exposures: np.ndarray, times: np.ndarray) -> np.ndarray:
+    """Puts logged exposures (n, 14) beside the log times at which they were made; NaN elsewhere."""
+    poses = np.full((len(times), 4, 4), np.nan)
+    exposures = exposures[exposures[:, 1] > 0.0]
+    nearest = np.minimum(np.searchsorted(times, exposures[:, 0] - 1e-9), len(times) - 1)
+    exact = np.abs(times[nearest] - exposures[:, 0]) < 1e-9
+    poses[nearest[exact], :3] = exposures[exact, 2:].reshape(-1, 3, 4)
+    poses[nearest[exact], 3] = [0.0, 0.0, 0.0, 1.0]
+    return poses
 
 
 def _selector(plant: MultibodyPlant, indices: list[int]) -> Selector:

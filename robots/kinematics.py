@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from scipy.linalg.lapack import dgetrf, dgetrs
 
 from robots.model import NUM_JOINTS, RobotModel
 
@@ -211,6 +212,23 @@ def robust_inverse(
     U, s, Vt = np.linalg.svd(J)
     gain = s / (np.square(s) + np.square(alpha)[..., None] + np.finfo(float).tiny)
     return np.swapaxes(Vt, -1, -2) * gain[..., None, :] @ np.swapaxes(U, -1, -2)
+
+
+def robust_solve(J: np.ndarray, V: np.ndarray) -> np.ndarray:
+    """J^+ V for one Jacobian with the robust inverse J^+, without forming it away from singularities.
+
+    Args:
+        J: Jacobian, shape (6, 6).
+        V: one twist, shape (6,), or several as columns, shape (6, n).
+
+    Returns:
+        Joint velocities in the shape of V.
+    """
+    factors, pivots, _ = dgetrf(J)
+    # The product of the pivots is the determinant up to its sign.
+    if abs(float(factors.ravel(order="K")[:: NUM_JOINTS + 1].prod())) >= MANIPULABILITY_THRESHOLD:
+        return dgetrs(factors, pivots, V)[0]
+    return robust_inverse(J) @ V
 
 
 def rotation_about(axis: np.ndarray, angle: float) -> np.ndarray:

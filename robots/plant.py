@@ -71,6 +71,22 @@ class PlantRobot:
             q = q + state[..., [joint.position_start() for joint in self.deflections]]
         return q
 
+    def tool_poses(self, states: np.ndarray) -> np.ndarray:
+        """Poses of the tool in the world.
+
+        Args:
+            states: states of the plant, shape (n, num_states).
+
+        Returns:
+            Homogeneous matrices, shape (n, 4, 4).
+        """
+        context = self.plant.CreateDefaultContext()
+        poses = np.empty((len(states), 4, 4))
+        for pose, state in zip(poses, states, strict=True):
+            self.plant.SetPositionsAndVelocities(context, state)
+            pose[:] = self.tool.CalcPoseInWorld(context).GetAsMatrix4()
+        return poses
+
     def set_at_rest(self, context: Context, theta: np.ndarray) -> None:
         """Puts the motors at theta (rad, shape (6,)), still, with the gears sagging under gravity."""
         positions = np.zeros(self.plant.num_positions())

@@ -168,8 +168,8 @@ def _relative_rotation(X_WD: np.ndarray, X_WE: np.ndarray) -> np.ndarray:
 
 def _single_sine_error(X_WD: np.ndarray, X_WE: np.ndarray) -> tuple[list[float], float]:
     """e-bar of one pair of poses as floats, and the cosine of the angle between them."""
-    (a0, a1, a2, ax), (b0, b1, b2, bx), (c0, c1, c2, cx), _ = X_WD.tolist()
-    (d0, d1, d2, dx), (e0, e1, e2, ex), (f0, f1, f2, fx), _ = X_WE.tolist()
+    (a0, a1, a2, ax), (b0, b1, b2, bx), (c0, c1, c2, cx), *_ = X_WD.tolist()
+    (d0, d1, d2, dx), (e0, e1, e2, ex), (f0, f1, f2, fx), *_ = X_WE.tolist()
     error = [
         0.5 * (c0 * e0 + c1 * e1 + c2 * e2 - b0 * f0 - b1 * f1 - b2 * f2),
         0.5 * (a0 * f0 + a1 * f1 + a2 * f2 - c0 * d0 - c1 * d1 - c2 * d2),

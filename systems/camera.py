@@ -5,11 +5,10 @@ from dataclasses import dataclass, field
 import numpy as np
 from pydrake.common import RandomDistribution
 from pydrake.common.value import Value
-from pydrake.math import RigidTransform, RotationMatrix
+from pydrake.math import RigidTransform, RollPitchYaw, RotationMatrix
 from pydrake.systems.framework import Context, DiscreteValues, LeafSystem
 from scipy.stats import norm
 
-from robots.kinematics import rotation_about
 from systems.samples import PoseSample
 
 _WIDTH = 14  # time, valid, then the rows of the 3 x 4 pose matrix
@@ -35,6 +34,7 @@ class PoseCamera(LeafSystem):
         in  ``X_WE``         RigidTransform, the true tool in the world
         in  ``noise``        vector 7, standard normal (wired by ``AddRandomInputs``)
         out ``pose_sample``  PoseSample, the newest one that has arrived; a lost exposure arrives as invalid
+        out ``exposure``     vector 14, the last exposure, not yet arrived: time, validity, rows of X_WE; for logs
 
     Orientation noise is a small rotation about a random axis of the world.
     """
@@ -54,12 +54,14 @@ class PoseCamera(LeafSystem):
         self._noise = self.DeclareVectorInputPort("noise", 7, RandomDistribution.kGaussian)
         in_flight = int(np.floor(config.delay / config.period + _EPSILON)) + 2
         empty = np.concatenate([[-np.inf, 0.0], np.eye(4)[:3].ravel()])
-        self._pipeline = self.DeclareDiscreteState(np.tile(empty, in_flight))
+        newest = self.DeclareDiscreteState(empty)
+        self._older = self.DeclareDiscreteState(np.tile(empty, in_flight - 1))
+        self.DeclareStateOutputPort("exposure", newest)
         self.DeclareAbstractOutputPort(
             "pose_sample",
             lambda: Value(PoseSample()),
             self._calc_sample,
-            {self.time_ticket(), self.discrete_state_ticket(self._pipeline)},
+            {self.time_ticket(), self.xd_ticket()},
         )
         self.DeclarePeriodicDiscreteUpdateEvent(config.period, 0.0, self._expose)
 
@@ -67,31 +69,29 @@ class PoseCamera(LeafSystem):
         time = context.get_time()
         noise = self._noise.Eval(context)
         lost = noise[6] < self._lost_below or any(a <= time < b for a, b in self._config.dropouts)
-        X_WE = self._X_WE.Eval(context).GetAsMatrix34()
+        X_WE = self._X_WE.Eval(context)
+        R_WE = X_WE.rotation()
         if self._rotation_sigma > 0.0:
-            turn = self._rotation_sigma * noise[:3]
-            angle = float(np.sqrt(turn @ turn))
-            X_WE[:, :3] = rotation_about(turn / (angle or 1.0), angle) @ X_WE[:, :3]
-        X_WE[:, 3] += self._config.position_sigma * noise[3:6]
+            # For small angles about random axes any three-angle rotation is the same.
+            R_WE = RotationMatrix(RollPitchYaw(self._rotation_sigma * noise[:3])).multiply(R_WE)
         entry = np.empty(_WIDTH)
-        entry[0], entry[1], entry[2:] = time, not lost, X_WE.ravel()
-        older = context.get_discrete_state(self._pipeline).value()[:-_WIDTH]
-        discrete_state.set_value(np.concatenate([entry, older]))
+        entry[0], entry[1] = time, not lost
+        pose = entry[2:].reshape(3, 4)
+        pose[:, :3] = R_WE.matrix()
+        pose[:, 3] = X_WE.translation() + self._config.position_sigma * noise[3:6]
+        newest, older = (context.get_discrete_state(i).value() for i in (0, self._older))
+        discrete_state.set_value(0, entry)
+        discrete_state.set_value(self._older, np.concatenate([newest, older[:-_WIDTH]]))
 
     def _calc_sample(self, context: Context, output) -> None:
         due = context.get_time() - self._config.delay + _EPSILON
-        pipeline = context.get_discrete_state(self._pipeline).value().reshape(-1, _WIDTH)
-        for entry in pipeline:
-            if entry[0] <= due:
-                output.set_value(_decode(entry, self._config.position_sigma))
-                return
-        raise AssertionError("the camera's pipeline always ends with a sample that has arrived")
-
-
-def _decode(entry: np.ndarray, residual: float) -> PoseSample:
-    pose = entry[2:].reshape(3, 4)
-    X_WE = RigidTransform(RotationMatrix(pose[:, :3]), pose[:, 3])
-    return PoseSample(float(entry[0]), X_WE, bool(entry[1]), residual)
+        entry = context.get_discrete_state(0).value()
+        if entry[0] > due:
+            older = context.get_discrete_state(self._older).value().reshape(-1, _WIDTH)
+            entry = next(candidate for candidate in older if candidate[0] <= due)
+        # Orthonormal by construction; checking it again would cost more than the rest.
+        X_WE = RigidTransform.MakeUnchecked(entry[2:].reshape(3, 4))
+        output.set_value(PoseSample(float(entry[0]), X_WE, bool(entry[1]), self._config.position_sigma))
 
 
 def _check(config: CameraConfig) -> None:

@@ -27,7 +27,9 @@ class CommandInterpolator(LeafSystem):
     """
 
     def __init__(self, period: float, delay: float, tracks_position: bool = True) -> None:
-        """Args:
+        """Chooses which command to follow at a tick.
+
+        Args:
             period: time between commands in s.
             delay: time from the issue of a command to the instant the set-point is at it, in s.
             tracks_position: False for velocity control, where only the velocity command counts.

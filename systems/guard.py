@@ -1,5 +1,6 @@
 """The last word before the robot: limits, missing commands, lost measurements and the smooth stop."""
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -20,12 +21,11 @@ KINDS = (
 )
 _VELOCITY, _POSITION, _CORRECTION, _NO_COMMAND, _REFUSED, _HELD, _STOPPED = range(len(KINDS))
 
-# The state: what was issued last (NaN before the first command), the velocity from which a braking
-# began, the counts, the mode, the times of the first tick and of the last command and the refused samples counted so far.
-_ISSUED_POSITION, _ISSUED_VELOCITY, _BRAKING_FROM = slice(0, 6), slice(6, 12), slice(12, 18)
-_COUNTS = slice(18, 18 + len(KINDS))
-_MODE, _FIRST_TICK, _LAST_COMMAND, _REFUSED_SEEN = range(_COUNTS.stop, _COUNTS.stop + 4)
-_WIDTH = _REFUSED_SEEN + 1
+# The state beside the counts: what was issued last (NaN before the first command), the velocity from which
+# a braking began, the mode, the times of the first tick and of the last command, the refused samples seen.
+_POSITIONS, _VELOCITIES, _ISSUED, _BRAKING_FROM = slice(0, 6), slice(6, 12), slice(0, 12), slice(12, 18)
+_MODE, _FIRST_TICK, _LAST_COMMAND, _REFUSED_SEEN = range(18, 22)
+_WIDTH = 22
 _GOING, _HOLDING, _STOPPING = 0.0, 1.0, 2.0
 
 
@@ -67,7 +67,9 @@ class CommandGuard(LeafSystem):
         correction_limit_deg: float,
         uses_camera: bool = True,
     ) -> None:
-        """Args:
+        """Checks the configuration.
+
+        Args:
             robot: whose limits count.
             config: what is allowed.
             period: time between commands in s.
@@ -81,7 +83,8 @@ class CommandGuard(LeafSystem):
         super().__init__()
         if not 0.0 < config.hold_after < config.stop_after:
             raise ValueError(
-                f"guard: 0 < hold_after < stop_after is needed, got {config.hold_after} s and {config.stop_after} s"
+                "guard: 0 < hold_after < stop_after is needed, got "
+                f"{config.hold_after} s and {config.stop_after} s"
             )
         if not (config.stop_time > 0.0 and 0.0 < config.speed_share <= 1.0):
             raise ValueError(
@@ -90,7 +93,7 @@ class CommandGuard(LeafSystem):
             )
         self._config, self._period, self._uses_camera = config, period, uses_camera
         self._lower, self._upper = robot.lower, robot.upper
-        self._speed = config.speed_share * robot.speed
+        self._inverse_speed = np.tile(1.0 / (config.speed_share * robot.speed), 2)
         # A hundred-thousandth below, because a law's own clipping rounds.
         self._correction_limit = (1.0 - 1e-5) * correction_limit
         self._correction_angle = (1.0 - 1e-5) * np.deg2rad(correction_limit_deg)
@@ -105,83 +108,84 @@ class CommandGuard(LeafSystem):
         ]
         self._joints = self.DeclareAbstractInputPort("joint_sample", Value(JointSample()))
         unknown = np.zeros(_WIDTH)
-        unknown[:12], unknown[_FIRST_TICK], unknown[_LAST_COMMAND] = np.nan, np.inf, -np.inf
-        self._state = self.DeclareDiscreteState(unknown)
+        unknown[_ISSUED], unknown[_FIRST_TICK], unknown[_LAST_COMMAND] = np.nan, np.inf, -np.inf
+        state = self.DeclareDiscreteState(unknown)
+        counts = self.DeclareDiscreteState(len(KINDS))
+        self.DeclareStateOutputPort("guard_status", counts)
         inputs = {port.ticket() for port in self._inputs} | {self._joints.ticket()}
-        inputs |= {self.discrete_state_ticket(self._state)}
         # One entry computes everything; the ports are slices of it.
         self._next = self.DeclareCacheEntry(
-            "next", ValueProducer(Value[object], self._calc_next), inputs
+            "next", ValueProducer(Value[object], self._calc_next), inputs | {self.discrete_state_ticket(state)}
         )
-        for name, part in (
-            ("position_command", _ISSUED_POSITION),
-            ("velocity_command", _ISSUED_VELOCITY),
-            ("guard_status", _COUNTS),
-        ):
-            size = part.stop - part.start
-            self.DeclareVectorOutputPort(name, size, self._slice(part), {self._next.ticket()})
+        for name, part in (("position_command", _POSITIONS), ("velocity_command", _VELOCITIES)):
+            self.DeclareVectorOutputPort(name, NUM_JOINTS, self._slice(part), {self._next.ticket()})
         self.DeclarePeriodicDiscreteUpdateEvent(period, 0.0, self._remember)
 
     def _slice(self, part: slice):
         def calc(context: Context, output: BasicVector) -> None:
-            output.set_value(self._next.Eval(context)[part])
+            output.set_value(self._next.Eval(context)[0][part])
 
         return calc
 
     def _calc_next(self, context: Context, value) -> None:
-        state = context.get_discrete_state(self._state).value().copy()
+        """The next state and which kinds of intervention it takes."""
+        state = context.get_discrete_state(0).value().copy()
         position, velocity, correction, measurement = (port.Eval(context) for port in self._inputs)
-        counts = state[_COUNTS]
-        if np.isnan(state[0]):
-            state[_ISSUED_POSITION], state[_ISSUED_VELOCITY] = self._joints.Eval(context).position, 0.0
+        kinds = []
+        if math.isnan(state[0]):
+            state[_POSITIONS], state[_VELOCITIES] = self._joints.Eval(context).position, 0.0
+        rates = np.concatenate([(position - state[_POSITIONS]) / self._period, velocity])
+        excess = float((np.abs(rates) * self._inverse_speed).max())
         if state[_MODE] == _STOPPING:
-            counts[_STOPPED] += 1.0
+            kinds.append(_STOPPED)
             self._brake(state)
-        elif not np.isfinite(position.sum() + velocity.sum()):
+        elif not math.isfinite(excess):
             # Before the first command a law is silent by right.
-            counts[_NO_COMMAND] += state[_LAST_COMMAND] > -np.inf
+            if state[_LAST_COMMAND] > -np.inf:
+                kinds.append(_NO_COMMAND)
             self._brake(state)
         else:
-            self._follow(state, position, velocity, counts)
-        counts[_HELD] += state[_MODE] == _HOLDING
-        counts[_REFUSED] += measurement[1] - state[_REFUSED_SEEN]
-        state[_REFUSED_SEEN] = measurement[1]
+            self._follow(state, rates, excess, kinds)
+        if state[_MODE] == _HOLDING:
+            kinds.append(_HELD)
+        if measurement[1] > state[_REFUSED_SEEN]:
+            kinds.append(_REFUSED)
+            state[_REFUSED_SEEN] = measurement[1]
         turned, shifted = correction[:3], correction[3:]
         if turned @ turned > self._correction_angle**2 or shifted @ shifted > self._correction_limit**2:
-            counts[_CORRECTION] += 1.0
-        value.set_value(state)
+            kinds.append(_CORRECTION)
+        value.set_value((state, kinds))
 
-    def _follow(self, state: np.ndarray, position: np.ndarray, velocity: np.ndarray, counts: np.ndarray) -> None:
+    def _follow(self, state: np.ndarray, rates: np.ndarray, excess: float, kinds: list[int]) -> None:
         """Goes to the law's command as far as the limits allow."""
-        step = position - state[_ISSUED_POSITION]
-        excess = max(
-            float((np.abs(step) / self._speed).max()) / self._period, float((np.abs(velocity) / self._speed).max())
-        )
         if excess > 1.0 + 1e-9:
-            counts[_VELOCITY] += 1.0
-            position, velocity = state[_ISSUED_POSITION] + step / excess, velocity / excess
-        if (position < self._lower).any() or (position > self._upper).any():
-            counts[_POSITION] += 1.0
-            inside = np.minimum(np.maximum(position, self._lower), self._upper)
+            kinds.append(_VELOCITY)
+            rates = rates / excess
+        position = state[_POSITIONS] + self._period * rates[_POSITIONS]
+        velocity = rates[_VELOCITIES]
+        inside = np.minimum(np.maximum(position, self._lower), self._upper)
+        if (inside != position).any():
+            kinds.append(_POSITION)
             velocity = np.where((position - inside) * velocity > 0.0, 0.0, velocity)
             position = inside
-        state[_ISSUED_POSITION], state[_ISSUED_VELOCITY], state[_BRAKING_FROM] = position, velocity, velocity
+        state[_POSITIONS], state[_VELOCITIES], state[_BRAKING_FROM] = position, velocity, velocity
 
     def _brake(self, state: np.ndarray) -> None:
         """Slows all joints down evenly, from full motion to rest in ``stop_time``."""
-        start, last = state[_BRAKING_FROM], state[_ISSUED_VELOCITY]
+        start, last = state[_BRAKING_FROM], state[_VELOCITIES].copy()
         top = float(np.abs(start).max())
         share = max(0.0, float(np.abs(last).max()) / top - self._period / self._config.stop_time) if top else 0.0
         velocity = share * start
-        position = state[_ISSUED_POSITION] + 0.5 * self._period * (last + velocity)
-        state[_ISSUED_POSITION] = np.minimum(np.maximum(position, self._lower), self._upper)
-        state[_ISSUED_VELOCITY] = velocity
+        position = state[_POSITIONS] + 0.5 * self._period * (last + velocity)
+        state[_POSITIONS] = np.minimum(np.maximum(position, self._lower), self._upper)
+        state[_VELOCITIES] = velocity
 
     def _remember(self, context: Context, discrete_state: DiscreteValues) -> None:
         """Makes the issued command the state and decides from the clocks how the next tick will go."""
-        state = self._next.Eval(context).copy()
+        state, kinds = self._next.Eval(context)
+        state = state.copy()
         time = context.get_time()
-        if np.isfinite(self._inputs[0].Eval(context)[0]) or state[_LAST_COMMAND] == -np.inf:
+        if _NO_COMMAND not in kinds:
             state[_LAST_COMMAND] = time
         # A camera that has not spoken yet is not lost: its time starts with the guard's first tick.
         state[_FIRST_TICK] = min(state[_FIRST_TICK], time)
@@ -192,4 +196,8 @@ class CommandGuard(LeafSystem):
             state[_MODE] = _STOPPING
         else:
             state[_MODE] = _HOLDING if age >= self._config.hold_after - 1e-9 else _GOING
-        discrete_state.set_value(state)
+        discrete_state.set_value(0, state)
+        if kinds:
+            counts = context.get_discrete_state(1).value().copy()
+            counts[kinds] += 1.0
+            discrete_state.set_value(1, counts)

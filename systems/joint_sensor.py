@@ -20,7 +20,12 @@ class JointSensor(LeafSystem):
         super().__init__()
         self._state = self.DeclareVectorInputPort("motor_state", 2 * NUM_JOINTS)
         self._torque = self.DeclareVectorInputPort("motor_torque", NUM_JOINTS)
-        self.DeclareAbstractOutputPort("joint_sample", lambda: Value(JointSample()), self._calc)
+        self.DeclareAbstractOutputPort(
+            "joint_sample",
+            lambda: Value(JointSample()),
+            self._calc,
+            {self.time_ticket(), self._state.ticket(), self._torque.ticket()},
+        )
 
     def _calc(self, context: Context, output) -> None:
         state = self._state.Eval(context)

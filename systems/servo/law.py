@@ -2,19 +2,22 @@
 
 import math
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from pydrake.common.value import Value
 from pydrake.math import RigidTransform
 from pydrake.systems.framework import Context, DiscreteValues, LeafSystem
 
-from robots.inverse_kinematics import JointLimitError, UnreachableError
+from robots.inverse_kinematics import InverseKinematics, JointLimitError, UnreachableError
 from robots.kinematics import rotation_about
 from robots.model import NUM_JOINTS, RobotModel
 from systems.guard import GuardConfig
 from systems.samples import JointSample, PoseSample
 
 _ENTRY = 19  # a moment of the path: time, the rows of the 3 x 4 pose matrix, the twist
+# rad in one tick: ten times what the fastest joint can do, far less than from branch to branch
+_LARGEST_STEP = 0.4
 _NO_COMMAND = np.full(NUM_JOINTS, np.nan)
 
 
@@ -30,9 +33,8 @@ class LawConfig:
     correction_speed_limit_deg_s: float = 30.0  # of one joint, where a law corrects velocities
 
 
-@dataclass(frozen=True)
-class Moment:
-    """What a law sees at one tick. Poses are homogeneous matrices (4, 4)."""
+class Moment(NamedTuple):
+    """What a law sees at one tick. Poses are the upper three rows of homogeneous matrices, shape (3, 4)."""
 
     X_WD: np.ndarray  # wanted pose
     V_WD: np.ndarray  # wanted twist
@@ -40,8 +42,7 @@ class Moment:
     measured: tuple[np.ndarray, np.ndarray] | None  # (wanted, seen) pose at the exposure; None: do not correct
 
 
-@dataclass(frozen=True)
-class Step:
+class Step(NamedTuple):
     """What a law answers: a command, its correction so far and its memory for the next tick."""
 
     position: np.ndarray  # rad
@@ -76,7 +77,9 @@ class ServoLaw(LeafSystem):
         preview: float = 0.0,
         memory_span: float = 0.25,
     ) -> None:
-        """Args:
+        """Checks the configuration.
+
+        Args:
             robot: the nominal robot.
             config: gains and limits.
             guard: when to use a sample.
@@ -93,7 +96,7 @@ class ServoLaw(LeafSystem):
                 raise ValueError(f"servo law: {label} must be positive, got {getattr(config, label)}")
         self.robot, self.config, self.period = robot, config, period
         self._guard, self._preview = guard, preview
-        self._largest_angle = np.deg2rad(guard.largest_deviation_deg)
+        self._smallest_trace = 1.0 + 2.0 * math.cos(math.radians(guard.largest_deviation_deg))
         self._X_WD = self.DeclareAbstractInputPort("X_WE_desired", Value(RigidTransform()))
         self._V_WD = self.DeclareVectorInputPort("V_WE_desired", 6)
         self._joints = self.DeclareAbstractInputPort("joint_sample", Value(JointSample()))
@@ -126,20 +129,20 @@ class ServoLaw(LeafSystem):
 
     def _tick(self, context: Context, discrete_state: DiscreteValues) -> None:
         time = context.get_time()
-        X_WD = self._X_WD.Eval(context).GetAsMatrix4()
+        X_WD = self._X_WD.Eval(context).GetAsMatrix34()
         V_WD = self._V_WD.Eval(context)
         joints: JointSample = self._joints.Eval(context)
         sample: PoseSample = self._camera.Eval(context)
         last_used, refused = context.get_discrete_state(self._outputs[3]).value()
 
         entry = np.empty(_ENTRY)
-        entry[0], entry[1:13], entry[13:] = time + self._preview, X_WD[:3].ravel(), V_WD
+        entry[0], entry[1:13], entry[13:] = time + self._preview, X_WD.ravel(), V_WD
         history = np.concatenate([entry, context.get_discrete_state(self._history).value()[:-_ENTRY]])
 
         measured = None
         if sample.valid and time - sample.time <= self._guard.hold_after + 1e-9:
             wanted = self._path_at(history, sample.time)
-            seen = sample.X_WE.GetAsMatrix4()
+            seen = sample.X_WE.GetAsMatrix34()
             if wanted is not None and self._is_plausible(wanted, seen):
                 measured = (wanted, seen)
                 last_used = sample.time
@@ -171,28 +174,39 @@ class ServoLaw(LeafSystem):
             # Before the first tick the path was where it was then: it starts at rest.
             steps_ago = np.count_nonzero(~np.isnan(history[::_ENTRY])) - 1
         entry = history[steps_ago * _ENTRY : (steps_ago + 1) * _ENTRY]
-        X_WD = np.eye(4)
-        X_WD[:3] = entry[1:13].reshape(3, 4)
+        X_WD = entry[1:13].reshape(3, 4)
         if abs(time - entry[0]) > 1e-6:
-            move_pose(X_WD, (time - entry[0]) * entry[13:])
+            X_WD = moved_pose(X_WD, (time - entry[0]) * entry[13:])
         return X_WD
 
     def _is_plausible(self, wanted: np.ndarray, seen: np.ndarray) -> bool:
         """Whether a sample can be this tool on this path rather than a false detection."""
-        gap = seen[:3, 3] - wanted[:3, 3]
-        cosine = 0.5 * (float(np.vdot(seen[:3, :3], wanted[:3, :3])) - 1.0)
-        return (
-            float(gap @ gap) <= self._guard.largest_deviation**2
-            and math.acos(min(1.0, max(-1.0, cosine))) <= self._largest_angle
-        )
+        p, p_wanted = seen[:, 3], wanted[:, 3]
+        gap = p - p_wanted
+        trace = float(np.vdot(seen, wanted)) - float(p @ p_wanted)
+        return float(gap @ gap) <= self._guard.largest_deviation**2 and trace >= self._smallest_trace
 
 
-def move_pose(X: np.ndarray, step: np.ndarray) -> None:
-    """Moves a pose (4, 4) in place by a small spatial displacement (rad, m) in world axes."""
+def moved_pose(X: np.ndarray, step: np.ndarray) -> np.ndarray:
+    """A pose (3, 4), moved by a small spatial displacement (rad, m) in world axes."""
     angle = math.sqrt(float(step[:3] @ step[:3]))
-    if angle > 0.0:
-        X[:3, :3] = rotation_about(step[:3] / angle, angle) @ X[:3, :3]
-    X[:3, 3] += step[3:]
+    moved = np.empty((3, 4))
+    moved[:, :3] = rotation_about(step[:3] / (angle or 1.0), angle) @ X[:, :3]
+    moved[:, 3] = X[:, 3] + step[3:]
+    return moved
+
+
+def followed_branch(inverse: InverseKinematics, X_WE: np.ndarray, q_near: np.ndarray) -> np.ndarray:
+    """The joint positions of a pose (3, 4) next to the last ones.
+
+    Raises:
+        UnreachableError: if the pose is out of reach, or only on a branch that is a jump away.
+        JointLimitError: if a joint limit is in the way.
+    """
+    q = inverse.nearest((X_WE[:, :3], X_WE[:, 3]), q_near)
+    if float(np.abs(q - q_near).max()) > _LARGEST_STEP:
+        raise UnreachableError("the path goes on only on another branch of the inverse kinematics")
+    return q
 
 
 def limit_norm(vector: np.ndarray, limit: float) -> np.ndarray:

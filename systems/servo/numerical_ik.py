@@ -4,13 +4,14 @@ import math
 
 import numpy as np
 
-from robots.kinematics import Kinematics, robust_inverse
+from robots.kinematics import Kinematics, robust_solve
 from robots.model import RobotModel
-from robots.pose import pose_error, sine_error_rate_matrix, sine_pose_error
+from robots.pose import pose_error
 from systems.guard import GuardConfig
 from systems.servo.law import LawConfig, Moment, ServoLaw, Step
 
-_LARGEST_EXACT_ANGLE = math.radians(60.0)  # L is singular at 90 degrees
+_SMALLEST_COSINE = math.cos(math.radians(60.0))  # L is singular at 90 degrees
+_ROTATION, _TRANSLATION = slice(0, 3), slice(3, 6)
 
 
 class NumericalIk(ServoLaw):
@@ -36,38 +37,46 @@ class NumericalIk(ServoLaw):
         q_d = moment.position
         for _ in range(6):  # from 10 mm off, Newton's method is exact after three
             X_WE, J = self._kinematics.forward_and_jacobian(q_d)
-            q_d = q_d + robust_inverse(J) @ pose_error(moment.X_WD, X_WE)
+            q_d = q_d + robust_solve(J, pose_error(moment.X_WD, X_WE))
         return np.concatenate([q_d, moment.position, np.zeros(6)])
 
     def _step(self, moment: Moment, memory: np.ndarray) -> Step:
         q_d, q, last_velocity = memory[:6], memory[6:12], memory[12:]
         J = self._kinematics.jacobian(0.5 * (q + q_d))
-        J_inverse = robust_inverse(J)
-        q_d = q_d + J_inverse @ pose_error(moment.X_WD, self._kinematics.forward(q_d))
         correction = J @ (q - q_d)
-        V = moment.V_WD
+        twists = np.empty((6, 2))
+        twists[:, 0] = pose_error(moment.X_WD, self._kinematics.forward(q_d))
+        twists[:, 1] = moment.V_WD
         if moment.measured is not None:
-            V = V + self._feedback(*moment.measured, moment.V_WD, correction)
-        velocity = J_inverse @ V
+            twists[:, 1] += self._feedback(*moment.measured, moment.V_WD, correction)
+        rates = robust_solve(J, twists)
+        q_d = q_d + rates[:, 0]
+        velocity = rates[:, 1]
         q = q + 0.5 * self.period * (velocity + last_velocity)
         return Step(q, velocity, correction, np.concatenate([q_d, q, velocity]))
 
     def _feedback(
         self, wanted: np.ndarray, seen: np.ndarray, V_WD: np.ndarray, correction: np.ndarray
     ) -> np.ndarray:
-        """What the law adds to the wanted twist."""
-        error = sine_pose_error(wanted, seen)
+        """What the law adds to the wanted twist.
+
+        L has the closed-form solutions L^-1 L^T w = (R R_d^T) w and L^-1 e-bar = e-bar / cos(angle).
+        """
+        relative = seen[:, :3] @ wanted[:, :3].T
+        (xx, xy, xz), (yx, yy, yz), (zx, zy, zz) = relative.tolist()
+        gain = 0.5 * self.config.rotation
+        cosine = 0.5 * (xx + yy + zz - 1.0)
         twist = np.empty(6)
-        twist[3:] = self.config.translation * error[3:]
-        L = sine_error_rate_matrix(wanted[:3, :3], seen[:3, :3])
-        if 0.5 * (np.vdot(wanted[:3, :3], seen[:3, :3]) - 1.0) > math.cos(_LARGEST_EXACT_ANGLE):
-            w = V_WD[:3]
-            twist[:3] = np.linalg.solve(L, L.T @ w + self.config.rotation * error[:3]) - w
+        if cosine > _SMALLEST_COSINE:
+            gain /= cosine
+            twist[:3] = relative @ V_WD[:3] - V_WD[:3]
         else:
-            twist[:3] = self.config.rotation * error[:3]
-        for part, limit in ((slice(0, 3), self._limits[0]), (slice(3, 6), self._limits[1])):
+            twist[:3] = 0.0
+        twist[:3] += (gain * (yz - zy), gain * (zx - xz), gain * (xy - yx))
+        twist[3:] = self.config.translation * (wanted[:, 3] - seen[:, 3])
+        for part, limit in ((_ROTATION, self._limits[0]), (_TRANSLATION, self._limits[1])):
             # At its limit the correction may only shrink.
-            size = math.sqrt(float(correction[part] @ correction[part]))
-            if size >= limit and float(correction[part] @ twist[part]) > 0.0:
+            size_squared = float(correction[part] @ correction[part])
+            if size_squared >= limit * limit and float(correction[part] @ twist[part]) > 0.0:
                 twist[part] = 0.0
         return twist

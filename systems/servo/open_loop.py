@@ -3,10 +3,10 @@
 import numpy as np
 
 from robots.inverse_kinematics import InverseKinematics
-from robots.kinematics import Kinematics, robust_inverse
+from robots.kinematics import Kinematics, robust_solve
 from robots.model import RobotModel
 from systems.guard import GuardConfig
-from systems.servo.law import LawConfig, Moment, ServoLaw, Step
+from systems.servo.law import LawConfig, Moment, ServoLaw, Step, followed_branch
 
 
 class OpenLoop(ServoLaw):
@@ -26,6 +26,6 @@ class OpenLoop(ServoLaw):
         return moment.position
 
     def _step(self, moment: Moment, memory: np.ndarray) -> Step:
-        q = self._inverse.nearest(moment.X_WD, memory)
-        velocity = robust_inverse(self._kinematics.jacobian(q)) @ moment.V_WD
+        q = followed_branch(self._inverse, moment.X_WD, memory)
+        velocity = robust_solve(self._kinematics.jacobian(q), moment.V_WD)
         return Step(q, velocity, np.zeros(6), q)

@@ -5,11 +5,11 @@ import math
 import numpy as np
 
 from robots.inverse_kinematics import InverseKinematics
-from robots.kinematics import Kinematics, robust_inverse
+from robots.kinematics import Kinematics, robust_solve
 from robots.model import RobotModel
 from robots.pose import euler_rate_matrix, pose_error, wrap_angle, zyx_from_rotation
 from systems.guard import GuardConfig
-from systems.servo.law import LawConfig, Moment, ServoLaw, Step
+from systems.servo.law import LawConfig, Moment, ServoLaw, Step, followed_branch
 
 
 class Pbvs(ServoLaw):
@@ -33,19 +33,19 @@ class Pbvs(ServoLaw):
         return moment.position
 
     def _step(self, moment: Moment, memory: np.ndarray) -> Step:
-        q_d = self._inverse.nearest(moment.X_WD, memory)
-        velocity = robust_inverse(self._kinematics.jacobian(q_d)) @ moment.V_WD
+        q_d = followed_branch(self._inverse, moment.X_WD, memory)
+        velocity = robust_solve(self._kinematics.jacobian(q_d), moment.V_WD)
         X_WE, J = self._kinematics.forward_and_jacobian(moment.position)
         if moment.measured is not None:
-            correction = robust_inverse(J) @ self._feedback(*moment.measured)
+            correction = robust_solve(J, self._feedback(*moment.measured))
             velocity = velocity + correction * min(1.0, self._speed_limit / max(np.abs(correction).max(), 1e-12))
         position = moment.position + self.period * velocity
         return Step(position, velocity, pose_error(X_WE, moment.X_WD), q_d)
 
     def _feedback(self, wanted: np.ndarray, seen: np.ndarray) -> np.ndarray:
-        zyx = zyx_from_rotation(seen[:3, :3])
-        rates = self.config.rotation * wrap_angle(zyx_from_rotation(wanted[:3, :3]) - zyx)
+        zyx = zyx_from_rotation(seen[:, :3])
+        rates = self.config.rotation * wrap_angle(zyx_from_rotation(wanted[:, :3]) - zyx)
         twist = np.empty(6)
         twist[:3] = euler_rate_matrix(zyx) @ rates
-        twist[3:] = self.config.translation * (wanted[:3, 3] - seen[:3, 3])
+        twist[3:] = self.config.translation * (wanted[:, 3] - seen[:, 3])
         return twist

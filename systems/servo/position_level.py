@@ -5,11 +5,11 @@ import math
 import numpy as np
 
 from robots.inverse_kinematics import InverseKinematics
-from robots.kinematics import Kinematics, robust_inverse
+from robots.kinematics import Kinematics, robust_solve
 from robots.model import RobotModel
 from robots.pose import euler_rate_matrix, rotation_from_zyx, wrap_angle, zyx_from_rotation
 from systems.guard import GuardConfig
-from systems.servo.law import LawConfig, Moment, ServoLaw, Step, limit_norm
+from systems.servo.law import LawConfig, Moment, ServoLaw, Step, followed_branch, limit_norm
 
 
 class PositionLevel(ServoLaw):
@@ -33,7 +33,7 @@ class PositionLevel(ServoLaw):
         self._angle_limit = math.radians(config.correction_limit_deg)
 
     def _start(self, moment: Moment) -> np.ndarray:
-        X_WE = self._kinematics.forward(moment.position)
+        X_WE = self._kinematics.forward(moment.position)[:3]
         return np.concatenate([_euler_difference(X_WE, moment.X_WD), moment.position])
 
     def _step(self, moment: Moment, memory: np.ndarray) -> Step:
@@ -48,21 +48,21 @@ class PositionLevel(ServoLaw):
         c[:3] = limit_norm(c[:3], self._angle_limit)
         c[3:] = limit_norm(c[3:], self.config.correction_limit)
 
-        wanted_zyx = zyx_from_rotation(moment.X_WD[:3, :3])
+        wanted_zyx = zyx_from_rotation(moment.X_WD[:, :3])
         zyx = wanted_zyx + c[:3]
         X_WC = moment.X_WD.copy()
-        X_WC[:3, :3] = rotation_from_zyx(zyx)
-        X_WC[:3, 3] += c[3:]
-        q = self._inverse.nearest(X_WC, q)
+        X_WC[:, :3] = rotation_from_zyx(zyx)
+        X_WC[:, 3] += c[3:]
+        q = followed_branch(self._inverse, X_WC, q)
         T = euler_rate_matrix(zyx)
         correction = np.concatenate([T @ c[:3], c[3:]])
         V = moment.V_WD + rate
         V[:3] = T @ (rate[:3] + np.linalg.solve(euler_rate_matrix(wanted_zyx), moment.V_WD[:3]))
-        velocity = robust_inverse(self._kinematics.jacobian(q)) @ V
+        velocity = robust_solve(self._kinematics.jacobian(q), V)
         return Step(q, velocity, correction, np.concatenate([c, q]))
 
 
 def _euler_difference(X_WD: np.ndarray, X_WE: np.ndarray) -> np.ndarray:
     """z_d - z with wrapped angles (alpha, beta, gamma) in rad, then the position in m, eq. (5.10)."""
-    angles = wrap_angle(zyx_from_rotation(X_WD[:3, :3]) - zyx_from_rotation(X_WE[:3, :3]))
-    return np.concatenate([angles, X_WD[:3, 3] - X_WE[:3, 3]])
+    angles = wrap_angle(zyx_from_rotation(X_WD[:, :3]) - zyx_from_rotation(X_WE[:, :3]))
+    return np.concatenate([angles, X_WD[:, 3] - X_WE[:, 3]])
