@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 from pydrake.common.yaml import yaml_dump, yaml_load, yaml_load_typed
+from pydrake.systems.analysis import GetIntegrationSchemes
 
 from robots.geometric_errors import GeometricErrors
 from robots.model import NUM_JOINTS
@@ -48,13 +49,13 @@ class ServoConfig:
 class IntegratorConfig:
     """How the plant is integrated.
 
-    ``auto`` is runge_kutta3 with at most a third of the tick, or radau3 with at most half of it where the
-    other would need tiny steps. The bench shows that the tip is then right to less than a micrometre.
+    ``auto`` is runge_kutta3, or radau3 where that one would need tiny steps. What is left open is chosen such
+    that the tip is right to less than a micrometre, as the bench shows.
     """
 
     scheme: str = "auto"  # or any name of Drake's GetIntegrationSchemes
-    accuracy: float = 1e-3
-    max_step: float = 4e-3  # s, of a scheme chosen by name
+    accuracy: float | None = None
+    max_step: float | None = None  # s
 
 
 @dataclass
@@ -92,8 +93,6 @@ _RANGES: dict[str, tuple[float, float, str]] = {
     "servo.guard.stop_time": (1e-3, 10.0, "s"),
     "servo.guard.largest_deviation": (1e-4, 2.0, "m"),
     "servo.guard.largest_deviation_deg": (0.01, 180.0, "deg"),
-    "integrator.accuracy": (1e-12, 1e-1, "relative"),
-    "integrator.max_step": (1e-6, 0.1, "s"),
 }
 _LAW_RANGES: dict[str, tuple[float, float, str]] = {
     "translation": (0.0, 1000.0, "1/s"),
@@ -219,8 +218,9 @@ def _misfit(value: Any, default: Any, where: str = "") -> str:
         return "" if fits else f"{where} must be {default.size} numbers, got {value!r}"
     if isinstance(default, int):
         return "" if isinstance(value, int) else f"{where} must be a whole number, got {value!r}"
-    if isinstance(default, float):
-        return "" if _is_number(value) else f"{where} must be a number, got {value!r}"
+    if isinstance(default, float) or default is None:
+        fits = _is_number(value) or (default is None and value is None)
+        return "" if fits else f"{where} must be a number, got {value!r}"
     return ""
 
 
@@ -252,6 +252,15 @@ def _check(scenario: Scenario, name: str) -> None:
             refuse(f"servo.laws.{law}.drive must be one of {', '.join(KINDS)}, got '{config.drive}'")
         for label, bounds in _LAW_RANGES.items():
             in_range(f"servo.laws.{law}.{label}", getattr(config, label), bounds)
+    integrator = scenario.integrator
+    if integrator.scheme != "auto" and integrator.scheme not in GetIntegrationSchemes():
+        refuse(
+            f"integrator.scheme must be auto or one of {', '.join(GetIntegrationSchemes())}, got '{integrator.scheme}'"
+        )
+    if integrator.accuracy is not None:
+        in_range("integrator.accuracy", integrator.accuracy, (1e-12, 1e-1, "relative"))
+    if integrator.max_step is not None:
+        in_range("integrator.max_step", integrator.max_step, (1e-6, 0.1, "s"))
     if scenario.law not in LAWS:
         refuse(f"law must be one of {', '.join(LAWS)}, got '{scenario.law}'")
     if scenario.station.kind != "simulated":

@@ -36,7 +36,7 @@ class Servo(Diagram):
         guard_config, period = scenario.servo.guard, scenario.station.period
         preview = scenario.reference.preview
         builder = DiagramBuilder()
-        self.reference = builder.AddNamedSystem("reference", Reference(scenario.reference))
+        self.reference = builder.AddNamedSystem("reference", Reference(scenario.reference, period))
         servo = builder.AddNamedSystem(
             "law",
             LAWS[law](

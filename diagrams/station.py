@@ -17,7 +17,7 @@ from pydrake.systems.primitives import (
 from diagrams.scenario import StationConfig
 from robots.model import NUM_JOINTS, RobotModel
 from robots.plant import add_robot
-from systems.camera import PoseCamera
+from systems.camera import BLOCK, PoseCamera
 from systems.drive import Drive
 from systems.joint_sensor import JointSensor
 from systems.tip_pose import TipPose
@@ -72,8 +72,9 @@ class SimulatedStation(Diagram):
         sensor = builder.AddNamedSystem("joint_sensor", JointSensor())
         tip = builder.AddNamedSystem("tip", TipPose(self.robot))
         camera = builder.AddNamedSystem("camera", PoseCamera(config.camera))
+        noise = camera.GetInputPort("noise")
         self._noise = builder.AddNamedSystem(
-            "noise", RandomSource(RandomDistribution.kGaussian, camera.GetInputPort("noise").size(), config.camera.period)
+            "noise", RandomSource(RandomDistribution.kGaussian, noise.size(), BLOCK * config.camera.period)
         )
 
         state = self.plant.get_state_output_port()
@@ -86,7 +87,7 @@ class SimulatedStation(Diagram):
         builder.Connect(torque, sensor.GetInputPort("motor_torque"))
         builder.Connect(state, tip.GetInputPort("state"))
         builder.Connect(tip.GetOutputPort("X_WE"), camera.GetInputPort("X_WE"))
-        builder.Connect(self._noise.get_output_port(), camera.GetInputPort("noise"))
+        builder.Connect(self._noise.get_output_port(), noise)
 
         for name in ("position_command", "velocity_command"):
             builder.ExportInput(self.drive.GetInputPort(name), name)
@@ -94,7 +95,6 @@ class SimulatedStation(Diagram):
             name: LogVectorOutput(port, builder, config.period)
             for name, port in (
                 ("state", state),
-                ("motor_state", motor_state.get_output_port()),
                 ("motor_torque", torque),
                 ("exposure", camera.GetOutputPort("exposure")),
             )
@@ -134,11 +134,11 @@ class SimulatedStation(Diagram):
     def record(self, root_context: Context) -> StationRecord:
         """What the station has measured, and the truth beside it, since the start."""
         found = {name: log.FindLog(root_context) for name, log in self._logs.items()}
-        state, motor_state, torque, exposure = (log.data().T for log in found.values())
+        state, torque, exposure = (log.data().T for log in found.values())
         times = found["state"].sample_times()
         return StationRecord(
             time=times,
-            joint_position=motor_state[:, :NUM_JOINTS],
+            joint_position=state[:, self.robot.motor_indices()[:NUM_JOINTS]],
             joint_effort=torque,
             X_WE_measured=_by_exposure(exposure, times),
             X_WE_true=self.robot.tool_poses(state),

@@ -112,6 +112,39 @@ def euler_rate_matrix(zyx: np.ndarray) -> np.ndarray:
     )
 
 
+def euler_difference(R_WD: np.ndarray, R_WE: np.ndarray) -> np.ndarray:
+    """The wrapped differences of the ZYX angles of two rotations (3, 3), wanted minus seen, in rad, (3,)."""
+    wanted, seen = zyx_from_rotation(R_WD).tolist(), zyx_from_rotation(R_WE).tolist()
+    return np.array([math.remainder(a - b, 2.0 * math.pi) for a, b in zip(wanted, seen, strict=True)])
+
+
+def angular_velocity(zyx: np.ndarray, rates: np.ndarray) -> np.ndarray:
+    """w = T(zyx) rates for one orientation, see `euler_rate_matrix`; shape (3,) each, rad and rad/s."""
+    alpha, beta, _ = zyx.tolist()
+    alpha_rate, beta_rate, gamma_rate = rates.tolist()
+    ca, sa, cb = math.cos(alpha), math.sin(alpha), math.cos(beta)
+    return np.array(
+        [
+            ca * cb * gamma_rate - sa * beta_rate,
+            sa * cb * gamma_rate + ca * beta_rate,
+            alpha_rate - math.sin(beta) * gamma_rate,
+        ]
+    )
+
+
+def euler_rates(zyx: np.ndarray, w: np.ndarray) -> np.ndarray:
+    """The inverse of `angular_velocity`.
+
+    Raises:
+        ZeroDivisionError: at beta = +-pi/2 exactly, where the rates are not defined.
+    """
+    alpha, beta, _ = zyx.tolist()
+    x, y, z = w.tolist()
+    ca, sa = math.cos(alpha), math.sin(alpha)
+    gamma_rate = (ca * x + sa * y) / math.cos(beta)
+    return np.array([z + math.sin(beta) * gamma_rate, ca * y - sa * x, gamma_rate])
+
+
 def _skew_part(m: np.ndarray) -> np.ndarray:
     """The vector v with v-tilde = (m - m^T) / 2."""
     return 0.5 * np.stack(

@@ -5,13 +5,15 @@ from dataclasses import dataclass, field
 import numpy as np
 from pydrake.common import RandomDistribution
 from pydrake.common.value import Value
-from pydrake.math import RigidTransform, RollPitchYaw, RotationMatrix
+from pydrake.math import RigidTransform
 from pydrake.systems.framework import Context, DiscreteValues, LeafSystem
 from scipy.stats import norm
 
 from systems.samples import PoseSample
 
 _WIDTH = 14  # time, valid, then the rows of the 3 x 4 pose matrix
+BLOCK = 64  # exposures whose noise is drawn at once: drawing is what Drake is slow at
+_PER_EXPOSURE = 7  # standard normal numbers: orientation, position, drop-out
 _EPSILON = 1e-9  # s, a sample that is due at a tick arrives at it in spite of rounding
 
 
@@ -32,7 +34,7 @@ class PoseCamera(LeafSystem):
 
     Ports:
         in  ``X_WE``         RigidTransform, the true tool in the world
-        in  ``noise``        vector 7, standard normal (wired by ``AddRandomInputs``)
+        in  ``noise``        vector 448, standard normal, drawn anew every `BLOCK` periods
         out ``pose_sample``  PoseSample, the newest one that has arrived; a lost exposure arrives as invalid
         out ``exposure``     vector 14, the last exposure, not yet arrived: time, validity, rows of X_WE; for logs
 
@@ -51,7 +53,7 @@ class PoseCamera(LeafSystem):
         self._rotation_sigma = float(np.deg2rad(config.orientation_sigma_deg))
         self._lost_below = norm.ppf(config.dropout_probability)
         self._X_WE = self.DeclareAbstractInputPort("X_WE", Value(RigidTransform()))
-        self._noise = self.DeclareVectorInputPort("noise", 7, RandomDistribution.kGaussian)
+        self._noise = self.DeclareVectorInputPort("noise", BLOCK * _PER_EXPOSURE, RandomDistribution.kGaussian)
         in_flight = int(np.floor(config.delay / config.period + _EPSILON)) + 2
         empty = np.concatenate([[-np.inf, 0.0], np.eye(4)[:3].ravel()])
         newest = self.DeclareDiscreteState(empty)
@@ -67,21 +69,22 @@ class PoseCamera(LeafSystem):
 
     def _expose(self, context: Context, discrete_state: DiscreteValues) -> None:
         time = context.get_time()
-        noise = self._noise.Eval(context)
-        lost = noise[6] < self._lost_below or any(a <= time < b for a, b in self._config.dropouts)
-        X_WE = self._X_WE.Eval(context)
-        R_WE = X_WE.rotation()
-        if self._rotation_sigma > 0.0:
-            # For small angles about random axes any three-angle rotation is the same.
-            R_WE = RotationMatrix(RollPitchYaw(self._rotation_sigma * noise[:3])).multiply(R_WE)
+        first = round(time / self._config.period) % BLOCK * _PER_EXPOSURE
+        noise = self._noise.Eval(context)[first : first + _PER_EXPOSURE]
+        lost = noise[6] < self._lost_below
+        for start, end in self._config.dropouts:
+            lost = lost or start <= time < end
         entry = np.empty(_WIDTH)
         entry[0], entry[1] = time, not lost
         pose = entry[2:].reshape(3, 4)
-        pose[:, :3] = R_WE.matrix()
-        pose[:, 3] = X_WE.translation() + self._config.position_sigma * noise[3:6]
-        newest, older = (context.get_discrete_state(i).value() for i in (0, self._older))
+        pose[:] = self._X_WE.Eval(context).GetAsMatrix34()
+        if self._rotation_sigma > 0.0:
+            pose[:, :3] = _small_rotation(*(self._rotation_sigma * noise[:3]).tolist()) @ pose[:, :3]
+        pose[:, 3] += self._config.position_sigma * noise[3:6]
+        older = discrete_state.get_mutable_value(self._older)
+        older[_WIDTH:] = older[:-_WIDTH].copy()
+        older[:_WIDTH] = context.get_discrete_state(0).value()
         discrete_state.set_value(0, entry)
-        discrete_state.set_value(self._older, np.concatenate([newest, older[:-_WIDTH]]))
 
     def _calc_sample(self, context: Context, output) -> None:
         due = context.get_time() - self._config.delay + _EPSILON
@@ -92,6 +95,19 @@ class PoseCamera(LeafSystem):
         # Orthonormal by construction; checking it again would cost more than the rest.
         X_WE = RigidTransform.MakeUnchecked(entry[2:].reshape(3, 4))
         output.set_value(PoseSample(float(entry[0]), X_WE, bool(entry[1]), self._config.position_sigma))
+
+
+def _small_rotation(x: float, y: float, z: float) -> np.ndarray:
+    """The rotation of the quaternion along (1, x/2, y/2, z/2): that of the rotation vector, up to third order."""
+    x, y, z = 0.5 * x, 0.5 * y, 0.5 * z
+    s = 2.0 / (1.0 + x * x + y * y + z * z)
+    return np.array(
+        [
+            [1.0 - s * (y * y + z * z), s * (x * y - z), s * (x * z + y)],
+            [s * (x * y + z), 1.0 - s * (x * x + z * z), s * (y * z - x)],
+            [s * (x * z - y), s * (y * z + x), 1.0 - s * (x * x + y * y)],
+        ]
+    )
 
 
 def _check(config: CameraConfig) -> None:

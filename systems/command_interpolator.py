@@ -17,7 +17,8 @@ class CommandInterpolator(LeafSystem):
     and holds the acceleration that leads the set-point there. So the set-point moves on parabolas with
     continuous velocity; it reaches any command exactly within two periods (dead beat), and it follows a
     smooth command with an error of only jerk * period^3 / 12. A position that is merely held for a period
-    would be late by half of it.
+    would be late by half of it. With the shortest delay, one period, the next command is not yet known and
+    the last one is carried on uniformly: that costs acceleration * period^2 / 2.
 
     Ports:
         in  ``position_command``  vector 6 in rad

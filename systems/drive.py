@@ -13,7 +13,6 @@ from pydrake.systems.primitives import (
     Adder,
     LinearSystem,
     MultilayerPerceptron,
-    PassThrough,
     PerceptronActivationType,
 )
 
@@ -107,16 +106,12 @@ class Drive(Diagram):
             "gravity", InverseDynamics(self._rigid_plant, InverseDynamics.InverseDynamicsMode.kGravityCompensation)
         )
         self._friction = builder.AddNamedSystem("friction", _coulomb_friction())
-        motor_state = builder.AddNamedSystem("motor_state", PassThrough(2 * NUM_JOINTS))
         motor_torque = builder.AddNamedSystem("motor_torque", Adder(3, NUM_JOINTS))
         joint_torque = builder.AddNamedSystem("joint_torque", Adder(2, NUM_JOINTS))
 
         builder.Connect(self._interpolator.GetOutputPort("acceleration"), self._setpoint.get_input_port())
         builder.Connect(self._setpoint.get_output_port(), self._interpolator.GetInputPort("setpoint"))
         builder.Connect(self._setpoint.get_output_port(), controller.get_input_port_desired_state())
-        for system in (controller, gravity):
-            builder.Connect(motor_state.get_output_port(), system.get_input_port_estimated_state())
-        builder.Connect(motor_state.get_output_port(), self._friction.get_input_port())
         builder.Connect(controller.get_output_port_control(), motor_torque.get_input_port(0))
         builder.Connect(gravity.get_output_port_generalized_force(), motor_torque.get_input_port(1))
         builder.Connect(motor_torque.get_output_port(), joint_torque.get_input_port(0))
@@ -125,7 +120,9 @@ class Drive(Diagram):
         builder.ExportInput(self._interpolator.GetInputPort("position_command"), "position_command")
         builder.ExportInput(self._interpolator.GetInputPort("velocity_command"), "velocity_command")
         builder.ExportInput(motor_torque.get_input_port(2), "torque_feedforward")
-        builder.ExportInput(motor_state.get_input_port(), "motor_state")
+        motor_state = builder.ExportInput(self._friction.get_input_port(), "motor_state")
+        for system in (controller, gravity):
+            builder.ConnectInput(motor_state, system.get_input_port_estimated_state())
         builder.ExportOutput(motor_torque.get_output_port(), "motor_torque")
         builder.ExportOutput(joint_torque.get_output_port(), "joint_torque")
         builder.BuildInto(self)

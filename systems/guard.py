@@ -93,7 +93,8 @@ class CommandGuard(LeafSystem):
             )
         self._config, self._period, self._uses_camera = config, period, uses_camera
         self._lower, self._upper = robot.lower, robot.upper
-        self._inverse_speed = np.tile(1.0 / (config.speed_share * robot.speed), 2)
+        self._range = list(zip(robot.lower.tolist(), robot.upper.tolist(), strict=True))
+        self._speed = (config.speed_share * robot.speed).tolist()
         # A hundred-thousandth below, because a law's own clipping rounds.
         self._correction_limit = (1.0 - 1e-5) * correction_limit
         self._correction_angle = (1.0 - 1e-5) * np.deg2rad(correction_limit_deg)
@@ -128,47 +129,61 @@ class CommandGuard(LeafSystem):
         return calc
 
     def _calc_next(self, context: Context, value) -> None:
-        """The next state and which kinds of intervention it takes."""
+        """The next state and which kinds of intervention it takes. Plain floats: this runs every tick."""
         state = context.get_discrete_state(0).value().copy()
         position, velocity, correction, measurement = (port.Eval(context) for port in self._inputs)
         kinds = []
         if math.isnan(state[0]):
             state[_POSITIONS], state[_VELOCITIES] = self._joints.Eval(context).position, 0.0
-        rates = np.concatenate([(position - state[_POSITIONS]) / self._period, velocity])
-        excess = float((np.abs(rates) * self._inverse_speed).max())
+        steps = (position - state[_POSITIONS]).tolist()
+        rates = velocity.tolist()
+        excess = 0.0
+        for step, rate, speed in zip(steps, rates, self._speed, strict=True):
+            # Written so that NaN, which compares with nothing, is not lost.
+            if not (abs(rate) <= excess * speed and abs(step) <= excess * speed * self._period):
+                excess = max(abs(rate), abs(step) / self._period) / speed
+                if not math.isfinite(abs(rate) + abs(step)):
+                    excess = math.inf
+                    break
         if state[_MODE] == _STOPPING:
             kinds.append(_STOPPED)
             self._brake(state)
-        elif not math.isfinite(excess):
+        elif excess == math.inf:
             # Before the first command a law is silent by right.
-            if state[_LAST_COMMAND] > -np.inf:
+            if state[_LAST_COMMAND] > -math.inf:
                 kinds.append(_NO_COMMAND)
             self._brake(state)
         else:
-            self._follow(state, rates, excess, kinds)
+            self._follow(state, steps, rates, excess, kinds)
         if state[_MODE] == _HOLDING:
             kinds.append(_HELD)
-        if measurement[1] > state[_REFUSED_SEEN]:
+        refused = measurement[1]
+        if refused > state[_REFUSED_SEEN]:
             kinds.append(_REFUSED)
-            state[_REFUSED_SEEN] = measurement[1]
-        turned, shifted = correction[:3], correction[3:]
-        if turned @ turned > self._correction_angle**2 or shifted @ shifted > self._correction_limit**2:
+            state[_REFUSED_SEEN] = refused
+        a, b, c, x, y, z = correction.tolist()
+        if a * a + b * b + c * c > self._correction_angle**2 or x * x + y * y + z * z > self._correction_limit**2:
             kinds.append(_CORRECTION)
         value.set_value((state, kinds))
 
-    def _follow(self, state: np.ndarray, rates: np.ndarray, excess: float, kinds: list[int]) -> None:
+    def _follow(
+        self, state: np.ndarray, steps: list[float], rates: list[float], excess: float, kinds: list[int]
+    ) -> None:
         """Goes to the law's command as far as the limits allow."""
         if excess > 1.0 + 1e-9:
             kinds.append(_VELOCITY)
-            rates = rates / excess
-        position = state[_POSITIONS] + self._period * rates[_POSITIONS]
-        velocity = rates[_VELOCITIES]
-        inside = np.minimum(np.maximum(position, self._lower), self._upper)
-        if (inside != position).any():
-            kinds.append(_POSITION)
-            velocity = np.where((position - inside) * velocity > 0.0, 0.0, velocity)
-            position = inside
-        state[_POSITIONS], state[_VELOCITIES], state[_BRAKING_FROM] = position, velocity, velocity
+            steps, rates = [step / excess for step in steps], [rate / excess for rate in rates]
+        positions = [last + step for last, step in zip(state[_POSITIONS].tolist(), steps, strict=True)]
+        for i, (low, high) in enumerate(self._range):
+            if not low <= positions[i] <= high:
+                if _POSITION not in kinds:
+                    kinds.append(_POSITION)
+                inside = min(max(positions[i], low), high)
+                if (positions[i] - inside) * rates[i] > 0.0:
+                    rates[i] = 0.0
+                positions[i] = inside
+        state[_ISSUED] = positions + rates
+        state[_BRAKING_FROM] = rates
 
     def _brake(self, state: np.ndarray) -> None:
         """Slows all joints down evenly, from full motion to rest in ``stop_time``."""

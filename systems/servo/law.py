@@ -107,7 +107,7 @@ class ServoLaw(LeafSystem):
             self.DeclareDiscreteState(np.zeros(6)),
             self.DeclareDiscreteState(np.array([-np.inf, 0.0])),
         ]
-        self._history = self.DeclareDiscreteState(
+        self.DeclareDiscreteState(
             np.full((int(np.ceil((memory_span + preview) / period)) + 2) * _ENTRY, np.nan)
         )
         self._memory = self.DeclareDiscreteState(self.memory_size)
@@ -135,13 +135,14 @@ class ServoLaw(LeafSystem):
         sample: PoseSample = self._camera.Eval(context)
         last_used, refused = context.get_discrete_state(self._outputs[3]).value()
 
-        entry = np.empty(_ENTRY)
+        path = discrete_state.get_mutable_value(4).reshape(-1, _ENTRY)
+        tick = round(time / self.period)
+        entry = path[tick % len(path)]
         entry[0], entry[1:13], entry[13:] = time + self._preview, X_WD.ravel(), V_WD
-        history = np.concatenate([entry, context.get_discrete_state(self._history).value()[:-_ENTRY]])
 
         measured = None
         if sample.valid and time - sample.time <= self._guard.hold_after + 1e-9:
-            wanted = self._path_at(history, sample.time)
+            wanted = self._path_at(path, tick, sample.time)
             seen = sample.X_WE.GetAsMatrix34()
             if wanted is not None and self._is_plausible(wanted, seen):
                 measured = (wanted, seen)
@@ -150,7 +151,7 @@ class ServoLaw(LeafSystem):
                 refused += 1.0
 
         moment = Moment(X_WD, V_WD, joints.position, measured)
-        first_tick = np.isnan(history[_ENTRY])
+        first_tick = math.isnan(path[(tick - 1) % len(path), 0])
         memory = self._start(moment) if first_tick else context.get_discrete_state(self._memory).value()
         try:
             step = self._step(moment, memory)
@@ -162,18 +163,23 @@ class ServoLaw(LeafSystem):
         discrete_state.set_value(1, step.velocity)
         discrete_state.set_value(2, step.correction)
         discrete_state.set_value(3, np.array([last_used, refused]))
-        discrete_state.set_value(4, history)
         discrete_state.set_value(5, step.memory)
 
-    def _path_at(self, history: np.ndarray, time: float) -> np.ndarray | None:
-        """The wanted pose at an earlier time, None if it is too long ago."""
-        steps_ago = max(0, round((history[0] - time) / self.period))
-        if steps_ago * _ENTRY >= history.size:
+    def _path_at(self, path: np.ndarray, tick: int, time: float) -> np.ndarray | None:
+        """The wanted pose at an earlier time, None if it is too long ago.
+
+        Args:
+            path: the remembered moments, a ring of rows.
+            tick: the number of the newest one.
+            time: when the pose was wanted, in s.
+        """
+        ago = max(0, round((path[tick % len(path), 0] - time) / self.period))
+        if ago >= len(path):
             return None
-        if np.isnan(history[steps_ago * _ENTRY]):
+        entry = path[(tick - ago) % len(path)]
+        if math.isnan(entry[0]):
             # Before the first tick the path was where it was then: it starts at rest.
-            steps_ago = np.count_nonzero(~np.isnan(history[::_ENTRY])) - 1
-        entry = history[steps_ago * _ENTRY : (steps_ago + 1) * _ENTRY]
+            entry = path[np.nanargmin(path[:, 0])]
         X_WD = entry[1:13].reshape(3, 4)
         if abs(time - entry[0]) > 1e-6:
             X_WD = moved_pose(X_WD, (time - entry[0]) * entry[13:])

@@ -22,7 +22,7 @@ class NumericalIk(ServoLaw):
     offsets, that of the latter. Beyond 60 degrees of orientation error L = I, which is its limit for small
     errors: the law then still turns the tool the shorter way round.
 
-    The memory holds q_d, which follows the path by one Newton step a tick, then the commanded positions and
+    The memory holds q_d, found from the halfway point by one Newton step, then the commanded positions and
     their last velocity (trapezoidal rule).
     """
 
@@ -34,26 +34,22 @@ class NumericalIk(ServoLaw):
         self._limits = (math.radians(config.correction_limit_deg), config.correction_limit)
 
     def _start(self, moment: Moment) -> np.ndarray:
-        q_d = moment.position
-        for _ in range(6):  # from 10 mm off, Newton's method is exact after three
-            X_WE, J = self._kinematics.forward_and_jacobian(q_d)
-            q_d = q_d + robust_solve(J, pose_error(moment.X_WD, X_WE))
-        return np.concatenate([q_d, moment.position, np.zeros(6)])
+        return np.concatenate([moment.position, moment.position, np.zeros(6)])
 
     def _step(self, moment: Moment, memory: np.ndarray) -> Step:
         q_d, q, last_velocity = memory[:6], memory[6:12], memory[12:]
-        J = self._kinematics.jacobian(0.5 * (q + q_d))
+        halfway = 0.5 * (q + q_d)
+        X_WE, J = self._kinematics.forward_and_jacobian(halfway)
         correction = J @ (q - q_d)
         twists = np.empty((6, 2))
-        twists[:, 0] = pose_error(moment.X_WD, self._kinematics.forward(q_d))
+        twists[:, 0] = pose_error(moment.X_WD, X_WE)
         twists[:, 1] = moment.V_WD
         if moment.measured is not None:
             twists[:, 1] += self._feedback(*moment.measured, moment.V_WD, correction)
         rates = robust_solve(J, twists)
-        q_d = q_d + rates[:, 0]
         velocity = rates[:, 1]
         q = q + 0.5 * self.period * (velocity + last_velocity)
-        return Step(q, velocity, correction, np.concatenate([q_d, q, velocity]))
+        return Step(q, velocity, correction, np.concatenate([halfway + rates[:, 0], q, velocity]))
 
     def _feedback(
         self, wanted: np.ndarray, seen: np.ndarray, V_WD: np.ndarray, correction: np.ndarray

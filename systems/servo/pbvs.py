@@ -7,7 +7,7 @@ import numpy as np
 from robots.inverse_kinematics import InverseKinematics
 from robots.kinematics import Kinematics, robust_solve
 from robots.model import RobotModel
-from robots.pose import euler_rate_matrix, pose_error, wrap_angle, zyx_from_rotation
+from robots.pose import angular_velocity, euler_difference, pose_error, zyx_from_rotation
 from systems.guard import GuardConfig
 from systems.servo.law import LawConfig, Moment, ServoLaw, Step, followed_branch
 
@@ -43,9 +43,8 @@ class Pbvs(ServoLaw):
         return Step(position, velocity, pose_error(X_WE, moment.X_WD), q_d)
 
     def _feedback(self, wanted: np.ndarray, seen: np.ndarray) -> np.ndarray:
-        zyx = zyx_from_rotation(seen[:, :3])
-        rates = self.config.rotation * wrap_angle(zyx_from_rotation(wanted[:, :3]) - zyx)
+        rates = self.config.rotation * euler_difference(wanted[:, :3], seen[:, :3])
         twist = np.empty(6)
-        twist[:3] = euler_rate_matrix(zyx) @ rates
+        twist[:3] = angular_velocity(zyx_from_rotation(seen[:, :3]), rates)
         twist[3:] = self.config.translation * (wanted[:, 3] - seen[:, 3])
         return twist

@@ -7,7 +7,7 @@ import numpy as np
 from robots.inverse_kinematics import InverseKinematics
 from robots.kinematics import Kinematics, robust_solve
 from robots.model import RobotModel
-from robots.pose import euler_rate_matrix, rotation_from_zyx, wrap_angle, zyx_from_rotation
+from robots.pose import angular_velocity, euler_difference, euler_rates, rotation_from_zyx, zyx_from_rotation
 from systems.guard import GuardConfig
 from systems.servo.law import LawConfig, Moment, ServoLaw, Step, followed_branch, limit_norm
 
@@ -50,19 +50,20 @@ class PositionLevel(ServoLaw):
 
         wanted_zyx = zyx_from_rotation(moment.X_WD[:, :3])
         zyx = wanted_zyx + c[:3]
-        X_WC = moment.X_WD.copy()
+        X_WC = np.empty((3, 4))
         X_WC[:, :3] = rotation_from_zyx(zyx)
-        X_WC[:, 3] += c[3:]
+        X_WC[:, 3] = moment.X_WD[:, 3] + c[3:]
         q = followed_branch(self._inverse, X_WC, q)
-        T = euler_rate_matrix(zyx)
-        correction = np.concatenate([T @ c[:3], c[3:]])
+        correction = np.concatenate([angular_velocity(zyx, c[:3]), c[3:]])
         V = moment.V_WD + rate
-        V[:3] = T @ (rate[:3] + np.linalg.solve(euler_rate_matrix(wanted_zyx), moment.V_WD[:3]))
+        V[:3] = angular_velocity(zyx, rate[:3] + euler_rates(wanted_zyx, moment.V_WD[:3]))
         velocity = robust_solve(self._kinematics.jacobian(q), V)
         return Step(q, velocity, correction, np.concatenate([c, q]))
 
 
 def _euler_difference(X_WD: np.ndarray, X_WE: np.ndarray) -> np.ndarray:
     """z_d - z with wrapped angles (alpha, beta, gamma) in rad, then the position in m, eq. (5.10)."""
-    angles = wrap_angle(zyx_from_rotation(X_WD[:, :3]) - zyx_from_rotation(X_WE[:, :3]))
-    return np.concatenate([angles, X_WD[:, 3] - X_WE[:, 3]])
+    difference = np.empty(6)
+    difference[:3] = euler_difference(X_WD[:, :3], X_WE[:, :3])
+    difference[3:] = X_WD[:, 3] - X_WE[:, 3]
+    return difference
