@@ -11,14 +11,13 @@ _WIDTH = 2 * NUM_JOINTS  # one command: positions, then velocities
 class CommandInterpolator(LeafSystem):
     """Steers a double integrator through the commands, each one a given delay after its issue.
 
-    A command (p, v) issued at time s says "be at p with velocity v". At every tick t the interpolator
-    picks the command whose time has come, i.e. where to be at t + period is what was wanted at
-    t + period - delay, carries it there by its own velocity if that instant lies between two commands,
-    and holds the acceleration that leads the set-point there. So the set-point moves on parabolas with
-    continuous velocity; it reaches any command exactly within two periods (dead beat), and it follows a
-    smooth command with an error of only jerk * period^3 / 12. A position that is merely held for a period
-    would be late by half of it. With the shortest delay, one period, the next command is not yet known and
-    the last one is carried on uniformly: that costs acceleration * period^2 / 2.
+    A command (p, v) issued at time s says "be at p with velocity v". At every tick t the interpolator finds
+    where to be at t + period, which is what was wanted at t + period - delay, from the two commands around
+    that instant; with a delay of less than two periods the later one is not yet known, and the last two are
+    carried on with constant acceleration. It then holds the acceleration that leads the set-point there. So
+    the set-point moves on parabolas with continuous velocity; it reaches any command exactly within two
+    periods (dead beat), and it follows a smooth command with an error of the order of jerk * period^3. A
+    position that is merely held for a period would be late by half of it.
 
     Ports:
         in  ``position_command``  vector 6 in rad
@@ -46,9 +45,9 @@ class CommandInterpolator(LeafSystem):
                 f"drive: command_delay + dead_time must be at least one command period of {period} s, because a "
                 f"command is interpolated over one period; got {delay} s"
             )
-        # A command read at a tick was issued one period ago; index 0 is that one, then older ones.
-        self._index = max(0, int(np.ceil((delay - 2.0 * period) / period - 1e-9)))
-        self._lead = 2.0 * period - delay + self._index * period
+        # A command read at a tick was issued one period ago: number 0; number k another k periods before.
+        self._base = max(0, int(np.ceil((delay - 2.0 * period) / period - 1e-9)))
+        self._lead = 2.0 * period - delay + self._base * period
         # Dead beat for a double integrator under a held acceleration.
         self._position_gain = 1.0 / period**2 if tracks_position else 0.0
         self._velocity_gain = 1.5 / period if tracks_position else 1.0 / period
@@ -57,7 +56,7 @@ class CommandInterpolator(LeafSystem):
         self._velocity = self.DeclareVectorInputPort("velocity_command", NUM_JOINTS)
         self._setpoint = self.DeclareVectorInputPort("setpoint", _WIDTH)
         acceleration = self.DeclareDiscreteState(NUM_JOINTS)
-        self._transit = self.DeclareDiscreteState(max(1, self._index) * _WIDTH)
+        self._transit = self.DeclareDiscreteState(max(1, self._base) * _WIDTH)
         self.DeclareStateOutputPort("acceleration", acceleration)
         self.DeclarePeriodicDiscreteUpdateEvent(period, 0.0, self._update)
 
@@ -69,14 +68,20 @@ class CommandInterpolator(LeafSystem):
 
     def _update(self, context: Context, discrete_state: DiscreteValues) -> None:
         command = np.concatenate([self._position.Eval(context), self._velocity.Eval(context)])
-        if self._index > 0:
-            transit = context.get_discrete_state(self._transit).value()
-            discrete_state.set_value(1, np.concatenate([command, transit[:-_WIDTH]]))
-            command = transit[-_WIDTH:]
+        transit = discrete_state.get_mutable_value(1)
+        commands = np.concatenate([command, transit])
+        transit[:] = commands[:-_WIDTH]
+        base, newer = self._base * _WIDTH, max(0, self._base - 1) * _WIDTH
+        velocity = commands[base + NUM_JOINTS : base + _WIDTH]
+        if self._lead > 0.0:
+            older = newer + _WIDTH
+            change = commands[newer + NUM_JOINTS : newer + _WIDTH] - commands[older + NUM_JOINTS : older + _WIDTH]
+            velocity = velocity + self._lead / self._period * change
         setpoint = self._setpoint.Eval(context)
-        velocity = command[NUM_JOINTS:]
-        # Where a uniform motion that ends at the command would be now.
-        position = command[:NUM_JOINTS] + (self._lead - self._period) * velocity
-        acceleration = self._position_gain * (position - setpoint[:NUM_JOINTS])
-        acceleration += self._velocity_gain * (velocity - setpoint[NUM_JOINTS:])
+        acceleration = self._velocity_gain * (velocity - setpoint[NUM_JOINTS:])
+        if self._position_gain > 0.0:
+            # Where a uniform motion that ends at the target would be now.
+            position = commands[base : base + NUM_JOINTS] - self._period * velocity
+            position += 0.5 * self._lead * (commands[base + NUM_JOINTS : base + _WIDTH] + velocity)
+            acceleration += self._position_gain * (position - setpoint[:NUM_JOINTS])
         discrete_state.set_value(0, acceleration)
