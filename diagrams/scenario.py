@@ -95,8 +95,8 @@ _RANGES: dict[str, tuple[float, float, str]] = {
     "servo.guard.largest_deviation_deg": (0.01, 180.0, "deg"),
 }
 _LAW_RANGES: dict[str, tuple[float, float, str]] = {
-    "translation": (0.0, 1000.0, "1/s"),
-    "rotation": (0.0, 1000.0, "1/s"),
+    "translation": (1e-3, 1000.0, "1/s"),
+    "rotation": (1e-3, 1000.0, "1/s"),
     "correction_limit": (1e-4, 2.0, "m"),
     "correction_limit_deg": (0.01, 180.0, "deg"),
     "correction_speed_limit_deg_s": (0.01, 1000.0, "deg/s"),
@@ -125,6 +125,7 @@ def load_scenario(name: str, settings: list[str] | None = None) -> Scenario:
     tree = _read(name, Path())
     for setting in settings or []:
         _apply(tree, setting)
+    tree = _with_numbers(tree, Scenario())
     problem = _misfit(tree, Scenario())
     if problem:
         raise ScenarioError(f"scenario {name}: {problem}")
@@ -222,6 +223,24 @@ def _misfit(value: Any, default: Any, where: str = "") -> str:
         fits = _is_number(value) or (default is None and value is None)
         return "" if fits else f"{where} must be a number, got {value!r}"
     return ""
+
+
+def _with_numbers(value: Any, default: Any) -> Any:
+    """The tree with texts such as 50e-6 turned to numbers where one is wanted; YAML asks for 50.0e-6."""
+    if isinstance(value, dict):
+        known = vars(default) if is_dataclass(default) else {}
+        return {
+            key: _with_numbers(entry, known.get(key, LawConfig() if isinstance(default, dict) else None))
+            for key, entry in value.items()
+        }
+    if isinstance(value, list) and isinstance(default, np.ndarray):
+        return [_with_numbers(entry, 0.0) for entry in value]
+    if isinstance(value, str) and not isinstance(default, str):
+        try:
+            return float(value)
+        except ValueError:
+            return value
+    return value
 
 
 def _is_number(value: Any) -> bool:

@@ -8,12 +8,12 @@ from pydrake.multibody.plant import MultibodyPlant
 from pydrake.systems.framework import Context, Diagram, DiagramBuilder
 from pydrake.systems.primitives import (
     ConstantVectorSource,
-    LogVectorOutput,
     RandomSource,
     Selector,
     SelectorParams,
 )
 
+from diagrams.packed_log import PackedLog
 from diagrams.scenario import StationConfig
 from robots.model import NUM_JOINTS, RobotModel
 from robots.plant import add_robot
@@ -91,14 +91,8 @@ class SimulatedStation(Diagram):
 
         for name in ("position_command", "velocity_command"):
             builder.ExportInput(self.drive.GetInputPort(name), name)
-        self._logs = {
-            name: LogVectorOutput(port, builder, config.period)
-            for name, port in (
-                ("state", state),
-                ("motor_torque", torque),
-                ("exposure", camera.GetOutputPort("exposure")),
-            )
-        }
+        logged = {"state": state, "motor_torque": torque, "exposure": camera.GetOutputPort("exposure")}
+        self._log = PackedLog(builder, logged, config.period)
         builder.ExportOutput(sensor.GetOutputPort("joint_sample"), "joint_sample")
         builder.ExportOutput(camera.GetOutputPort("pose_sample"), "pose_sample")
         builder.ExportOutput(tip.GetOutputPort("X_WE"), "truth.X_WE")
@@ -133,14 +127,13 @@ class SimulatedStation(Diagram):
 
     def record(self, root_context: Context) -> StationRecord:
         """What the station has measured, and the truth beside it, since the start."""
-        found = {name: log.FindLog(root_context) for name, log in self._logs.items()}
-        state, torque, exposure = (log.data().T for log in found.values())
-        times = found["state"].sample_times()
+        times, data = self._log.read(root_context)
+        state = data["state"]
         return StationRecord(
             time=times,
             joint_position=state[:, self.robot.motor_indices()[:NUM_JOINTS]],
-            joint_effort=torque,
-            X_WE_measured=_by_exposure(exposure, times),
+            joint_effort=data["motor_torque"],
+            X_WE_measured=_by_exposure(data["exposure"], times),
             X_WE_true=self.robot.tool_poses(state),
             link_position=self.robot.link_positions(state),
         )

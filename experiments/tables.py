@@ -21,7 +21,10 @@ def print_summary(console: Console, result: Mapping[str, Any]) -> None:
     console.print(f"[bold]Scenario {escape(result['scenario'])}[/bold]")
     for source in SOURCES:
         console.print(error_table(result, source))
-    console.print(guard_table(result))
+    if any(count for run in result["runs"].values() for count in run["guard"].values()):
+        console.print(guard_table(result))
+    else:
+        console.print("[italic]Guard: no intervention[/italic]\n")
 
 
 def error_table(result: Mapping[str, Any], source: str) -> Table:
@@ -52,15 +55,13 @@ def error_table(result: Mapping[str, Any], source: str) -> Table:
 def guard_table(result: Mapping[str, Any]) -> Table:
     """How often the guard intervened, by kind."""
     kinds = sorted({kind for run in result["runs"].values() for kind, count in run["guard"].items() if count})
-    title = "Guard, ticks with an intervention" if kinds else "Guard: no intervention"
+    title = "Guard, ticks with an intervention"
     table = Table(box=box.SIMPLE_HEAD, title=title, title_justify="left", title_style="italic")
-    if kinds:
-        table.add_column("law", no_wrap=True)
+    table.add_column("law", no_wrap=True)
     for kind in kinds:
         table.add_column(escape(kind.replace("_", " ")), justify="right")
-    if kinds:
-        for law, run in result["runs"].items():
-            table.add_row(escape(law_title(law)), *(str(run["guard"].get(kind, 0)) for kind in kinds))
+    for law, run in result["runs"].items():
+        table.add_row(escape(law_title(law)), *(str(run["guard"].get(kind, 0)) for kind in kinds))
     return table
 
 

@@ -11,7 +11,6 @@ the last link) and E the tool. At zero joint angles the frame of link i sits at
 
 import math
 from dataclasses import dataclass, field, fields, is_dataclass
-from functools import cached_property
 from importlib.resources import files
 from pathlib import Path
 from typing import Any
@@ -126,52 +125,52 @@ class RobotModel:
     def _limit(self, name: str) -> np.ndarray:
         return np.deg2rad([getattr(joint.limits, name) for joint in self.joints])
 
-    @cached_property
+    @property
     def axes(self) -> np.ndarray:
         """Joint axes in the frames of their links, shape (6, 3)."""
         return np.array([joint.axis / np.linalg.norm(joint.axis) for joint in self.joints])
 
-    @cached_property
+    @property
     def lower(self) -> np.ndarray:
         """Lower joint limits in rad, shape (6,)."""
         return self._limit("lower_deg")
 
-    @cached_property
+    @property
     def upper(self) -> np.ndarray:
         """Upper joint limits in rad, shape (6,)."""
         return self._limit("upper_deg")
 
-    @cached_property
+    @property
     def speed(self) -> np.ndarray:
         """Largest joint speeds in rad/s, shape (6,)."""
         return self._limit("speed_deg_s")
 
-    @cached_property
+    @property
     def gear_ratio(self) -> np.ndarray:
         """Gear ratios, shape (6,)."""
         return self._drive_train("ratio")
 
-    @cached_property
+    @property
     def reflected_inertia(self) -> np.ndarray:
         """Rotor inertias seen on the link side of the gear in kg m^2, shape (6,)."""
         return self.gear_ratio**2 * self._drive_train("rotor_inertia")
 
-    @cached_property
+    @property
     def joint_stiffness(self) -> np.ndarray:
         """Stiffness of the gears in N m / rad, joint side, shape (6,)."""
         return self._drive_train("stiffness")
 
-    @cached_property
+    @property
     def joint_viscous_friction(self) -> np.ndarray:
         """Viscous friction of the motors in N m s / rad on the link side, Probst (2024) eq. (2.63)."""
         return self.gear_ratio**2 * self._drive_train("viscous_friction")
 
-    @cached_property
+    @property
     def joint_coulomb_friction(self) -> np.ndarray:
         """Coulomb friction of the motors in N m on the link side, Probst (2024) eq. (2.64)."""
         return self.gear_ratio * self._drive_train("coulomb_friction")
 
-    @cached_property
+    @property
     def coulomb_velocity(self) -> np.ndarray:
         """Joint velocity over which the Coulomb friction changes its sign in rad/s, shape (6,)."""
         return self._drive_train("coulomb_velocity")

@@ -35,8 +35,8 @@ class PiGains:
 class CascadeGains:
     """Position controller around a PI velocity controller, as industrial drives have it."""
 
-    position: float = 20.0  # 1/s
-    velocity: float = 100.0  # 1/s, joint torque per velocity error and reflected rotor inertia
+    position: float = 25.0  # 1/s
+    velocity: float = 100.0  # 1/s, joint torque per velocity error and joint inertia
     integral: float = 10.0  # 1/s, the inverse of the integral action time
 
 
@@ -96,12 +96,12 @@ class Drive(Diagram):
             ),
         )
         self._setpoint = builder.AddNamedSystem("setpoint", _double_integrator())
-        self._gains = kp, ki, kd = _pid_gains(robot, kind, config)
-        controller = builder.AddNamedSystem("controller", PidController(kp, ki, kd))
         # Kept as a member: the gravity system only refers to it.
         self._rigid_plant = MultibodyPlant(0.0)
         add_robot(self._rigid_plant, robot, "rigid", payload)
         self._rigid_plant.Finalize()
+        self._gains = kp, ki, kd = _pid_gains(robot, kind, config, self._rigid_plant)
+        controller = builder.AddNamedSystem("controller", PidController(kp, ki, kd))
         gravity = builder.AddNamedSystem(
             "gravity", InverseDynamics(self._rigid_plant, InverseDynamics.InverseDynamicsMode.kGravityCompensation)
         )
@@ -148,7 +148,9 @@ class Drive(Diagram):
             friction.SetBiases(context, layer, np.zeros(NUM_JOINTS))
 
 
-def _pid_gains(robot: RobotModel, kind: str, config: DriveConfig) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def _pid_gains(
+    robot: RobotModel, kind: str, config: DriveConfig, rigid_plant: MultibodyPlant
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Joint-side gains of the PID law that the drive amounts to."""
     ratio = robot.gear_ratio
     if kind == "position":
@@ -158,9 +160,14 @@ def _pid_gains(robot: RobotModel, kind: str, config: DriveConfig) -> tuple[np.nd
         return config.velocity.integral * ratio, 0.0 * ratio, config.velocity.proportional * ratio
     if kind == "cascade":
         gains = config.cascade
-        velocity = gains.velocity * robot.reflected_inertia
+        velocity = gains.velocity * _joint_inertias(rigid_plant)
         return velocity * (gains.position + gains.integral), velocity * gains.position * gains.integral, velocity
     raise ValueError(f"drive kind must be one of {', '.join(KINDS)}, got '{kind}'")
+
+
+def _joint_inertias(rigid_plant: MultibodyPlant) -> np.ndarray:
+    """What each motor has to turn in kg m^2, rotor included, with the arm as at zero joint positions, (6,)."""
+    return np.diag(rigid_plant.CalcMassMatrix(rigid_plant.CreateDefaultContext())).copy()
 
 
 def _double_integrator() -> LeafSystem:

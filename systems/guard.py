@@ -93,7 +93,6 @@ class CommandGuard(LeafSystem):
             )
         self._config, self._period, self._uses_camera = config, period, uses_camera
         self._lower, self._upper = robot.lower, robot.upper
-        self._range = list(zip(robot.lower.tolist(), robot.upper.tolist(), strict=True))
         self._speed = (config.speed_share * robot.speed).tolist()
         # A hundred-thousandth below, because a law's own clipping rounds.
         self._correction_limit = (1.0 - 1e-5) * correction_limit
@@ -135,8 +134,10 @@ class CommandGuard(LeafSystem):
         kinds = []
         if math.isnan(state[0]):
             state[_POSITIONS], state[_VELOCITIES] = self._joints.Eval(context).position, 0.0
-        steps = (position - state[_POSITIONS]).tolist()
-        rates = velocity.tolist()
+        # Into the range first: the way to where a joint must not go is not to slow the others down.
+        inside = np.minimum(np.maximum(position, self._lower), self._upper)
+        at_limit = (inside != position).any()
+        steps, rates = (inside - state[_POSITIONS]).tolist(), velocity.tolist()
         excess = 0.0
         for step, rate, speed in zip(steps, rates, self._speed, strict=True):
             # Written so that NaN, which compares with nothing, is not lost.
@@ -154,6 +155,10 @@ class CommandGuard(LeafSystem):
                 kinds.append(_NO_COMMAND)
             self._brake(state)
         else:
+            if at_limit:
+                kinds.append(_POSITION)
+                outward = (position - inside) * velocity > 0.0
+                rates = np.where(outward, 0.0, velocity).tolist()
             self._follow(state, steps, rates, excess, kinds)
         if state[_MODE] == _HOLDING:
             kinds.append(_HELD)
@@ -174,14 +179,6 @@ class CommandGuard(LeafSystem):
             kinds.append(_VELOCITY)
             steps, rates = [step / excess for step in steps], [rate / excess for rate in rates]
         positions = [last + step for last, step in zip(state[_POSITIONS].tolist(), steps, strict=True)]
-        for i, (low, high) in enumerate(self._range):
-            if not low <= positions[i] <= high:
-                if _POSITION not in kinds:
-                    kinds.append(_POSITION)
-                inside = min(max(positions[i], low), high)
-                if (positions[i] - inside) * rates[i] > 0.0:
-                    rates[i] = 0.0
-                positions[i] = inside
         state[_ISSUED] = positions + rates
         state[_BRAKING_FROM] = rates
 

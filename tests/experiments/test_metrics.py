@@ -112,7 +112,8 @@ def test_an_offset_across_the_path_is_path_accuracy():
     numbers = iso_9283([log], "true")
     assert numbers["AT_mm"] == pytest.approx(5.0, abs=ROUNDING)
     assert numbers["AP_mm"] == pytest.approx(5.0, abs=ROUNDING)
-    assert numbers["RP_mm"] is None and numbers["RT_mm"] is None
+    assert numbers["RP_mm"] is None
+    assert numbers["RT_mm"] is None
 
 
 def test_a_path_that_crosses_itself_is_not_mistaken_for_its_other_branch():
@@ -171,9 +172,9 @@ def test_real_time_factor_is_simulated_over_wall_time():
 def test_a_refused_number_leaves_the_old_file_and_no_rubbish(tmp_path):
     path = tmp_path / "summary.json"
     write_json(path, {"a": 1})
-    with pytest.raises(ValueError):
+    with pytest.raises(ValueError, match="not JSON compliant"):
         write_json(path, {"a": float("nan")})
-    with pytest.raises(OSError):
+    with pytest.raises(FileNotFoundError):
         write_json(tmp_path / "missing" / "summary.json", {})
     assert [entry.name for entry in tmp_path.iterdir()] == ["summary.json"]
     assert path.read_text() == '{\n  "a": 1\n}\n'

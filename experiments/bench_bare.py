@@ -1,0 +1,91 @@
+"""The yardstick of the closed loop: the same plant and drives making the same motion, and nothing else."""
+
+import numpy as np
+from pydrake.multibody.plant import MultibodyPlant
+from pydrake.systems.analysis import ApplySimulatorConfig, ExtractSimulatorConfig, Simulator
+from pydrake.systems.framework import Diagram, DiagramBuilder
+from pydrake.systems.primitives import (
+    ConstantVectorSource,
+    Demultiplexer,
+    Selector,
+    SelectorParams,
+    TrajectorySource,
+)
+from pydrake.trajectories import PiecewisePolynomial
+
+from diagrams.log import RunLog
+from diagrams.run import Experiment
+from robots.model import NUM_JOINTS, RobotModel
+from robots.plant import add_robot
+from systems.drive import Drive
+
+
+class BarePlant:
+    """Plant and drives of an experiment, fed with the commands that it has recorded.
+
+    No camera, no law, no guard, no logs. Integration scheme, accuracy and largest step are those of the
+    experiment.
+    """
+
+    def __init__(self, experiment: Experiment, robot: RobotModel, log: RunLog) -> None:
+        """Builds the diagram and puts it at rest where the experiment began.
+
+        Args:
+            experiment: what to take plant, drives and integrator from.
+            robot: its nominal robot.
+            log: what it has recorded, from the start on.
+        """
+        config = experiment.scenario.station
+        builder = DiagramBuilder()
+        self._plant = builder.AddNamedSystem("plant", MultibodyPlant(0.0))
+        self._robot = add_robot(self._plant, robot, config.elasticity, config.payload, config.errors)
+        self._plant.Finalize()
+        kind = experiment.scenario.servo.laws[experiment.law].drive
+        drive = builder.AddNamedSystem(
+            "drive", Drive(robot, kind, config.drive, config.period, config.payload)
+        )
+        state = builder.AddNamedSystem("motor_state", _selector(self._plant, self._robot.motor_indices()))
+        no_torque = builder.AddNamedSystem("no_feedforward", ConstantVectorSource(np.zeros(NUM_JOINTS)))
+        commands = builder.AddNamedSystem("commands", TrajectorySource(_held(log, config.period)))
+        split = builder.AddNamedSystem("split", Demultiplexer([NUM_JOINTS, NUM_JOINTS]))
+        builder.Connect(commands.get_output_port(), split.get_input_port())
+        builder.Connect(split.get_output_port(0), drive.GetInputPort("position_command"))
+        builder.Connect(split.get_output_port(1), drive.GetInputPort("velocity_command"))
+        builder.Connect(no_torque.get_output_port(), drive.GetInputPort("torque_feedforward"))
+        builder.Connect(self._plant.get_state_output_port(), state.get_input_port())
+        builder.Connect(state.get_output_port(), drive.GetInputPort("motor_state"))
+        builder.Connect(drive.GetOutputPort("joint_torque"), self._plant.get_actuation_input_port())
+        self._diagram: Diagram = builder.Build()
+        self._simulator = Simulator(self._diagram)
+        self._context = self._simulator.get_mutable_context()
+        # The motors begin where they were measured first; they are at rest there.
+        theta = log.joint_position[np.isfinite(log.joint_position).all(axis=1)][0]
+        self._robot.set_at_rest(self._plant.GetMyMutableContextFromRoot(self._context), theta)
+        drive.set_at_rest(self._context, theta)
+        ApplySimulatorConfig(ExtractSimulatorConfig(experiment.simulator), self._simulator)
+        self._simulator.Initialize()
+
+    def advance(self, until: float) -> None:
+        """Advances to a time in s."""
+        self._simulator.AdvanceTo(until)
+
+    def link_positions(self) -> np.ndarray:
+        """Link positions now, in rad, shape (6,)."""
+        positions = self._plant.GetPositions(self._plant.GetMyContextFromRoot(self._context))
+        return self._robot.link_positions(positions)
+
+
+def _held(log: RunLog, period: float) -> PiecewisePolynomial:
+    """The recorded commands, each held from half a period before its tick to half a period after it."""
+    commands = np.hstack([log.position_command, log.velocity_command])
+    breaks = np.append(log.time, log.time[-1] + period) - 0.5 * period
+    return PiecewisePolynomial.ZeroOrderHold(breaks, np.vstack([commands, commands[-1]]).T)
+
+
+def _selector(plant: MultibodyPlant, indices: list[int]) -> Selector:
+    """Picks entries of the plant's state."""
+    params = SelectorParams()
+    params.inputs = [SelectorParams.InputPortParams(name="state", size=plant.num_multibody_states())]
+    selections = [SelectorParams.OutputSelection(input_port_index=0, input_offset=i) for i in indices]
+    params.outputs = [SelectorParams.OutputPortParams(name="motor_state", selections=selections)]
+    return Selector(params)

@@ -1,0 +1,46 @@
+"""The files that a comparison or a single run leaves in its folder."""
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+from diagrams.log import RunLog
+from experiments.figure import write_figure
+from experiments.metrics import summary, timing, write_json
+from experiments.prepare import Prepared
+from experiments.replay import write_replay
+from experiments.report import write_report
+
+RESULTS = {
+    "report.html": "errors, plots and guard events; opens offline",
+    "replay.html": "the robot in motion; opens offline",
+    "figure.svg": "distance of the tip over time",
+    "summary.json": "the numbers; same seed, same bytes",
+    "timing.json": "wall times and real-time factors",
+}
+
+
+def write_results(folder: Path, prepared: Prepared, logs: Mapping[str, Sequence[RunLog]]) -> dict[str, Any]:
+    """Writes `RESULTS` into a folder that exists.
+
+    Args:
+        folder: where to.
+        prepared: what was run.
+        logs: law -> one log per cycle; the first cycle is the one that is drawn.
+
+    Returns:
+        The summary.
+
+    Raises:
+        OSError: if the folder cannot be written.
+    """
+    result, times = summary(prepared.title, logs), timing(logs)
+    first_cycles = {law: cycles[0] for law, cycles in logs.items()}
+    write_json(folder / "summary.json", result)
+    write_json(folder / "timing.json", times)
+    write_report(folder / "report.html", prepared.text, result, times, logs)
+    write_replay(
+        folder / "replay.html", prepared.robot, first_cycles, errors=prepared.scenario.station.errors
+    )
+    write_figure(folder / "figure.svg", prepared.title, first_cycles)
+    return result

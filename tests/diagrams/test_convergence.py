@@ -1,0 +1,33 @@
+"""The shipped integrator settings against accurate ones: the tip is right to less than a micrometre."""
+
+import numpy as np
+import pytest
+
+from diagrams.run import Experiment
+from tests.diagrams.rigs import LAWS, QUIET, scenario
+
+FAST = [
+    "reference.settle=0",
+    "reference.acceleration=3",
+    *QUIET,
+]  # motion from the start, no noise to amplify
+ACCURATE = ["integrator.accuracy=1.0e-8", "integrator.max_step=0.001"]
+
+
+def tips(law: str, duration: float, *settings: str) -> np.ndarray:
+    experiment = Experiment(scenario("misaligned", *FAST, *settings), law)
+    experiment.advance(duration)
+    return experiment.log().X_WE_true[:, :3, 3]
+
+
+@pytest.mark.parametrize(
+    ("law", "payload", "scheme"),
+    [*((law, 7.0, "runge_kutta3") for law in LAWS), ("numerical_ik", 0.0, "radau3")],
+)
+def test_an_accuracy_of_1e_8_moves_the_tip_by_less_than_a_micrometre(law: str, payload: float, scheme: str):
+    load = f"station.payload={payload}"
+    found = tips(law, 0.4, load)
+    accurate = tips(law, 0.4, load, f"integrator.scheme={scheme}", *ACCURATE)
+    assert np.ptp(found, axis=0).max() > 5e-3  # it has moved
+    error = np.linalg.norm(found - accurate, axis=1).max()
+    assert error < 1e-6

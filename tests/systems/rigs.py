@@ -1,0 +1,151 @@
+"""What tests of systems share: signals as functions of time, and hand-cranked laws and guards."""
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+from pydrake.common.value import Value
+from pydrake.math import RigidTransform, RotationMatrix
+from pydrake.systems.framework import LeafSystem
+
+from robots.kinematics import Kinematics
+from robots.model import RobotModel
+from systems.guard import KINDS, CommandGuard, GuardConfig
+from systems.samples import JointSample, PoseSample
+from systems.servo import LAWS, LawConfig
+
+PERIOD = 4e-3  # s
+
+
+def pose(X: np.ndarray) -> RigidTransform:
+    """A homogeneous matrix as a Drake transform."""
+    return RigidTransform(RotationMatrix(X[:3, :3]), X[:3, 3])
+
+
+class VectorSignal(LeafSystem):
+    """One vector output, a function of time."""
+
+    def __init__(self, signal: Callable[[float], np.ndarray]) -> None:
+        super().__init__()
+        size = np.size(signal(0.0))
+        self.DeclareVectorOutputPort(
+            "signal",
+            size,
+            lambda context, output: output.set_value(signal(context.get_time())),
+            {self.time_ticket()},
+        )
+
+
+class ValueSignal(LeafSystem):
+    """One abstract output, a function of time."""
+
+    def __init__(self, signal: Callable[[float], Any]) -> None:
+        super().__init__()
+        self.DeclareAbstractOutputPort(
+            "signal",
+            lambda: Value(signal(0.0)),
+            lambda context, output: output.set_value(signal(context.get_time())),
+            {self.time_ticket()},
+        )
+
+
+class GuardRig:
+    """A guard, ticked by hand as the simulator would: first its output is read, then it remembers."""
+
+    def __init__(self, robot: RobotModel, config: GuardConfig | None = None, start=None, **options) -> None:
+        limits = {"correction_limit": 0.1, "correction_limit_deg": 20.0}
+        self.guard = CommandGuard(robot, config or GuardConfig(), PERIOD, **(limits | options))
+        self.context = self.guard.CreateDefaultContext()
+        self.start = np.zeros(6) if start is None else start
+        self.ticks = 0
+
+    @property
+    def time(self) -> float:
+        """The time of the next tick in s."""
+        return self.ticks * PERIOD
+
+    def tick(self, position, velocity=None, seen: float = np.inf, refused: int = 0, correction=None):
+        """Issues one command; ``seen`` is the time of the last sample in s, by default the present.
+
+        Returns:
+            Position (rad), velocity (rad/s) and the counts by kind.
+        """
+        self.context.SetTime(self.time)
+        values = {
+            "position_command": position,
+            "velocity_command": np.zeros(6) if velocity is None else velocity,
+            "correction": np.zeros(6) if correction is None else correction,
+            "measurement": np.array([min(seen, self.time), refused]),
+        }
+        for name, value in values.items():
+            self.guard.GetInputPort(name).FixValue(self.context, value)
+        sample = JointSample(self.time, self.start, np.zeros(6), np.zeros(6), True)
+        self.guard.GetInputPort("joint_sample").FixValue(self.context, Value(sample))
+        ports = ("position_command", "velocity_command")
+        issued, speed = (self.guard.GetOutputPort(name).Eval(self.context).copy() for name in ports)
+        self.context.SetDiscreteState(self.guard.EvalUniquePeriodicDiscreteUpdate(self.context))
+        counts = self.guard.GetOutputPort("guard_status").Eval(self.context)
+        self.ticks += 1
+        return issued, speed, dict(zip(KINDS, counts.astype(int).tolist(), strict=True))
+
+
+class LawRig:
+    """A law on a perfect robot: what it commands at a tick is where the joints are at the next.
+
+    The camera sees the tip of the *true* robot, which may differ from the nominal one of the law, a given
+    number of ticks late.
+    """
+
+    def __init__(
+        self,
+        law: str,
+        nominal: RobotModel,
+        path: Callable[[float], tuple[np.ndarray, np.ndarray]],
+        q: np.ndarray,
+        true: RobotModel | None = None,
+        config: LawConfig | None = None,
+        delay: int = 1,
+        preview: float = 0.0,
+    ) -> None:
+        self.law = LAWS[law](
+            nominal, config or LawConfig(), GuardConfig(), PERIOD, preview=preview, memory_span=0.25
+        )
+        self.context = self.law.CreateDefaultContext()
+        self.true = Kinematics(true or nominal)
+        self.path, self.preview, self.delay = path, preview, delay
+        self.q = q
+        self.tips: list[np.ndarray] = []  # X_WE at the ticks so far
+        self.ticks = 0
+
+    def output(self, name: str) -> np.ndarray:
+        """What an output port of the law says now."""
+        return self.law.GetOutputPort(name).Eval(self.context).copy()
+
+    def tick(self, sample: PoseSample | None = None) -> np.ndarray:
+        """One tick; a sample that is given replaces the camera's. Returns the position command in rad."""
+        time = self.ticks * PERIOD
+        self.tips.append(self.true.forward(self.q))
+        if sample is None:
+            exposed = self.ticks - self.delay
+            sample = PoseSample()
+            if exposed >= 0:
+                sample = PoseSample(exposed * PERIOD, pose(self.tips[exposed]), True)
+        X_WD, V_WD = self.path(time + self.preview)
+        self.context.SetTime(time)
+        self.law.GetInputPort("X_WE_desired").FixValue(self.context, Value(pose(X_WD)))
+        self.law.GetInputPort("V_WE_desired").FixValue(self.context, V_WD)
+        joints = JointSample(time, self.q, np.zeros(6), np.zeros(6), True)
+        self.law.GetInputPort("joint_sample").FixValue(self.context, Value(joints))
+        self.law.GetInputPort("pose_sample").FixValue(self.context, Value(sample))
+        self.context.SetDiscreteState(self.law.EvalUniquePeriodicDiscreteUpdate(self.context))
+        command = self.output("position_command")
+        if np.isfinite(command).all():
+            self.q = command
+        self.ticks += 1
+        return command
+
+    def run(self, duration: float) -> np.ndarray:
+        """Ticks for so many seconds. Returns the true tips X_WE at all ticks so far, shape (n, 4, 4)."""
+        for _ in range(round(duration / PERIOD)):
+            self.tick()
+        return np.array(self.tips)
