@@ -26,4 +26,6 @@ class PackedLog:
         """The times, shape (n,), and by name what was logged, shape (n, size) each."""
         log = self._sink.FindLog(root_context)
         columns = np.split(log.data(), np.cumsum(list(self._sizes.values()))[:-1])
-        return log.sample_times().copy(), {name: part.T for name, part in zip(self._sizes, columns, strict=True)}
+        return log.sample_times().copy(), {
+            name: part.T for name, part in zip(self._sizes, columns, strict=True)
+        }

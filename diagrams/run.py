@@ -19,7 +19,7 @@ from systems.guard import KINDS
 from systems.paths import CartesianPath
 from systems.servo import LawConfig
 
-# Beyond this rate the explicit runge_kutta3 takes more time in tiny steps than the implicit radau3 in its own.
+# Beyond this rate the explicit runge_kutta3 with its tiny steps takes longer than the implicit radau3.
 _EXPLICIT_RATE_LIMIT = 4000.0  # 1/s
 # Accuracy and fewest steps in a tick with which the tip is right to less than a micrometre.
 _MEASURED = {"runge_kutta3": (1e-3, 1), "radau3": (1e-3, 2)}
@@ -84,7 +84,7 @@ class Experiment:
         self._wall_time = 0.0
 
     def _integration(self) -> SimulatorConfig:
-        """The scenario's integrator; ``auto`` and what is left open are filled in as measured in the bench."""
+        """The scenario's integrator, with what it leaves open filled in as measured in the bench."""
         config = self.scenario.integrator
         scheme = config.scheme
         if scheme == "auto":
@@ -167,7 +167,9 @@ def start_position(robot: RobotModel, scenario: Scenario, path: CartesianPath) -
         X_WE[:3, 3] -= 1e-3 * scenario.initial_error_mm
         return inverse.nearest(X_WE, q_path[0])
     except ValueError as error:
-        raise ScenarioError(f"{robot.name} cannot follow the path '{scenario.reference.path}': {error}") from error
+        raise ScenarioError(
+            f"{robot.name} cannot follow the path '{scenario.reference.path}': {error}"
+        ) from error
 
 
 def _events(times: np.ndarray, counts: np.ndarray) -> list[GuardEvent]:
@@ -178,5 +180,7 @@ def _events(times: np.ndarray, counts: np.ndarray) -> list[GuardEvent]:
         edges = np.diff(increments[:, column].astype(int), prepend=0, append=0)
         for start, stop in zip(np.flatnonzero(edges == 1), np.flatnonzero(edges == -1), strict=True):
             length = times[stop - 1] - times[start]
-            events.append(GuardEvent(float(times[start]), kind, f"for {1e3 * length:.0f} ms, {stop - start} ticks"))
+            events.append(
+                GuardEvent(float(times[start]), kind, f"for {1e3 * length:.0f} ms, {stop - start} ticks")
+            )
     return sorted(events, key=lambda event: event.time)

@@ -66,7 +66,9 @@ class SimulatedStation(Diagram):
         self.plant = builder.AddNamedSystem("plant", MultibodyPlant(0.0))
         self.robot = add_robot(self.plant, robot, config.elasticity, config.payload, config.errors)
         self.plant.Finalize()
-        self.drive = builder.AddNamedSystem("drive", Drive(robot, drive, config.drive, config.period, config.payload))
+        self.drive = builder.AddNamedSystem(
+            "drive", Drive(robot, drive, config.drive, config.period, config.payload)
+        )
         motor_state = builder.AddNamedSystem("motor_state", _selector(self.plant, self.robot.motor_indices()))
         no_torque = builder.AddNamedSystem("no_feedforward", ConstantVectorSource(np.zeros(NUM_JOINTS)))
         sensor = builder.AddNamedSystem("joint_sensor", JointSensor())
@@ -106,10 +108,12 @@ class SimulatedStation(Diagram):
         self.robot.set_at_rest(self.plant.GetMyMutableContextFromRoot(root_context), theta)
         self.drive.set_at_rest(root_context, theta)
         # Not SetRandomContext of the diagram: that would draw the friction parameters too.
-        self._noise.SetRandomContext(self._noise.GetMyMutableContextFromRoot(root_context), RandomGenerator(seed))
+        self._noise.SetRandomContext(
+            self._noise.GetMyMutableContextFromRoot(root_context), RandomGenerator(seed)
+        )
 
     def fastest_rate(self, root_context: Context) -> float:
-        """The largest eigenvalue in magnitude, in 1/s, of plant and drive linearised about a state of rest."""
+        """The largest eigenvalue in magnitude of plant and drive, linearised about rest, in 1/s."""
         context = self.plant.GetMyContextFromRoot(root_context)
         stiffness, damping = self.drive.linear_gains()
         motors = [joint.position_start() for joint in self.robot.motors]
@@ -123,7 +127,6 @@ class SimulatedStation(Diagram):
         M_inverse = np.linalg.inv(self.plant.CalcMassMatrix(context))
         A = np.block([[np.zeros((n, n)), np.eye(n)], [-M_inverse * K, -M_inverse * D]])
         return float(np.abs(np.linalg.eigvals(A)).max())
-
 
     def record(self, root_context: Context) -> StationRecord:
         """What the station has measured, and the truth beside it, since the start."""

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from scipy.linalg.lapack import dgetrf, dgetrs
+from scipy.linalg import get_lapack_funcs
 
 from robots.model import NUM_JOINTS, RobotModel
 
@@ -214,6 +214,9 @@ def robust_inverse(
     return np.swapaxes(Vt, -1, -2) * gain[..., None, :] @ np.swapaxes(U, -1, -2)
 
 
+_dgetrf, _dgetrs = get_lapack_funcs(("getrf", "getrs"), dtype=np.float64)
+
+
 def robust_solve(J: np.ndarray, V: np.ndarray) -> np.ndarray:
     """J^+ V for one Jacobian with the robust inverse J^+, without forming it away from singularities.
 
@@ -224,10 +227,10 @@ def robust_solve(J: np.ndarray, V: np.ndarray) -> np.ndarray:
     Returns:
         Joint velocities in the shape of V.
     """
-    factors, pivots, _ = dgetrf(J)
+    factors, pivots, _ = _dgetrf(J)
     # The product of the pivots is the determinant up to its sign.
     if abs(float(factors.ravel(order="K")[:: NUM_JOINTS + 1].prod())) >= MANIPULABILITY_THRESHOLD:
-        return dgetrs(factors, pivots, V)[0]
+        return _dgetrs(factors, pivots, V)[0]
     return robust_inverse(J) @ V
 
 

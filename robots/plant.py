@@ -126,12 +126,14 @@ def add_robot(
         raise ValueError(f"elasticity must be one of {', '.join(ELASTICITIES)}, got '{elasticity}'")
     if not 0.0 <= payload <= robot.payload.largest_mass:
         raise ValueError(
-            f"payload must be between 0 and {robot.payload.largest_mass} kg for {robot.name}, got {payload} kg"
+            f"payload of {robot.name} must be between 0 and {robot.payload.largest_mass} kg, got {payload} kg"
         )
     errors = errors or GeometricErrors()
     parent = plant.AddRigidBody("base", _inertia(robot.base_link))
     plant.WeldFrames(plant.world_frame(), parent.body_frame(), robot.base.pose())
-    _add_capsule(plant, parent, np.zeros(3), robot.joints[0].placement.translation, robot.base_link.radius, _BASE_COLOR)
+    _add_capsule(
+        plant, parent, np.zeros(3), robot.joints[0].placement.translation, robot.base_link.radius, _BASE_COLOR
+    )
     motors, deflections, springs = [], [], []
     for i, (joint, link, offset) in enumerate(
         zip(robot.joints, robot.links, errors.joint_offset(), strict=True), 1
@@ -150,7 +152,9 @@ def add_robot(
         if elasticity == "joints":
             driven = plant.AddRigidBody(f"rotor_{i}", _massless())
             deflection = plant.AddJoint(
-                RevoluteJoint(f"deflection_{i}", driven.body_frame(), body.body_frame(), joint.axis, train.damping)
+                RevoluteJoint(
+                    f"deflection_{i}", driven.body_frame(), body.body_frame(), joint.axis, train.damping
+                )
             )
             springs.append(plant.AddForceElement(RevoluteSpring(deflection, 0.0, train.stiffness)))
             deflections.append(deflection)

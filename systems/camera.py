@@ -1,4 +1,4 @@
-"""A pose camera: it sees the tool in regular exposures and reports each one late, with noise, or not at all."""
+"""A pose camera: it sees the tool at regular instants and reports it late, with noise, or not at all."""
 
 from dataclasses import dataclass, field
 
@@ -36,7 +36,7 @@ class PoseCamera(LeafSystem):
         in  ``X_WE``         RigidTransform, the true tool in the world
         in  ``noise``        vector 448, standard normal, drawn anew every `BLOCK` periods
         out ``pose_sample``  PoseSample, the newest one that has arrived; a lost exposure arrives as invalid
-        out ``exposure``     vector 14, the last exposure, not yet arrived: time, validity, rows of X_WE; for logs
+        out ``exposure``     vector 14, the last exposure before it arrives: time, validity, rows of X_WE
 
     Orientation noise is a small rotation about a random axis of the world.
     """
@@ -53,7 +53,9 @@ class PoseCamera(LeafSystem):
         self._rotation_sigma = float(np.deg2rad(config.orientation_sigma_deg))
         self._lost_below = norm.ppf(config.dropout_probability)
         self._X_WE = self.DeclareAbstractInputPort("X_WE", Value(RigidTransform()))
-        self._noise = self.DeclareVectorInputPort("noise", BLOCK * _PER_EXPOSURE, RandomDistribution.kGaussian)
+        self._noise = self.DeclareVectorInputPort(
+            "noise", BLOCK * _PER_EXPOSURE, RandomDistribution.kGaussian
+        )
         in_flight = int(np.floor(config.delay / config.period + _EPSILON)) + 2
         empty = np.concatenate([[-np.inf, 0.0], np.eye(4)[:3].ravel()])
         newest = self.DeclareDiscreteState(empty)
@@ -98,7 +100,7 @@ class PoseCamera(LeafSystem):
 
 
 def _small_rotation(x: float, y: float, z: float) -> np.ndarray:
-    """The rotation of the quaternion along (1, x/2, y/2, z/2): that of the rotation vector, up to third order."""
+    """The rotation of the quaternion along (1, x/2, y/2, z/2): to third order that of the rotation vector."""
     x, y, z = 0.5 * x, 0.5 * y, 0.5 * z
     s = 2.0 / (1.0 + x * x + y * y + z * z)
     return np.array(

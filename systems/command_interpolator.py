@@ -42,8 +42,8 @@ class CommandInterpolator(LeafSystem):
             raise ValueError(f"drive: period must be positive, got {period} s")
         if delay < period * (1.0 - 1e-9):
             raise ValueError(
-                f"drive: command_delay + dead_time must be at least one command period of {period} s, because a "
-                f"command is interpolated over one period; got {delay} s"
+                f"drive: command_delay + dead_time must be at least one command period of {period} s, "
+                f"because a command is interpolated over one period; got {delay} s"
             )
         # A command read at a tick was issued one period ago: number 0; number k another k periods before.
         self._base = max(0, int(np.ceil((delay - 2.0 * period) / period - 1e-9)))
@@ -75,7 +75,9 @@ class CommandInterpolator(LeafSystem):
         velocity = commands[base + NUM_JOINTS : base + _WIDTH]
         if self._lead > 0.0:
             older = newer + _WIDTH
-            change = commands[newer + NUM_JOINTS : newer + _WIDTH] - commands[older + NUM_JOINTS : older + _WIDTH]
+            change = (
+                commands[newer + NUM_JOINTS : newer + _WIDTH] - commands[older + NUM_JOINTS : older + _WIDTH]
+            )
             velocity = velocity + self._lead / self._period * change
         setpoint = self._setpoint.Eval(context)
         acceleration = self._velocity_gain * (velocity - setpoint[NUM_JOINTS:])

@@ -103,7 +103,8 @@ class Drive(Diagram):
         self._gains = kp, ki, kd = _pid_gains(robot, kind, config, self._rigid_plant)
         controller = builder.AddNamedSystem("controller", PidController(kp, ki, kd))
         gravity = builder.AddNamedSystem(
-            "gravity", InverseDynamics(self._rigid_plant, InverseDynamics.InverseDynamicsMode.kGravityCompensation)
+            "gravity",
+            InverseDynamics(self._rigid_plant, InverseDynamics.InverseDynamicsMode.kGravityCompensation),
         )
         self._friction = builder.AddNamedSystem("friction", _coulomb_friction())
         motor_torque = builder.AddNamedSystem("motor_torque", Adder(3, NUM_JOINTS))
@@ -128,7 +129,7 @@ class Drive(Diagram):
         builder.BuildInto(self)
 
     def linear_gains(self) -> tuple[np.ndarray, np.ndarray]:
-        """Stiffness (N m / rad) and damping (N m s / rad) of the drives about rest, joint side, shape (6,) each."""
+        """Stiffness (N m / rad) and damping (N m s / rad) about rest, joint side, shape (6,) each."""
         friction_slope = self.robot.joint_coulomb_friction / self.robot.coulomb_velocity
         return self._gains[0], self._gains[2] + friction_slope
 
@@ -141,7 +142,9 @@ class Drive(Diagram):
         self._setpoint.GetMyMutableContextFromRoot(root_context).SetContinuousState(still)
         self._interpolator.set_at_rest(self._interpolator.GetMyMutableContextFromRoot(root_context), theta)
         friction, context = self._friction, self._friction.GetMyMutableContextFromRoot(root_context)
-        velocity_only = np.hstack([np.zeros((NUM_JOINTS, NUM_JOINTS)), np.diag(1.0 / self.robot.coulomb_velocity)])
+        velocity_only = np.hstack(
+            [np.zeros((NUM_JOINTS, NUM_JOINTS)), np.diag(1.0 / self.robot.coulomb_velocity)]
+        )
         friction.SetWeights(context, 0, velocity_only)
         friction.SetWeights(context, 1, -np.diag(self.robot.joint_coulomb_friction))
         for layer in (0, 1):
@@ -161,12 +164,16 @@ def _pid_gains(
     if kind == "cascade":
         gains = config.cascade
         velocity = gains.velocity * _joint_inertias(rigid_plant)
-        return velocity * (gains.position + gains.integral), velocity * gains.position * gains.integral, velocity
+        return (
+            velocity * (gains.position + gains.integral),
+            velocity * gains.position * gains.integral,
+            velocity,
+        )
     raise ValueError(f"drive kind must be one of {', '.join(KINDS)}, got '{kind}'")
 
 
 def _joint_inertias(rigid_plant: MultibodyPlant) -> np.ndarray:
-    """What each motor has to turn in kg m^2, rotor included, with the arm as at zero joint positions, (6,)."""
+    """What each motor has to turn at zero joint positions, rotor included, in kg m^2, shape (6,)."""
     return np.diag(rigid_plant.CalcMassMatrix(rigid_plant.CreateDefaultContext())).copy()
 
 

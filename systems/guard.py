@@ -115,7 +115,9 @@ class CommandGuard(LeafSystem):
         inputs = {port.ticket() for port in self._inputs} | {self._joints.ticket()}
         # One entry computes everything; the ports are slices of it.
         self._next = self.DeclareCacheEntry(
-            "next", ValueProducer(Value[object], self._calc_next), inputs | {self.discrete_state_ticket(state)}
+            "next",
+            ValueProducer(Value[object], self._calc_next),
+            inputs | {self.discrete_state_ticket(state)},
         )
         for name, part in (("position_command", _POSITIONS), ("velocity_command", _VELOCITIES)):
             self.DeclareVectorOutputPort(name, NUM_JOINTS, self._slice(part), {self._next.ticket()})
@@ -167,7 +169,10 @@ class CommandGuard(LeafSystem):
             kinds.append(_REFUSED)
             state[_REFUSED_SEEN] = refused
         a, b, c, x, y, z = correction.tolist()
-        if a * a + b * b + c * c > self._correction_angle**2 or x * x + y * y + z * z > self._correction_limit**2:
+        if (
+            a * a + b * b + c * c > self._correction_angle**2
+            or x * x + y * y + z * z > self._correction_limit**2
+        ):
             kinds.append(_CORRECTION)
         value.set_value((state, kinds))
 
@@ -186,7 +191,9 @@ class CommandGuard(LeafSystem):
         """Slows all joints down evenly, from full motion to rest in ``stop_time``."""
         start, last = state[_BRAKING_FROM], state[_VELOCITIES].copy()
         top = float(np.abs(start).max())
-        share = max(0.0, float(np.abs(last).max()) / top - self._period / self._config.stop_time) if top else 0.0
+        share = (
+            max(0.0, float(np.abs(last).max()) / top - self._period / self._config.stop_time) if top else 0.0
+        )
         velocity = share * start
         position = state[_POSITIONS] + 0.5 * self._period * (last + velocity)
         state[_POSITIONS] = np.minimum(np.maximum(position, self._lower), self._upper)

@@ -30,4 +30,6 @@ class JointSensor(LeafSystem):
     def _calc(self, context: Context, output) -> None:
         state = self._state.Eval(context)
         torque = self._torque.Eval(context)
-        output.set_value(JointSample(context.get_time(), state[:NUM_JOINTS], state[NUM_JOINTS:], torque, True))
+        output.set_value(
+            JointSample(context.get_time(), state[:NUM_JOINTS], state[NUM_JOINTS:], torque, True)
+        )

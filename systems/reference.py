@@ -10,7 +10,6 @@ from pydrake.systems.framework import BasicVector, Context, LeafSystem
 
 from systems.paths import CartesianPath, ReferenceConfig, make_path
 
-
 _Moment = tuple[RigidTransform, np.ndarray, np.ndarray]  # pose, twist, acceleration
 
 

@@ -1,4 +1,4 @@
-"""What all visual-servo laws share: their ports, the comparison with the camera, and what is never trusted."""
+"""What all visual-servo laws share: ports, the comparison with the camera, and what is never trusted."""
 
 import math
 from dataclasses import dataclass
@@ -10,7 +10,7 @@ from pydrake.math import RigidTransform
 from pydrake.systems.framework import Context, DiscreteValues, LeafSystem
 
 from robots.inverse_kinematics import InverseKinematics, JointLimitError, UnreachableError
-from robots.kinematics import rotation_about
+from robots.kinematics import Kinematics, rotation_about
 from robots.model import NUM_JOINTS, RobotModel
 from systems.guard import GuardConfig
 from systems.samples import JointSample, PoseSample
@@ -39,7 +39,9 @@ class Moment(NamedTuple):
     X_WD: np.ndarray  # wanted pose
     V_WD: np.ndarray  # wanted twist
     position: np.ndarray  # measured joint positions, rad
-    measured: tuple[np.ndarray, np.ndarray] | None  # (wanted, seen) pose at the exposure; None: do not correct
+    measured: (
+        tuple[np.ndarray, np.ndarray] | None
+    )  # (wanted, seen) pose at the exposure; None: do not correct
 
 
 class Step(NamedTuple):
@@ -52,7 +54,7 @@ class Step(NamedTuple):
 
 
 class ServoLaw(LeafSystem):
-    """The frame of a visual-servo law; a law adds `_start` and `_step`.
+    """The frame of a visual-servo law on the nominal kinematics; a law adds `_start` and `_step`.
 
     Ports:
         in  ``X_WE_desired``      RigidTransform, the wanted pose at t + preview
@@ -94,7 +96,9 @@ class ServoLaw(LeafSystem):
         for label in ("translation", "rotation", "correction_limit", "correction_limit_deg"):
             if not getattr(config, label) > 0.0:
                 raise ValueError(f"servo law: {label} must be positive, got {getattr(config, label)}")
-        self.robot, self.config, self.period = robot, config, period
+        self.config, self.period = config, period
+        self._kinematics, self._inverse = Kinematics(robot), InverseKinematics(robot)
+        self._angle_limit = math.radians(config.correction_limit_deg)
         self._guard, self._preview = guard, preview
         self._smallest_trace = 1.0 + 2.0 * math.cos(math.radians(guard.largest_deviation_deg))
         self._X_WD = self.DeclareAbstractInputPort("X_WE_desired", Value(RigidTransform()))

@@ -4,11 +4,9 @@ import math
 
 import numpy as np
 
-from robots.kinematics import Kinematics, robust_solve
-from robots.model import RobotModel
+from robots.kinematics import robust_solve
 from robots.pose import pose_error
-from systems.guard import GuardConfig
-from systems.servo.law import LawConfig, Moment, ServoLaw, Step
+from systems.servo.law import Moment, ServoLaw, Step
 
 _SMALLEST_COSINE = math.cos(math.radians(60.0))  # L is singular at 90 degrees
 _ROTATION, _TRANSLATION = slice(0, 3), slice(3, 6)
@@ -27,11 +25,6 @@ class NumericalIk(ServoLaw):
     """
 
     memory_size = 18
-
-    def __init__(self, robot: RobotModel, config: LawConfig, guard: GuardConfig, period: float, **options) -> None:
-        super().__init__(robot, config, guard, period, **options)
-        self._kinematics = Kinematics(robot)
-        self._limits = (math.radians(config.correction_limit_deg), config.correction_limit)
 
     def _start(self, moment: Moment) -> np.ndarray:
         return np.concatenate([moment.position, moment.position, np.zeros(6)])
@@ -70,7 +63,7 @@ class NumericalIk(ServoLaw):
             twist[:3] = 0.0
         twist[:3] += (gain * (yz - zy), gain * (zx - xz), gain * (xy - yx))
         twist[3:] = self.config.translation * (wanted[:, 3] - seen[:, 3])
-        for part, limit in ((_ROTATION, self._limits[0]), (_TRANSLATION, self._limits[1])):
+        for part, limit in ((_ROTATION, self._angle_limit), (_TRANSLATION, self.config.correction_limit)):
             # At its limit the correction may only shrink.
             size_squared = float(correction[part] @ correction[part])
             if size_squared >= limit * limit and float(correction[part] @ twist[part]) > 0.0:

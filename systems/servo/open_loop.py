@@ -2,11 +2,8 @@
 
 import numpy as np
 
-from robots.inverse_kinematics import InverseKinematics
-from robots.kinematics import Kinematics, robust_solve
-from robots.model import RobotModel
-from systems.guard import GuardConfig
-from systems.servo.law import LawConfig, Moment, ServoLaw, Step, followed_branch
+from robots.kinematics import robust_solve
+from systems.servo.law import Moment, ServoLaw, Step, followed_branch
 
 
 class OpenLoop(ServoLaw):
@@ -16,11 +13,6 @@ class OpenLoop(ServoLaw):
     """
 
     memory_size = 6
-
-    def __init__(self, robot: RobotModel, config: LawConfig, guard: GuardConfig, period: float, **options) -> None:
-        super().__init__(robot, config, guard, period, **options)
-        self._kinematics = Kinematics(robot)
-        self._inverse = InverseKinematics(robot)
 
     def _start(self, moment: Moment) -> np.ndarray:
         return moment.position

@@ -4,12 +4,9 @@ import math
 
 import numpy as np
 
-from robots.inverse_kinematics import InverseKinematics
-from robots.kinematics import Kinematics, robust_solve
-from robots.model import RobotModel
+from robots.kinematics import robust_solve
 from robots.pose import angular_velocity, euler_difference, pose_error, zyx_from_rotation
-from systems.guard import GuardConfig
-from systems.servo.law import LawConfig, Moment, ServoLaw, Step, followed_branch
+from systems.servo.law import Moment, ServoLaw, Step, followed_branch
 
 
 class Pbvs(ServoLaw):
@@ -23,12 +20,6 @@ class Pbvs(ServoLaw):
 
     memory_size = 6
 
-    def __init__(self, robot: RobotModel, config: LawConfig, guard: GuardConfig, period: float, **options) -> None:
-        super().__init__(robot, config, guard, period, **options)
-        self._kinematics = Kinematics(robot)
-        self._inverse = InverseKinematics(robot)
-        self._speed_limit = math.radians(config.correction_speed_limit_deg_s)
-
     def _start(self, moment: Moment) -> np.ndarray:
         return moment.position
 
@@ -38,7 +29,10 @@ class Pbvs(ServoLaw):
         X_WE, J = self._kinematics.forward_and_jacobian(moment.position)
         if moment.measured is not None:
             correction = robust_solve(J, self._feedback(*moment.measured))
-            velocity = velocity + correction * min(1.0, self._speed_limit / max(np.abs(correction).max(), 1e-12))
+            velocity = velocity + correction * min(
+                1.0,
+                math.radians(self.config.correction_speed_limit_deg_s) / max(np.abs(correction).max(), 1e-12),
+            )
         position = moment.position + self.period * velocity
         return Step(position, velocity, pose_error(X_WE, moment.X_WD), q_d)
 

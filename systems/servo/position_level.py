@@ -1,15 +1,10 @@
 """The error system on position level: the wanted pose, shifted by the integral of its error."""
 
-import math
-
 import numpy as np
 
-from robots.inverse_kinematics import InverseKinematics
-from robots.kinematics import Kinematics, robust_solve
-from robots.model import RobotModel
+from robots.kinematics import robust_solve
 from robots.pose import angular_velocity, euler_difference, euler_rates, rotation_from_zyx, zyx_from_rotation
-from systems.guard import GuardConfig
-from systems.servo.law import LawConfig, Moment, ServoLaw, Step, followed_branch, limit_norm
+from systems.servo.law import Moment, ServoLaw, Step, followed_branch, limit_norm
 
 
 class PositionLevel(ServoLaw):
@@ -25,12 +20,6 @@ class PositionLevel(ServoLaw):
     """
 
     memory_size = 12
-
-    def __init__(self, robot: RobotModel, config: LawConfig, guard: GuardConfig, period: float, **options) -> None:
-        super().__init__(robot, config, guard, period, **options)
-        self._kinematics = Kinematics(robot)
-        self._inverse = InverseKinematics(robot)
-        self._angle_limit = math.radians(config.correction_limit_deg)
 
     def _start(self, moment: Moment) -> np.ndarray:
         X_WE = self._kinematics.forward(moment.position)[:3]

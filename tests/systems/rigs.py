@@ -53,7 +53,7 @@ class GuardRig:
     """A guard, ticked by hand as the simulator would: first its output is read, then it remembers."""
 
     def __init__(self, robot: RobotModel, config: GuardConfig | None = None, start=None, **options) -> None:
-        limits = {"correction_limit": 0.1, "correction_limit_deg": 20.0}
+        limits: dict[str, Any] = {"correction_limit": 0.1, "correction_limit_deg": 20.0}
         self.guard = CommandGuard(robot, config or GuardConfig(), PERIOD, **(limits | options))
         self.context = self.guard.CreateDefaultContext()
         self.start = np.zeros(6) if start is None else start

@@ -1,6 +1,7 @@
 """The visual-servo laws on a perfect robot that is where it was told to be: decay, smoothness, refusals."""
 
 from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 import pytest
@@ -79,7 +80,7 @@ def test_an_error_dies_with_the_time_constant_of_its_gain(law: str, part: str, d
     An integrator with gain K and dead time T decays with the real root of s = K exp(s T), which is
     -W(-K T) / T. T is the camera's delay, the tick from the command to the motion and half a tick of hold.
     """
-    gains = {"translation": 3.0, "rotation": 3.0, part: 5.0}
+    gains: dict[str, Any] = {"translation": 3.0, "rotation": 3.0, part: 5.0}
     error = np.repeat([0.0, 0.01] if part == "translation" else [np.deg2rad(1.0), 0.0], 3)
     rig = LawRig(
         law, ROBOT, standing(HOME), joints_at(displaced(error)), config=LawConfig(**gains), delay=delay
@@ -212,5 +213,7 @@ def test_a_pose_out_of_reach_gives_no_command_and_the_law_goes_on_when_it_return
 @pytest.mark.parametrize("law", LAWS)
 @pytest.mark.parametrize("label", ["translation", "rotation", "correction_limit", "correction_limit_deg"])
 def test_refuses_gains_and_limits_that_are_not_positive(law: str, label: str):
+    config = LawConfig()
+    setattr(config, label, 0.0)
     with pytest.raises(ValueError, match=f"servo law: {label} must be positive, got 0.0"):
-        LAWS[law](ROBOT, LawConfig(**{label: 0.0}), GuardConfig(), PERIOD)
+        LAWS[law](ROBOT, config, GuardConfig(), PERIOD)

@@ -66,19 +66,20 @@ def test_the_rotations_are_rotations():
         assert np.linalg.det(R_WE.matrix()) > 0.0
 
 
-@pytest.mark.parametrize(("preview", "evaluations"), [(0.0, 1), (0.1, 2)])
-def test_the_path_is_evaluated_once_per_time(preview: float, evaluations: int, monkeypatch):
-    times = []
+def test_ticks_are_computed_beforehand_and_other_times_when_they_are_asked_for(monkeypatch):
+    asked = []
     sample = CartesianPath.sample
-    monkeypatch.setattr(CartesianPath, "sample", lambda path, time: times.append(time) or sample(path, time))
-    reference, root, context = in_diagram(ReferenceConfig(preview=preview))
-    for tick in (1, 2):
-        root.SetTime(float(tick))
-        for _ in range(2):
-            outputs(reference, context, "desired")
-            outputs(reference, context, "preview")
-        assert len(times) == tick * evaluations
-    assert times[-1] == 2.0 + preview
+    monkeypatch.setattr(CartesianPath, "sample", lambda path, time: asked.append(time) or sample(path, time))
+    reference, root, context = in_diagram(ReferenceConfig(preview=0.1))
+    asked.clear()
+    for tick in (0, 1, 700):
+        root.SetTime(0.004 * tick)
+        outputs(reference, context, "desired")
+        outputs(reference, context, "preview")
+    assert asked == []
+    root.SetTime(0.0051)
+    outputs(reference, context, "preview")
+    assert {float(time[0]) for time in asked} == {0.1051}
 
 
 def test_refuses_a_path_that_does_not_exist():
