@@ -130,38 +130,22 @@ class CommandGuard(LeafSystem):
         return calc
 
     def _calc_next(self, context: Context, value) -> None:
-        """The next state and which kinds of intervention it takes. Plain floats: this runs every tick."""
+        """The next state and which kinds of intervention it takes."""
         state = context.get_discrete_state(0).value().copy()
         position, velocity, correction, measurement = (port.Eval(context) for port in self._inputs)
         kinds = []
         if math.isnan(state[0]):
             state[_POSITIONS], state[_VELOCITIES] = self._joints.Eval(context).position, 0.0
-        # Into the range first: the way to where a joint must not go is not to slow the others down.
-        inside = np.minimum(np.maximum(position, self._lower), self._upper)
-        at_limit = (inside != position).any()
-        steps, rates = (inside - state[_POSITIONS]).tolist(), velocity.tolist()
-        excess = 0.0
-        for step, rate, speed in zip(steps, rates, self._speed, strict=True):
-            # Written so that NaN, which compares with nothing, is not lost.
-            if not (abs(rate) <= excess * speed and abs(step) <= excess * speed * self._period):
-                excess = max(abs(rate), abs(step) / self._period) / speed
-                if not math.isfinite(abs(rate) + abs(step)):
-                    excess = math.inf
-                    break
         if state[_MODE] == _STOPPING:
             kinds.append(_STOPPED)
             self._brake(state)
-        elif excess == math.inf:
+        elif not math.isfinite(float(position @ position + velocity @ velocity)):
             # Before the first command a law is silent by right.
             if state[_LAST_COMMAND] > -math.inf:
                 kinds.append(_NO_COMMAND)
             self._brake(state)
         else:
-            if at_limit:
-                kinds.append(_POSITION)
-                outward = (position - inside) * velocity > 0.0
-                rates = np.where(outward, 0.0, velocity).tolist()
-            self._follow(state, steps, rates, excess, kinds)
+            self._follow(state, position, velocity, kinds)
         if state[_MODE] == _HOLDING:
             kinds.append(_HELD)
         refused = measurement[1]
@@ -177,14 +161,23 @@ class CommandGuard(LeafSystem):
         value.set_value((state, kinds))
 
     def _follow(
-        self, state: np.ndarray, steps: list[float], rates: list[float], excess: float, kinds: list[int]
+        self, state: np.ndarray, position: np.ndarray, velocity: np.ndarray, kinds: list[int]
     ) -> None:
-        """Goes to the law's command as far as the limits allow."""
+        """Goes to the law's command as far as the limits allow. Plain floats: this runs every tick."""
+        # Into the range first: the way to where a joint must not go is not to slow the others down.
+        inside = np.minimum(np.maximum(position, self._lower), self._upper)
+        if (inside != position).any():
+            kinds.append(_POSITION)
+            velocity = np.where((position - inside) * velocity > 0.0, 0.0, velocity)
+        start, rates = state[_POSITIONS], velocity.tolist()
+        steps = (inside - start).tolist()
+        excess = 0.0
+        for step, rate, speed in zip(steps, rates, self._speed, strict=True):
+            excess = max(excess, abs(rate) / speed, abs(step) / (speed * self._period))
         if excess > 1.0 + 1e-9:
             kinds.append(_VELOCITY)
             steps, rates = [step / excess for step in steps], [rate / excess for rate in rates]
-        positions = [last + step for last, step in zip(state[_POSITIONS].tolist(), steps, strict=True)]
-        state[_ISSUED] = positions + rates
+        state[_ISSUED] = [last + step for last, step in zip(start.tolist(), steps, strict=True)] + rates
         state[_BRAKING_FROM] = rates
 
     def _brake(self, state: np.ndarray) -> None:

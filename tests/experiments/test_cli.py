@@ -29,7 +29,7 @@ REFUSED = {
         "station.camera.delay must be between 0 and 1 s",
     ),
     "no number": (["compare", "--set=station.payload=7kg"], "station.payload must be a number, got '7kg'"),
-    "too heavy": (["compare", "--set=station.payload=9"], "payload must be between 0 and 7.0 kg"),
+    "too heavy": (["compare", "--set=station.payload=9"], "must be between 0 and 7.0 kg"),
     "no integrator": (["compare", "--set=integrator.scheme=magic"], "magic"),
     "no scenario": (["compare", "--scenario=nope.yaml"], "no file nope.yaml"),
     "broken scenario": (["compare", "--scenario=broken.yaml"], "broken.yaml"),

@@ -30,7 +30,7 @@ def pages(page: Layout) -> list[Layout]:
 def systems(diagram: Diagram, depth: int) -> list[str]:
     names = []
     for system in diagram.GetSystems():
-        if not isinstance(system, VectorLogSink):
+        if not isinstance(system, VectorLogSink) and system.get_name() != "log_inputs":
             names.append(system.get_name())
             if isinstance(system, Diagram) and depth > 1:
                 names += systems(system, depth - 1)

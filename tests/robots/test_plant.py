@@ -225,7 +225,7 @@ def test_a_payload_adds_its_mass_at_the_flange():
 @pytest.mark.parametrize("payload", [7.1, -0.1, np.nan])
 def test_refuses_a_payload_that_the_robot_may_not_carry(payload: float):
     with pytest.raises(
-        ValueError, match=rf"payload must be between 0 and 7.* kg for ABB .*, got {payload} kg"
+        ValueError, match=rf"payload of ABB .* must be between 0 and 7.* kg, got {payload} kg"
     ):
         add_robot(MultibodyPlant(0.0), ROBOT, payload=payload)
 

@@ -151,7 +151,9 @@ def test_the_cascade_is_a_position_loop_around_a_pi_velocity_loop():
     velocity_error = gains.position * (p_wanted - p) + v_wanted - v
     integral = np.zeros_like(p)
     integral[1:] = np.cumsum(0.5e-3 * (velocity_error[1:] + velocity_error[:-1]), axis=0)
-    torque = ROBOT.reflected_inertia * gains.velocity * (velocity_error + gains.integral * integral)
+    plant = rigid_plant(0.0)
+    inertia = np.diag(plant.CalcMassMatrix(plant.CreateDefaultContext()))
+    torque = inertia * gains.velocity * (velocity_error + gains.integral * integral)
     gravity = np.array([gravity_torque(theta) for theta in p])
     # h^2/12 of the second derivative, 0.1 rad/s * 20^2 / s^2 * 0.3 s, times 2300 N m s / rad.
     np.testing.assert_allclose(found["motor_torque"] - gravity, torque, atol=0.01)
