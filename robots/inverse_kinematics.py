@@ -94,7 +94,7 @@ class InverseKinematics:
         q = np.stack([q1, q2, q3, q4, q5, q6], -1) * self._signs
         return wrap_angle(np.where(np.isnan(q2)[..., None], np.nan, q))
 
-    def nearest(self, X_WE: np.ndarray | tuple[np.ndarray, np.ndarray], q_near: np.ndarray) -> np.ndarray:
+    def nearest(self, X_WE: np.ndarray, q_near: np.ndarray) -> np.ndarray:
         """The solution within the joint limits that is nearest to a configuration, full turns included.
 
         All joints weigh the same. The result can be of another branch than ``q_near`` if that one leaves
@@ -102,7 +102,7 @@ class InverseKinematics:
         line the angle of axis 4 is kept, with the wrist on axis 1 that of axis 1.
 
         Args:
-            X_WE: pose of the tool, shape (4, 4), or its rotation (3, 3) and position (3,) in m.
+            X_WE: pose of the tool, shape (4, 4) or without the last row (3, 4).
             q_near: joint positions in rad, shape (6,).
 
         Returns:
@@ -113,14 +113,11 @@ class InverseKinematics:
             JointLimitError: if branches reach it, but none within the joint limits.
             ValueError: if an argument is not finite.
         """
-        if isinstance(X_WE, tuple):
-            R_WE, p_WE = X_WE
-            X_WE = np.eye(4)
-            X_WE[:3, :3], X_WE[:3, 3] = R_WE, p_WE
-        pose, near = X_WE.tolist(), np.asarray(q_near, dtype=float).tolist()
-        if not (math.isfinite(sum(map(sum, pose))) and math.isfinite(sum(near))):
-            raise ValueError(f"inverse kinematics: not finite: pose {pose} or configuration {near}")
-        X = (self._X_1W @ X_WE @ self._X_EH).tolist()
+        X_1E = self._X_1W[:3, :3] @ X_WE[:3]
+        X_1E[:, 3] += self._X_1W[:3, 3]
+        X, near = (X_1E @ self._X_EH).tolist(), np.asarray(q_near, dtype=float).tolist()
+        if not (math.isfinite(sum(map(sum, X))) and math.isfinite(sum(near))):
+            raise ValueError(f"inverse kinematics: not finite: pose {X_WE.tolist()} or configuration {near}")
         q = self._solve(X, near, *self._branch_of(near))
         if q is not None:
             fitted, squared = self._within_limits(q, near)

@@ -98,6 +98,7 @@ class ServoLaw(LeafSystem):
                 raise ValueError(f"servo law: {label} must be positive, got {getattr(config, label)}")
         self.config, self.period = config, period
         self._kinematics, self._inverse = Kinematics(robot), InverseKinematics(robot)
+        self._gains = np.repeat([config.rotation, config.translation], 3)
         self._angle_limit = math.radians(config.correction_limit_deg)
         self._guard, self._preview = guard, preview
         self._smallest_trace = 1.0 + 2.0 * math.cos(math.radians(guard.largest_deviation_deg))
@@ -146,12 +147,10 @@ class ServoLaw(LeafSystem):
 
         measured = None
         if sample.valid and time - sample.time <= self._guard.hold_after + 1e-9:
-            wanted = self._path_at(path, tick, sample.time)
-            seen = sample.X_WE.GetAsMatrix34()
-            if wanted is not None and self._is_plausible(wanted, seen):
-                measured = (wanted, seen)
+            measured = self._compared(path, tick, sample)
+            if measured is not None:
                 last_used = sample.time
-            elif wanted is not None and sample.time > last_used:
+            elif sample.time > last_used:
                 refused += 1.0
 
         moment = Moment(X_WD, V_WD, joints.position, measured)
@@ -169,32 +168,38 @@ class ServoLaw(LeafSystem):
         discrete_state.set_value(3, np.array([last_used, refused]))
         discrete_state.set_value(5, step.memory)
 
-    def _path_at(self, path: np.ndarray, tick: int, time: float) -> np.ndarray | None:
-        """The wanted pose at an earlier time, None if it is too long ago.
+    def _compared(
+        self, path: np.ndarray, tick: int, sample: PoseSample
+    ) -> tuple[np.ndarray, np.ndarray] | None:
+        """The pose that was wanted when a sample was exposed, and the pose that was seen.
 
         Args:
             path: the remembered moments, a ring of rows.
             tick: the number of the newest one.
-            time: when the pose was wanted, in s.
+            sample: a valid sample.
+
+        Returns:
+            None if the sample is too old to compare or too far from the path to be true.
         """
-        ago = max(0, round((path[tick % len(path), 0] - time) / self.period))
+        ago = max(0, round((path[tick % len(path), 0] - sample.time) / self.period))
         if ago >= len(path):
             return None
         entry = path[(tick - ago) % len(path)]
         if math.isnan(entry[0]):
             # Before the first tick the path was where it was then: it starts at rest.
             entry = path[np.nanargmin(path[:, 0])]
-        X_WD = entry[1:13].reshape(3, 4)
-        if abs(time - entry[0]) > 1e-6:
-            X_WD = moved_pose(X_WD, (time - entry[0]) * entry[13:])
-        return X_WD
-
-    def _is_plausible(self, wanted: np.ndarray, seen: np.ndarray) -> bool:
-        """Whether a sample can be this tool on this path rather than a false detection."""
-        p, p_wanted = seen[:, 3], wanted[:, 3]
-        gap = p - p_wanted
-        trace = float(np.vdot(seen, wanted)) - float(p @ p_wanted)
-        return float(gap @ gap) <= self._guard.largest_deviation**2 and trace >= self._smallest_trace
+        wanted = entry[1:13].reshape(3, 4)
+        passed = sample.time - float(entry[0])
+        if abs(passed) > 1e-6:
+            wanted = moved_pose(wanted, passed * entry[13:])
+        seen = sample.X_WE.GetAsMatrix34()
+        p_wanted, p_seen = wanted[:, 3], seen[:, 3]
+        gap = p_seen - p_wanted
+        # The trace of the rotation between them: the product of all entries less that of the positions.
+        trace = np.vdot(seen, wanted) - p_seen @ p_wanted
+        if gap @ gap > self._guard.largest_deviation**2 or trace < self._smallest_trace:
+            return None
+        return wanted, seen
 
 
 def moved_pose(X: np.ndarray, step: np.ndarray) -> np.ndarray:
@@ -213,13 +218,8 @@ def followed_branch(inverse: InverseKinematics, X_WE: np.ndarray, q_near: np.nda
         UnreachableError: if the pose is out of reach, or only on a branch that is a jump away.
         JointLimitError: if a joint limit is in the way.
     """
-    q = inverse.nearest((X_WE[:, :3], X_WE[:, 3]), q_near)
-    if float(np.abs(q - q_near).max()) > _LARGEST_STEP:
+    q = inverse.nearest(X_WE, q_near)
+    step = q - q_near
+    if step @ step > _LARGEST_STEP**2:
         raise UnreachableError("the path goes on only on another branch of the inverse kinematics")
     return q
-
-
-def limit_norm(vector: np.ndarray, limit: float) -> np.ndarray:
-    """The vector, shortened to the limit if it is longer."""
-    norm = math.sqrt(float(vector @ vector))
-    return vector if norm <= limit else vector * (limit / norm)

@@ -37,8 +37,8 @@ class Pbvs(ServoLaw):
         return Step(position, velocity, pose_error(X_WE, moment.X_WD), q_d)
 
     def _feedback(self, wanted: np.ndarray, seen: np.ndarray) -> np.ndarray:
-        rates = self.config.rotation * euler_difference(wanted[:, :3], seen[:, :3])
         twist = np.empty(6)
-        twist[:3] = angular_velocity(zyx_from_rotation(seen[:, :3]), rates)
-        twist[3:] = self.config.translation * (wanted[:, 3] - seen[:, 3])
-        return twist
+        difference = euler_difference(wanted[:, :3], seen[:, :3])
+        twist[:3] = angular_velocity(zyx_from_rotation(seen[:, :3]), difference)
+        twist[3:] = wanted[:, 3] - seen[:, 3]
+        return self._gains * twist

@@ -1,10 +1,12 @@
 """The error system on position level: the wanted pose, shifted by the integral of its error."""
 
+import math
+
 import numpy as np
 
 from robots.kinematics import robust_solve
 from robots.pose import angular_velocity, euler_difference, euler_rates, rotation_from_zyx, zyx_from_rotation
-from systems.servo.law import Moment, ServoLaw, Step, followed_branch, limit_norm
+from systems.servo.law import Moment, ServoLaw, Step, followed_branch
 
 
 class PositionLevel(ServoLaw):
@@ -29,13 +31,12 @@ class PositionLevel(ServoLaw):
         c, q = memory[:6], memory[6:]
         rate = np.zeros(6)
         if moment.measured is not None:
-            wanted, seen = moment.measured
-            rate = _euler_difference(wanted, seen)
-            rate[:3] *= self.config.rotation
-            rate[3:] *= self.config.translation
+            rate = self._gains * _euler_difference(*moment.measured)
         c = c + self.period * rate
-        c[:3] = limit_norm(c[:3], self._angle_limit)
-        c[3:] = limit_norm(c[3:], self.config.correction_limit)
+        for part, limit in ((c[:3], self._angle_limit), (c[3:], self.config.correction_limit)):
+            size_squared = part @ part
+            if size_squared > limit * limit:
+                part *= limit / math.sqrt(size_squared)
 
         wanted_zyx = zyx_from_rotation(moment.X_WD[:, :3])
         zyx = wanted_zyx + c[:3]
