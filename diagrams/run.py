@@ -22,7 +22,7 @@ from systems.servo import LawConfig
 # Beyond this rate the explicit runge_kutta3 with its tiny steps takes longer than the implicit radau3.
 _EXPLICIT_RATE_LIMIT = 4000.0  # 1/s
 # Accuracy and fewest steps in a tick with which the tip is right to less than a micrometre.
-_MEASURED = {"runge_kutta3": (3e-4, 1), "radau3": (1e-3, 2)}
+_MEASURED = {"runge_kutta3": (7e-4, 1), "radau3": (1e-3, 2)}
 _CHUNK = 0.2  # s of simulated time between two reports of progress
 
 

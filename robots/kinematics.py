@@ -5,8 +5,7 @@ out. One configuration takes about 10 us, 1e5 configurations some tens of millis
 """
 
 import math
-from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from scipy.linalg import get_lapack_funcs
@@ -23,16 +22,17 @@ _BLOCK = 2048  # configurations at a time, so that the intermediate arrays stay 
 Vector = tuple[Any, Any, Any]
 
 
-@dataclass(frozen=True)
-class _Step:
+class _Step(NamedTuple):
     """From one link to the next: along ``offset``, through the constant ``turn``, about axis ``k``.
 
-    The offset holds only the components that are not zero, as (index, length).
+    The offset holds only the components that are not zero, as (index, length); i and j are the axes after k.
     """
 
     offset: tuple[tuple[int, float], ...]
     turn: list[list[float]] | None
-    k: int = 2
+    i: int
+    j: int
+    k: int
 
 
 class Kinematics:
@@ -58,11 +58,11 @@ class Kinematics:
             axis_S = R_BS.T @ R_BL @ axis
             k = int(np.argmax(axis_S))
             if np.abs(axis_S - np.eye(3)[k]).max() < _ROUNDING:
-                self._joints.append(_Step(offset, None, k))
+                self._joints.append(_Step(offset, None, (k + 1) % 3, (k + 2) % 3, k))
                 continue
             turn = _z_to(axis_S)
             R_BS = R_BS @ turn
-            self._joints.append(_Step(offset, turn.tolist()))
+            self._joints.append(_Step(offset, turn.tolist(), 0, 1, 2))
         X_FE = robot.tool.pose()
         R_SF = R_BS.T @ R_BL
         self._p_SE = _nonzero(R_SF @ X_FE.translation())
@@ -72,17 +72,17 @@ class Kinematics:
         """The columns of R_WE, p_WE, and the axes and origins of the joints in the world."""
         columns, p = list(self._R_WB), self._p_WB
         axes, origins = [], []
-        for step, s, c in zip(self._joints, sines, cosines, strict=True):
-            p = _moved(p, columns, step.offset)
-            if step.turn is not None:
-                columns = _turned(columns, step.turn)
-            i, j = (step.k + 1) % 3, (step.k + 2) % 3
+        for (offset, turn, i, j, k), s, c in zip(self._joints, sines, cosines, strict=True):
+            if offset:
+                p = _moved(p, columns, offset)
+            if turn is not None:
+                columns = _turned(columns, turn)
             (ux, uy, uz), (vx, vy, vz) = columns[i], columns[j]
             columns[i] = (c * ux + s * vx, c * uy + s * vy, c * uz + s * vz)
             columns[j] = (c * vx - s * ux, c * vy - s * uy, c * vz - s * uz)
-            axes.append(columns[step.k])
+            axes.append(columns[k])
             origins.append(p)
-        p_WE = _moved(p, columns, self._p_SE)
+        p_WE = _moved(p, columns, self._p_SE) if self._p_SE else p
         return _turned(columns, self._R_SE), p_WE, axes, origins
 
     def forward(self, q: np.ndarray) -> np.ndarray:
