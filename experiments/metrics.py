@@ -158,10 +158,15 @@ def timing(logs: Comparison) -> dict[str, Any]:
 
 
 def best_law(result: Mapping[str, Any]) -> str:
-    """The law of a `summary` whose largest true distance is smallest; the open loop only if it is alone."""
+    """The law of a `summary` whose largest true distance is smallest; the open loop only if it is alone.
+
+    Where the laws start from the same error and it stays the largest, the root mean square decides.
+    """
     runs = result["runs"]
     laws = [law for law in runs if law != "open_loop"] or list(runs)
-    return min(laws, key=lambda law: _sortable(runs[law]["true"]["max_norm_mm"]))
+    smallest = min(_sortable(runs[law]["true"]["max_norm_mm"]) for law in laws)
+    alike = [law for law in laws if _sortable(runs[law]["true"]["max_norm_mm"]) <= 1.001 * smallest]
+    return min(alike, key=lambda law: _sortable(runs[law]["true"]["rms_norm_mm"]))
 
 
 def write_json(path: str | Path, data: Any) -> None:

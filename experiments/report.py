@@ -62,9 +62,18 @@ def verdict(summary: Mapping[str, Any]) -> str:
     """The result in one or two sentences of plain text."""
     best, runs = best_law(summary), summary["runs"]
     numbers = runs[best]["true"]
+    if numbers["settling_s"] is None:
+        course = (
+            f"keeps the true tip within {_text(numbers['max_norm_mm'])} mm and "
+            f"{_text(numbers['max_angle_deg'])}° of the wanted path"
+        )
+    else:
+        course = (
+            f"brings the true tip, up to {_text(numbers['max_norm_mm'])} mm off at the start, "
+            f"within 5 % of that in {_text(numbers['settling_s'])} s"
+        )
     text = (
-        f"{law_title(best)} keeps the true tip within {_text(numbers['max_norm_mm'])} mm and "
-        f"{_text(numbers['max_angle_deg'])}° of the wanted path and comes to rest "
+        f"{law_title(best)} {course} and comes to rest "
         f"{_text(norm(numbers['static_mm']))} mm and {_text(norm(numbers['static_deg']))}° from it."
     )
     if "open_loop" in runs and best != "open_loop":
