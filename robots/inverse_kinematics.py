@@ -113,11 +113,13 @@ class InverseKinematics:
             JointLimitError: if branches reach it, but none within the joint limits.
             ValueError: if an argument is not finite.
         """
+        near = np.asarray(q_near, dtype=float).tolist()
+        # A sum of squares is finite only if all of its terms are.
+        if not (math.isfinite(np.vdot(X_WE, X_WE)) and math.isfinite(sum(near))):
+            raise ValueError(f"inverse kinematics: not finite: pose {X_WE.tolist()} or configuration {near}")
         X_1E = self._X_1W[:3, :3] @ X_WE[:3]
         X_1E[:, 3] += self._X_1W[:3, 3]
-        X, near = (X_1E @ self._X_EH).tolist(), np.asarray(q_near, dtype=float).tolist()
-        if not (math.isfinite(sum(map(sum, X))) and math.isfinite(sum(near))):
-            raise ValueError(f"inverse kinematics: not finite: pose {X_WE.tolist()} or configuration {near}")
+        X = (X_1E @ self._X_EH).tolist()
         q = self._solve(X, near, *self._branch_of(near))
         if q is not None:
             fitted, squared = self._within_limits(q, near)
