@@ -16,7 +16,7 @@ from pydrake.systems.primitives import (
 from diagrams.packed_log import PackedLog
 from diagrams.scenario import StationConfig
 from robots.model import NUM_JOINTS, RobotModel
-from robots.plant import add_robot
+from robots.plant import PlantRobot, add_robot
 from systems.camera import BLOCK, PoseCamera
 from systems.drive import Drive
 from systems.joint_sensor import JointSensor
@@ -69,7 +69,7 @@ class SimulatedStation(Diagram):
         self.drive = builder.AddNamedSystem(
             "drive", Drive(robot, drive, config.drive, config.period, config.payload)
         )
-        motor_state = builder.AddNamedSystem("motor_state", _selector(self.plant, self.robot.motor_indices()))
+        motor_state = builder.AddNamedSystem("motor_state", motor_state_selector(self.robot))
         no_torque = builder.AddNamedSystem("no_feedforward", ConstantVectorSource(np.zeros(NUM_JOINTS)))
         sensor = builder.AddNamedSystem("joint_sensor", JointSensor())
         tip = builder.AddNamedSystem("tip", TipPose(self.robot))
@@ -153,10 +153,12 @@ def _by_exposure(exposures: np.ndarray, times: np.ndarray) -> np.ndarray:
     return poses
 
 
-def _selector(plant: MultibodyPlant, indices: list[int]) -> Selector:
-    """Picks entries of the plant's state."""
+def motor_state_selector(robot: PlantRobot) -> Selector:
+    """A system that picks motor positions and velocities, 12 numbers, from the state of a robot's plant."""
     params = SelectorParams()
-    params.inputs = [SelectorParams.InputPortParams(name="state", size=plant.num_multibody_states())]
-    selections = [SelectorParams.OutputSelection(input_port_index=0, input_offset=i) for i in indices]
+    params.inputs = [SelectorParams.InputPortParams(name="state", size=robot.plant.num_multibody_states())]
+    selections = [
+        SelectorParams.OutputSelection(input_port_index=0, input_offset=i) for i in robot.motor_indices()
+    ]
     params.outputs = [SelectorParams.OutputPortParams(name="motor_state", selections=selections)]
     return Selector(params)

@@ -7,14 +7,13 @@ from pydrake.systems.framework import Diagram, DiagramBuilder
 from pydrake.systems.primitives import (
     ConstantVectorSource,
     Demultiplexer,
-    Selector,
-    SelectorParams,
     TrajectorySource,
 )
 from pydrake.trajectories import PiecewisePolynomial
 
 from diagrams.log import RunLog
 from diagrams.run import Experiment
+from diagrams.station import motor_state_selector
 from robots.model import NUM_JOINTS, RobotModel
 from robots.plant import add_robot
 from systems.drive import Drive
@@ -44,7 +43,7 @@ class BarePlant:
         drive = builder.AddNamedSystem(
             "drive", Drive(robot, kind, config.drive, config.period, config.payload)
         )
-        state = builder.AddNamedSystem("motor_state", _selector(self._plant, self._robot.motor_indices()))
+        state = builder.AddNamedSystem("motor_state", motor_state_selector(self._robot))
         no_torque = builder.AddNamedSystem("no_feedforward", ConstantVectorSource(np.zeros(NUM_JOINTS)))
         commands = builder.AddNamedSystem("commands", TrajectorySource(_held(log, config.period)))
         split = builder.AddNamedSystem("split", Demultiplexer([NUM_JOINTS, NUM_JOINTS]))
@@ -80,12 +79,3 @@ def _held(log: RunLog, period: float) -> PiecewisePolynomial:
     commands = np.hstack([log.position_command, log.velocity_command])
     breaks = np.append(log.time, log.time[-1] + period) - 0.5 * period
     return PiecewisePolynomial.ZeroOrderHold(breaks, np.vstack([commands, commands[-1]]).T)
-
-
-def _selector(plant: MultibodyPlant, indices: list[int]) -> Selector:
-    """Picks entries of the plant's state."""
-    params = SelectorParams()
-    params.inputs = [SelectorParams.InputPortParams(name="state", size=plant.num_multibody_states())]
-    selections = [SelectorParams.OutputSelection(input_port_index=0, input_offset=i) for i in indices]
-    params.outputs = [SelectorParams.OutputPortParams(name="motor_state", selections=selections)]
-    return Selector(params)

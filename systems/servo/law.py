@@ -54,7 +54,7 @@ class Step(NamedTuple):
 
 
 class ServoLaw(LeafSystem):
-    """The frame of a visual-servo law on the nominal kinematics; a law adds `_start` and `_step`.
+    """The frame of a visual-servo law on the nominal kinematics; a law adds `_step` and may add `_start`.
 
     Ports:
         in  ``X_WE_desired``      RigidTransform, the wanted pose at t + preview
@@ -122,11 +122,11 @@ class ServoLaw(LeafSystem):
             self.DeclareStateOutputPort(name, state)
         self.DeclarePeriodicDiscreteUpdateEvent(period, 0.0, self._tick)
 
-    memory_size = 1  # numbers that a law remembers; a law overrides it
+    memory_size = NUM_JOINTS  # how many numbers a law remembers
 
     def _start(self, moment: Moment) -> np.ndarray:
-        """The memory with which the law begins, so that its first command moves nothing."""
-        raise NotImplementedError
+        """The memory with which the law begins; where a law says nothing else, the measured positions."""
+        return moment.position
 
     def _step(self, moment: Moment, memory: np.ndarray) -> Step:
         """One tick of the law."""

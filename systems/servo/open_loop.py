@@ -12,11 +12,6 @@ class OpenLoop(ServoLaw):
     The memory holds the last joint positions, which choose the branch.
     """
 
-    memory_size = 6
-
-    def _start(self, moment: Moment) -> np.ndarray:
-        return moment.position
-
     def _step(self, moment: Moment, memory: np.ndarray) -> Step:
         q = followed_branch(self._inverse, moment.X_WD, memory)
         velocity = robust_solve(self._kinematics.jacobian(q), moment.V_WD)

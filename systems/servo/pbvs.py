@@ -18,11 +18,6 @@ class Pbvs(ServoLaw):
     The correcting joint velocity is limited. The memory holds q_d, the nominal joint positions on the path.
     """
 
-    memory_size = 6
-
-    def _start(self, moment: Moment) -> np.ndarray:
-        return moment.position
-
     def _step(self, moment: Moment, memory: np.ndarray) -> Step:
         q_d = followed_branch(self._inverse, moment.X_WD, memory)
         velocity = robust_solve(self._kinematics.jacobian(q_d), moment.V_WD)
