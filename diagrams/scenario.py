@@ -76,6 +76,7 @@ class Scenario:
 
 # Where a number is allowed to lie; a delay of 4 means milliseconds written as seconds.
 _RANGES: dict[str, tuple[float, float, str]] = {
+    "seed": (0, 2**32 - 1, ""),
     "station.period": (5e-4, 0.1, "s"),
     "station.payload": (0.0, 1000.0, "kg"),
     "station.drive.command_delay": (0.0, 1.0, "s"),
@@ -162,7 +163,9 @@ def _check(scenario: Scenario) -> None:
 def _in_range(path: str, value: float, bounds: tuple[float, float, str]) -> None:
     low, high, unit = bounds
     if not (math.isfinite(value) and low <= value <= high):
-        raise ScenarioError(f"{path} must be between {low:g} and {high:g} {unit}, got {value:g}")
+        raise ScenarioError(
+            f"{path} must be between {low:.10g} and {high:.10g} {unit}".rstrip() + f", got {value:.10g}"
+        )
 
 
 def _one_of(path: str, value: str, allowed: Collection[str]) -> None:

@@ -22,6 +22,8 @@ from systems.drive import Drive
 from systems.joint_sensor import JointSensor
 from systems.tip_pose import TipPose
 
+_RUNAWAY = 10.0  # times the largest joint speed: no drive of a working simulation gets there
+
 
 @dataclass(frozen=True)
 class StationRecord:
@@ -71,7 +73,7 @@ class SimulatedStation(Diagram):
         )
         motor_state = builder.AddNamedSystem("motor_state", motor_state_selector(self.robot))
         no_torque = builder.AddNamedSystem("no_feedforward", ConstantVectorSource(np.zeros(NUM_JOINTS)))
-        sensor = builder.AddNamedSystem("joint_sensor", JointSensor())
+        sensor = builder.AddNamedSystem("joint_sensor", JointSensor(_RUNAWAY * float(robot.speed.max())))
         tip = builder.AddNamedSystem("tip", TipPose(self.robot))
         camera = builder.AddNamedSystem("camera", PoseCamera(config.camera))
         noise = camera.GetInputPort("noise")

@@ -48,7 +48,8 @@ class CommandGuard(LeafSystem):
         in  ``position_command``  vector 6 in rad, NaN where the law has no answer
         in  ``velocity_command``  vector 6 in rad/s
         in  ``correction``        vector 6 in rad and m, rotation first
-        in  ``measurement``       vector 2: time of the last usable sample in s, number of refused samples
+        in  ``measurement``       vector 3: when the last usable sample arrived (s), how many were refused,
+                                  when the newest one was exposed (s)
         in  ``joint_sample``      JointSample
         out ``position_command``  vector 6 in rad: always finite, in range, within the speed limits
         out ``velocity_command``  vector 6 in rad/s, likewise
@@ -103,7 +104,7 @@ class CommandGuard(LeafSystem):
                 ("position_command", NUM_JOINTS),
                 ("velocity_command", NUM_JOINTS),
                 ("correction", 6),
-                ("measurement", 2),
+                ("measurement", 3),
             )
         ]
         self._joints = self.DeclareAbstractInputPort("joint_sample", Value(JointSample()))

@@ -64,7 +64,8 @@ class ServoLaw(LeafSystem):
         out ``position_command``  vector 6 in rad, NaN before the first tick and where the law has no answer
         out ``velocity_command``  vector 6 in rad/s, likewise
         out ``correction``        vector 6 in rad and m, rotation first: what the law has added to the path
-        out ``measurement``       vector 2: time of the last usable sample in s, number of refused samples
+        out ``measurement``       vector 3: when the last usable sample arrived (s), how many were refused,
+                                  when the newest one was exposed (s)
 
     A sample is compared with the path at the instant of its exposure, so that transport delay does not
     look like an error. For that a law remembers the last ``memory_span`` seconds of the path.
@@ -110,7 +111,7 @@ class ServoLaw(LeafSystem):
             self.DeclareDiscreteState(_NO_COMMAND),
             self.DeclareDiscreteState(_NO_COMMAND),
             self.DeclareDiscreteState(np.zeros(6)),
-            self.DeclareDiscreteState(np.array([-np.inf, 0.0])),
+            self.DeclareDiscreteState(np.array([-np.inf, 0.0, -np.inf])),
         ]
         self.DeclareDiscreteState(
             np.full((int(np.ceil((memory_span + preview) / period)) + 2) * _ENTRY, np.nan)
@@ -138,7 +139,7 @@ class ServoLaw(LeafSystem):
         V_WD = self._V_WD.Eval(context)
         joints: JointSample = self._joints.Eval(context)
         sample: PoseSample = self._camera.Eval(context)
-        last_used, refused = context.get_discrete_state(self._outputs[3]).value()
+        last_used, refused, newest = context.get_discrete_state(self._outputs[3]).value()
 
         path = discrete_state.get_mutable_value(4).reshape(-1, _ENTRY)
         tick = round(time / self.period)
@@ -146,12 +147,16 @@ class ServoLaw(LeafSystem):
         entry[0], entry[1:13], entry[13:] = time + self._preview, X_WD.ravel(), V_WD
 
         measured = None
-        if sample.valid and time - sample.time <= self._guard.hold_after + 1e-9:
+        arrived = sample.valid and sample.time > newest
+        # A sample serves until the next one arrives, but not for ever. How late it came does not matter.
+        if arrived or (sample.valid and time - last_used <= self._guard.hold_after + 1e-9):
             measured = self._compared(path, tick, sample)
-            if measured is not None:
-                last_used = sample.time
-            elif sample.time > last_used:
-                refused += 1.0
+            if arrived:
+                newest = sample.time
+                if measured is None:
+                    refused += 1.0
+                else:
+                    last_used = time
 
         moment = Moment(X_WD, V_WD, joints.position, measured)
         first_tick = math.isnan(path[(tick - 1) % len(path), 0])
@@ -165,7 +170,7 @@ class ServoLaw(LeafSystem):
         discrete_state.set_value(0, step.position)
         discrete_state.set_value(1, step.velocity)
         discrete_state.set_value(2, step.correction)
-        discrete_state.set_value(3, np.array([last_used, refused]))
+        discrete_state.set_value(3, np.array([last_used, refused, newest]))
         discrete_state.set_value(5, step.memory)
 
     def _compared(

@@ -56,6 +56,22 @@ def test_a_gap_of_a_second_is_held_after_50_ms_and_stopped_for_good_after_500_ms
     assert counted(experiment)["stopped"] > 100
 
 
+@pytest.mark.parametrize("law", LAWS)
+def test_a_camera_that_is_later_than_the_longest_gap_still_serves(law: str):
+    """What counts as a gap is the time between two arrivals, not how long a sample was on its way."""
+    experiment = Experiment(scenario("misaligned", *QUIET, *SETTLE, RIGID, "station.camera.delay=0.06"), law)
+    experiment.advance(3.0)
+    assert "stopped" not in counted(experiment)
+    assert np.abs(true_errors(experiment)[1][-1, 3:]).max() < 1e-4
+
+
+def test_a_robot_that_runs_away_ends_the_simulation_with_a_reason():
+    runaway = "station.drive.position.proportional=-80"
+    experiment = Experiment(scenario("nominal", RIGID, runaway), "numerical_ik")
+    with pytest.raises(RuntimeError, match=r"run away: a joint is faster than 105 rad/s at t = 0\.\d+ s"):
+        experiment.advance(1.0)
+
+
 def test_open_loop_does_not_mind_a_blind_camera():
     settings = ["reference.settle=0", "station.camera.dropouts=[[0.0, 30.0]]"]
     experiment = Experiment(scenario("misaligned", *settings, RIGID), "open_loop")

@@ -18,6 +18,7 @@ from robots.kinematics import (
     Kinematics,
     manipulability,
     robust_inverse,
+    robust_solve,
     rotation_about,
 )
 from robots.model import Placement, RobotModel, load_robot
@@ -70,6 +71,16 @@ def drake(robot: RobotModel) -> Callable[[np.ndarray], tuple[np.ndarray, np.ndar
         return X.GetAsMatrix4(), J
 
     return evaluate
+
+
+def test_solving_is_multiplying_with_the_robust_inverse_also_at_a_singularity():
+    kinematics = Kinematics(load_robot("irb1200"))
+    for q5 in (0.8, 1e-5, 0.0):  # regular, damped, singular
+        J = kinematics.jacobian(np.array([0.3, 0.2, 0.4, 0.1, q5, -0.5]))
+        V = np.random.default_rng(5).normal(size=(6, 2))
+        # The damped inverse is as large as 1 / (2 alpha) = 5e3.
+        assert robust_solve(J, V) == pytest.approx(robust_inverse(J) @ V, abs=1e-8)
+        assert robust_solve(J, V[:, 0]) == pytest.approx(robust_solve(J, V)[:, 0], abs=1e-8)
 
 
 @pytest.mark.parametrize("build", [plain, with_base_and_tool, askew])

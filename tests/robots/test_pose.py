@@ -7,7 +7,10 @@ from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
 from robots.pose import (
+    angular_velocity,
+    euler_difference,
     euler_rate_matrix,
+    euler_rates,
     pose_error,
     rotation_from_zyx,
     rotation_vector,
@@ -126,6 +129,20 @@ def test_a_single_pose_gives_what_a_batch_gives():
     ]:
         singles = np.array([function(*arguments) for arguments in zip(*batch, strict=True)])
         assert function(*batch) == pytest.approx(singles, abs=1e-13), function.__name__
+
+
+def test_euler_rates_and_angular_velocity_are_the_rate_matrix_and_its_inverse():
+    rng = np.random.default_rng(13)
+    for zyx, rates in zip(rng.uniform(-1.5, 1.5, (100, 3)), rng.normal(size=(100, 3)), strict=True):
+        w = angular_velocity(zyx, rates)
+        assert w == pytest.approx(euler_rate_matrix(zyx) @ rates, abs=1e-13)
+        # The inverse grows with 1 / cos(beta), here up to 14.
+        assert euler_rates(zyx, w) == pytest.approx(rates, abs=1e-12)
+
+
+def test_euler_differences_take_the_short_way_round():
+    wanted, seen = (rotation_from_zyx(np.deg2rad([alpha, 10.0, 90.0])) for alpha in (179.0, -178.0))
+    assert np.rad2deg(euler_difference(wanted, seen)) == pytest.approx([-3.0, 0.0, 0.0], abs=1e-12)
 
 
 def test_rate_of_the_sine_error_against_finite_differences():

@@ -75,7 +75,7 @@ class GuardRig:
             "position_command": position,
             "velocity_command": np.zeros(6) if velocity is None else velocity,
             "correction": np.zeros(6) if correction is None else correction,
-            "measurement": np.array([min(seen, self.time), refused]),
+            "measurement": np.array([min(seen, self.time), refused, min(seen, self.time)]),
         }
         for name, value in values.items():
             self.guard.GetInputPort(name).FixValue(self.context, value)
