@@ -18,6 +18,7 @@ from systems.samples import JointSample, PoseSample
 _ENTRY = 19  # a moment of the path: time, the rows of the 3 x 4 pose matrix, the twist
 # rad in one tick: ten times what the fastest joint can do, far less than from branch to branch
 _LARGEST_STEP = 0.4
+_ROTATION, _TRANSLATION = slice(0, 3), slice(3, 6)
 _NO_COMMAND = np.full(NUM_JOINTS, np.nan)
 
 
@@ -39,9 +40,7 @@ class Moment(NamedTuple):
     X_WD: np.ndarray  # wanted pose
     V_WD: np.ndarray  # wanted twist
     position: np.ndarray  # measured joint positions, rad
-    measured: (
-        tuple[np.ndarray, np.ndarray] | None
-    )  # (wanted, seen) pose at the exposure; None: do not correct
+    measured: tuple[np.ndarray, np.ndarray] | None  # wanted and seen pose at an exposure, if it may be used
 
 
 class Step(NamedTuple):
@@ -172,6 +171,14 @@ class ServoLaw(LeafSystem):
         discrete_state.set_value(2, step.correction)
         discrete_state.set_value(3, np.array([last_used, refused, newest]))
         discrete_state.set_value(5, step.memory)
+
+    def _within_limits(self, twist: np.ndarray, correction: np.ndarray) -> np.ndarray:
+        """The twist that a law adds; where the correction stands at its limit, it may only shrink."""
+        for part, limit in ((_ROTATION, self._angle_limit), (_TRANSLATION, self.config.correction_limit)):
+            size = correction[part]
+            if size @ size >= limit * limit and size @ twist[part] > 0.0:
+                twist[part] = 0.0
+        return twist
 
     def _compared(
         self, path: np.ndarray, tick: int, sample: PoseSample

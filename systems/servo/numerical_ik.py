@@ -9,7 +9,6 @@ from robots.pose import pose_error
 from systems.servo.law import Moment, ServoLaw, Step
 
 _SMALLEST_COSINE = math.cos(math.radians(60.0))  # L is singular at 90 degrees
-_ROTATION, _TRANSLATION = slice(0, 3), slice(3, 6)
 
 
 class NumericalIk(ServoLaw):
@@ -38,15 +37,14 @@ class NumericalIk(ServoLaw):
         twists[:, 0] = pose_error(moment.X_WD, X_WE)
         twists[:, 1] = moment.V_WD
         if moment.measured is not None:
-            twists[:, 1] += self._feedback(*moment.measured, moment.V_WD, correction)
+            feedback = self._feedback(*moment.measured, moment.V_WD)
+            twists[:, 1] += self._within_limits(feedback, correction)
         rates = robust_solve(J, twists)
         velocity = rates[:, 1]
         q = q + 0.5 * self.period * (velocity + last_velocity)
         return Step(q, velocity, correction, np.concatenate([halfway + rates[:, 0], q, velocity]))
 
-    def _feedback(
-        self, wanted: np.ndarray, seen: np.ndarray, V_WD: np.ndarray, correction: np.ndarray
-    ) -> np.ndarray:
+    def _feedback(self, wanted: np.ndarray, seen: np.ndarray, V_WD: np.ndarray) -> np.ndarray:
         """What the law adds to the wanted twist.
 
         L has the closed-form solutions L^-1 L^T w = (R R_d^T) w and L^-1 e-bar = e-bar / cos(angle).
@@ -63,9 +61,4 @@ class NumericalIk(ServoLaw):
             twist[:3] = 0.0
         twist[:3] += (gain * (yz - zy), gain * (zx - xz), gain * (xy - yx))
         twist[3:] = self.config.translation * (wanted[:, 3] - seen[:, 3])
-        for part, limit in ((_ROTATION, self._angle_limit), (_TRANSLATION, self.config.correction_limit)):
-            # At its limit the correction may only shrink.
-            size_squared = float(correction[part] @ correction[part])
-            if size_squared >= limit * limit and float(correction[part] @ twist[part]) > 0.0:
-                twist[part] = 0.0
         return twist

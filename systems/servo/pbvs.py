@@ -15,21 +15,20 @@ class Pbvs(ServoLaw):
     Corrected: every angle difference is wrapped to (-180, 180] degrees, because alpha runs through 180
     degrees at both ends of the path; without that the source keeps a static error of 6 degrees.
 
-    The correcting joint velocity is limited. The memory holds q_d, the nominal joint positions on the path.
+    The correcting joint velocity is limited, and so is the correction that it adds up to. The memory holds
+    q_d, the nominal joint positions on the path.
     """
 
     def _step(self, moment: Moment, memory: np.ndarray) -> Step:
         q_d = followed_branch(self._inverse, moment.X_WD, memory)
         velocity = robust_solve(self._kinematics.jacobian(q_d), moment.V_WD)
         X_WE, J = self._kinematics.forward_and_jacobian(moment.position)
+        correction = pose_error(X_WE, moment.X_WD)
         if moment.measured is not None:
-            correction = robust_solve(J, self._feedback(*moment.measured))
-            velocity = velocity + correction * min(
-                1.0,
-                math.radians(self.config.correction_speed_limit_deg_s) / max(np.abs(correction).max(), 1e-12),
-            )
-        position = moment.position + self.period * velocity
-        return Step(position, velocity, pose_error(X_WE, moment.X_WD), q_d)
+            added = robust_solve(J, self._within_limits(self._feedback(*moment.measured), correction))
+            fastest = math.radians(self.config.correction_speed_limit_deg_s)
+            velocity = velocity + added * min(1.0, fastest / max(float(np.abs(added).max()), 1e-12))
+        return Step(moment.position + self.period * velocity, velocity, correction, q_d)
 
     def _feedback(self, wanted: np.ndarray, seen: np.ndarray) -> np.ndarray:
         twist = np.empty(6)
