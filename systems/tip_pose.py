@@ -17,7 +17,7 @@ class TipPose(LeafSystem):
 
     def __init__(self, robot: PlantRobot) -> None:
         super().__init__()
-        self._robot = robot
+        self._robot, self._num_positions = robot, robot.plant.num_positions()
         # Scratch memory only: overwritten before every use, so it carries nothing from call to call.
         self._scratch = robot.plant.CreateDefaultContext()
         self._state = self.DeclareVectorInputPort("state", robot.plant.num_multibody_states())
@@ -26,5 +26,5 @@ class TipPose(LeafSystem):
         )
 
     def _calc(self, context: Context, output) -> None:
-        self._robot.plant.SetPositionsAndVelocities(self._scratch, self._state.Eval(context))
+        self._robot.plant.SetPositions(self._scratch, self._state.Eval(context)[: self._num_positions])
         output.set_value(self._robot.tool.CalcPoseInWorld(self._scratch))
