@@ -5,9 +5,10 @@ import time
 from collections.abc import Callable
 
 import numpy as np
-from pydrake.systems.analysis import ApplySimulatorConfig, Simulator, SimulatorConfig
+from pydrake.systems.analysis import Simulator
 from pydrake.systems.framework import DiagramBuilder
 
+from diagrams.integration import Integration
 from diagrams.log import GuardEvent, RunLog
 from diagrams.packed_log import PackedLog
 from diagrams.scenario import Scenario, ScenarioError
@@ -19,10 +20,6 @@ from systems.guard import KINDS
 from systems.paths import CartesianPath
 from systems.servo import LawConfig
 
-# Beyond this rate the explicit runge_kutta3 with its tiny steps takes longer than the implicit radau3.
-_EXPLICIT_RATE_LIMIT = 4000.0  # 1/s
-# Accuracy and fewest steps in a tick with which the tip is right to less than a micrometre.
-_MEASURED = {"runge_kutta3": (7e-4, 1), "radau3": (1e-3, 2)}
 _CHUNK = 0.2  # s of simulated time between two reports of progress
 
 
@@ -79,24 +76,10 @@ class Experiment:
         self.simulator = Simulator(self.diagram)
         self.context = self.simulator.get_mutable_context()
         self.station.set_at_rest(self.context, start_position(robot, scenario, self.path), self.seed)
-        ApplySimulatorConfig(self._integration(), self.simulator)
-        self.simulator.Initialize()
+        rate = self.station.fastest_rate(self.context)
+        self.integration = Integration(scenario.integrator, scenario.station.period, rate)
+        self.integration.initialize(self.simulator)
         self._wall_time = 0.0
-
-    def _integration(self) -> SimulatorConfig:
-        """The scenario's integrator, with what it leaves open filled in as measured in the bench."""
-        config = self.scenario.integrator
-        scheme = config.scheme
-        if scheme == "auto":
-            explicit = self.station.fastest_rate(self.context) < _EXPLICIT_RATE_LIMIT
-            scheme = "runge_kutta3" if explicit else "radau3"
-        accuracy, steps = _MEASURED.get(scheme, _MEASURED["runge_kutta3"])
-        return SimulatorConfig(
-            integration_scheme=scheme,
-            max_step_size=config.max_step or self.scenario.station.period / steps,
-            accuracy=config.accuracy or accuracy,
-            use_error_control=True,
-        )
 
     def advance(self, until: float | None = None, progress: Callable[[float], None] | None = None) -> None:
         """Advances to a time in s, or to the end of the path."""
@@ -118,7 +101,7 @@ class Experiment:
         done = round(self.context.get_time() / self.scenario.station.period)
         while self.context.get_time() < end:
             done += ticks
-            self.simulator.AdvanceTo(min(end, done * self.scenario.station.period))
+            self.integration.advance(self.simulator, min(end, done * self.scenario.station.period))
             if progress:
                 progress(self.context.get_time() / end)
 

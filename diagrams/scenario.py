@@ -9,6 +9,7 @@ import numpy as np
 from pydrake.common.yaml import yaml_dump, yaml_load_typed
 from pydrake.systems.analysis import GetIntegrationSchemes
 
+from diagrams.integration import IntegratorConfig
 from diagrams.scenario_file import ScenarioError, conformed, one_line, read_tree, shipped_scenarios
 from robots.geometric_errors import GeometricErrors
 from robots.model import NUM_JOINTS
@@ -41,19 +42,6 @@ class ServoConfig:
 
     laws: dict[str, LawConfig] = field(default_factory=lambda: {name: LawConfig() for name in LAWS})
     guard: GuardConfig = field(default_factory=GuardConfig)
-
-
-@dataclass
-class IntegratorConfig:
-    """How the plant is integrated.
-
-    ``auto`` is runge_kutta3, or radau3 where that one would need tiny steps. What is left open is chosen such
-    that the tip is right to less than a micrometre, as the bench shows.
-    """
-
-    scheme: str = "auto"  # or any name of Drake's GetIntegrationSchemes
-    accuracy: float | None = None
-    max_step: float | None = None  # s
 
 
 @dataclass

@@ -2,7 +2,7 @@
 
 import numpy as np
 from pydrake.multibody.plant import MultibodyPlant
-from pydrake.systems.analysis import ApplySimulatorConfig, ExtractSimulatorConfig, Simulator
+from pydrake.systems.analysis import Simulator
 from pydrake.systems.framework import Diagram, DiagramBuilder
 from pydrake.systems.primitives import (
     ConstantVectorSource,
@@ -61,12 +61,12 @@ class BarePlant:
         theta = log.joint_position[np.isfinite(log.joint_position).all(axis=1)][0]
         self._robot.set_at_rest(self._plant.GetMyMutableContextFromRoot(self._context), theta)
         drive.set_at_rest(self._context, theta)
-        ApplySimulatorConfig(ExtractSimulatorConfig(experiment.simulator), self._simulator)
-        self._simulator.Initialize()
+        self._integration = experiment.integration
+        self._integration.initialize(self._simulator)
 
     def advance(self, until: float) -> None:
         """Advances to a time in s."""
-        self._simulator.AdvanceTo(until)
+        self._integration.advance(self._simulator, until)
 
     def link_positions(self) -> np.ndarray:
         """Link positions now, in rad, shape (6,)."""

@@ -73,20 +73,19 @@ class PoseCamera(LeafSystem):
         time = context.get_time()
         first = round(time / self._config.period) % BLOCK * _PER_EXPOSURE
         noise = self._noise.Eval(context)[first : first + _PER_EXPOSURE]
-        lost = noise[6] < self._lost_below
+        a, b, c, x, y, z, chance = noise.tolist()
+        lost = chance < self._lost_below
         for start, end in self._config.dropouts:
             lost = lost or start <= time < end
-        entry = np.empty(_WIDTH)
-        entry[0], entry[1] = time, not lost
-        pose = entry[2:].reshape(3, 4)
-        pose[:] = self._X_WE.Eval(context).GetAsMatrix34()
-        if self._rotation_sigma > 0.0:
-            pose[:, :3] = _small_rotation(*(self._rotation_sigma * noise[:3]).tolist()) @ pose[:, :3]
-        pose[:, 3] += self._config.position_sigma * noise[3:6]
+        pose = self._X_WE.Eval(context).GetAsMatrix34()
+        turn, shift = self._rotation_sigma, self._config.position_sigma
+        if turn > 0.0:
+            pose[:, :3] = _small_rotation(turn * a, turn * b, turn * c) @ pose[:, :3]
+        pose[:, 3] += (shift * x, shift * y, shift * z)
         older = discrete_state.get_mutable_value(self._older)
         older[_WIDTH:] = older[:-_WIDTH].copy()
         older[:_WIDTH] = context.get_discrete_state(0).value()
-        discrete_state.set_value(0, entry)
+        discrete_state.set_value(0, np.array([time, not lost, *pose.ravel().tolist()]))
 
     def _calc_sample(self, context: Context, output) -> None:
         due = context.get_time() - self._config.delay + _EPSILON

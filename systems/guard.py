@@ -94,7 +94,11 @@ class CommandGuard(LeafSystem):
             )
         self._config, self._period, self._uses_camera = config, period, uses_camera
         self._lower, self._upper = robot.lower, robot.upper
-        self._speed = (config.speed_share * robot.speed).tolist()
+        speed = config.speed_share * robot.speed
+        # Of each joint: its range, its largest speed, its largest step in a tick.
+        self._limits = list(
+            zip(*(a.tolist() for a in (robot.lower, robot.upper, speed, period * speed)), strict=True)
+        )
         # A hundred-thousandth below, because a law's own clipping rounds.
         self._correction_limit = (1.0 - 1e-5) * correction_limit
         self._correction_angle = (1.0 - 1e-5) * np.deg2rad(correction_limit_deg)
@@ -131,16 +135,16 @@ class CommandGuard(LeafSystem):
         return calc
 
     def _calc_next(self, context: Context, value) -> None:
-        """The next state and which kinds of intervention it takes."""
+        """The next state, which kinds of intervention it takes, and when the last sample arrived."""
         state = context.get_discrete_state(0).value().copy()
-        position, velocity, correction, measurement = (port.Eval(context) for port in self._inputs)
+        position, velocity, correction, measurement = (port.Eval(context).tolist() for port in self._inputs)
         kinds = []
         if math.isnan(state[0]):
             state[_POSITIONS], state[_VELOCITIES] = self._joints.Eval(context).position, 0.0
         if state[_MODE] == _STOPPING:
             kinds.append(_STOPPED)
             self._brake(state)
-        elif not math.isfinite(float(position @ position + velocity @ velocity)):
+        elif not math.isfinite(sum(position) + sum(velocity)):
             # Before the first command a law is silent by right.
             if state[_LAST_COMMAND] > -math.inf:
                 kinds.append(_NO_COMMAND)
@@ -153,32 +157,40 @@ class CommandGuard(LeafSystem):
         if refused > state[_REFUSED_SEEN]:
             kinds.append(_REFUSED)
             state[_REFUSED_SEEN] = refused
-        a, b, c, x, y, z = correction.tolist()
+        a, b, c, x, y, z = correction
         if (
             a * a + b * b + c * c > self._correction_angle**2
             or x * x + y * y + z * z > self._correction_limit**2
         ):
             kinds.append(_CORRECTION)
-        value.set_value((state, kinds))
+        value.set_value((state, kinds, measurement[0]))
 
     def _follow(
-        self, state: np.ndarray, position: np.ndarray, velocity: np.ndarray, kinds: list[int]
+        self, state: np.ndarray, position: list[float], velocity: list[float], kinds: list[int]
     ) -> None:
         """Goes to the law's command as far as the limits allow. Plain floats: this runs every tick."""
-        # Into the range first: the way to where a joint must not go is not to slow the others down.
-        inside = np.minimum(np.maximum(position, self._lower), self._upper)
-        if (inside != position).any():
+        start = state[_POSITIONS].tolist()
+        steps, rates = [], []
+        excess, is_outside = 0.0, False
+        for wanted, rate, last, (lower, upper, speed, stride) in zip(
+            position, velocity, start, self._limits, strict=True
+        ):
+            # Into the range first: the way to where a joint must not go is not to slow the others down.
+            if wanted < lower or wanted > upper:
+                is_outside = True
+                if (wanted > upper) == (rate > 0.0):
+                    rate = 0.0
+                wanted = lower if wanted < lower else upper
+            step = wanted - last
+            excess = max(excess, abs(rate) / speed, abs(step) / stride)
+            steps.append(step)
+            rates.append(rate)
+        if is_outside:
             kinds.append(_POSITION)
-            velocity = np.where((position - inside) * velocity > 0.0, 0.0, velocity)
-        start, rates = state[_POSITIONS], velocity.tolist()
-        steps = (inside - start).tolist()
-        excess = 0.0
-        for step, rate, speed in zip(steps, rates, self._speed, strict=True):
-            excess = max(excess, abs(rate) / speed, abs(step) / (speed * self._period))
         if excess > 1.0 + 1e-9:
             kinds.append(_VELOCITY)
             steps, rates = [step / excess for step in steps], [rate / excess for rate in rates]
-        state[_ISSUED] = [last + step for last, step in zip(start.tolist(), steps, strict=True)] + rates
+        state[_ISSUED] = [last + step for last, step in zip(start, steps, strict=True)] + rates
         state[_BRAKING_FROM] = rates
 
     def _brake(self, state: np.ndarray) -> None:
@@ -195,14 +207,13 @@ class CommandGuard(LeafSystem):
 
     def _remember(self, context: Context, discrete_state: DiscreteValues) -> None:
         """Makes the issued command the state and decides from the clocks how the next tick will go."""
-        state, kinds = self._next.Eval(context)
+        state, kinds, last_sample = self._next.Eval(context)
         state = state.copy()
         time = context.get_time()
         if _NO_COMMAND not in kinds:
             state[_LAST_COMMAND] = time
         # A camera that has not spoken yet is not lost: its time starts with the guard's first tick.
         state[_FIRST_TICK] = min(state[_FIRST_TICK], time)
-        last_sample = self._inputs[3].Eval(context)[0]
         age = time - max(last_sample, state[_FIRST_TICK]) if self._uses_camera else 0.0
         silence = time - state[_LAST_COMMAND]
         if state[_MODE] == _STOPPING or max(age, silence) >= self._config.stop_after - 1e-9:

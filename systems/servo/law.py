@@ -138,7 +138,7 @@ class ServoLaw(LeafSystem):
         V_WD = self._V_WD.Eval(context)
         joints: JointSample = self._joints.Eval(context)
         sample: PoseSample = self._camera.Eval(context)
-        last_used, refused, newest = context.get_discrete_state(self._outputs[3]).value()
+        last_used, refused, newest = context.get_discrete_state(self._outputs[3]).value().tolist()
 
         path = discrete_state.get_mutable_value(4).reshape(-1, _ENTRY)
         tick = round(time / self.period)
@@ -175,8 +175,8 @@ class ServoLaw(LeafSystem):
     def _within_limits(self, twist: np.ndarray, correction: np.ndarray) -> np.ndarray:
         """The twist that a law adds; where the correction stands at its limit, it may only shrink."""
         for part, limit in ((_ROTATION, self._angle_limit), (_TRANSLATION, self.config.correction_limit)):
-            size = correction[part]
-            if size @ size >= limit * limit and size @ twist[part] > 0.0:
+            x, y, z = correction[part].tolist()
+            if x * x + y * y + z * z >= limit * limit and correction[part] @ twist[part] > 0.0:
                 twist[part] = 0.0
         return twist
 
@@ -193,7 +193,7 @@ class ServoLaw(LeafSystem):
         Returns:
             None if the sample is too old to compare or too far from the path to be true.
         """
-        ago = max(0, round((path[tick % len(path), 0] - sample.time) / self.period))
+        ago = max(0, round(tick + (self._preview - sample.time) / self.period))
         if ago >= len(path):
             return None
         entry = path[(tick - ago) % len(path)]
@@ -205,11 +205,12 @@ class ServoLaw(LeafSystem):
         if abs(passed) > 1e-6:
             wanted = moved_pose(wanted, passed * entry[13:])
         seen = sample.X_WE.GetAsMatrix34()
-        p_wanted, p_seen = wanted[:, 3], seen[:, 3]
-        gap = p_seen - p_wanted
-        # The trace of the rotation between them: the product of all entries less that of the positions.
-        trace = np.vdot(seen, wanted) - p_seen @ p_wanted
-        if gap @ gap > self._guard.largest_deviation**2 or trace < self._smallest_trace:
+        (a0, a1, a2, ax), (b0, b1, b2, bx), (c0, c1, c2, cx) = wanted.tolist()
+        (d0, d1, d2, dx), (e0, e1, e2, ex), (f0, f1, f2, fx) = seen.tolist()
+        gap_squared = (ax - dx) ** 2 + (bx - ex) ** 2 + (cx - fx) ** 2
+        # The trace of the rotation between them is the product of all their entries.
+        trace = a0 * d0 + a1 * d1 + a2 * d2 + b0 * e0 + b1 * e1 + b2 * e2 + c0 * f0 + c1 * f1 + c2 * f2
+        if gap_squared > self._guard.largest_deviation**2 or trace < self._smallest_trace:
             return None
         return wanted, seen
 
@@ -231,7 +232,15 @@ def followed_branch(inverse: InverseKinematics, X_WE: np.ndarray, q_near: np.nda
         JointLimitError: if a joint limit is in the way.
     """
     q = inverse.nearest(X_WE, q_near)
-    step = q - q_near
-    if step @ step > _LARGEST_STEP**2:
-        raise UnreachableError("the path goes on only on another branch of the inverse kinematics")
+    refuse_jump(q - q_near)
     return q
+
+
+def refuse_jump(step: np.ndarray) -> None:
+    """Lets only steps of the joint positions (rad, shape (6,)) pass that a path can take in one tick.
+
+    Raises:
+        UnreachableError: if the step is larger.
+    """
+    if step @ step > _LARGEST_STEP**2:
+        raise UnreachableError("the path is out of reach, or goes on only on another branch")

@@ -33,7 +33,7 @@ class NumericalIk(ServoLaw):
         halfway = 0.5 * (q + q_d)
         X_WE, J = self._kinematics.forward_and_jacobian(halfway)
         correction = J @ (q - q_d)
-        twists = np.empty((6, 2))
+        twists = np.empty((2, 6)).T  # columns that LAPACK need not copy
         twists[:, 0] = pose_error(moment.X_WD, X_WE)
         twists[:, 1] = moment.V_WD
         if moment.measured is not None:
@@ -42,7 +42,9 @@ class NumericalIk(ServoLaw):
         rates = robust_solve(J, twists)
         velocity = rates[:, 1]
         q = q + 0.5 * self.period * (velocity + last_velocity)
-        return Step(q, velocity, correction, np.concatenate([halfway + rates[:, 0], q, velocity]))
+        following = np.empty(18)
+        following[:6], following[6:12], following[12:] = halfway + rates[:, 0], q, velocity
+        return Step(q, velocity, correction, following)
 
     def _feedback(self, wanted: np.ndarray, seen: np.ndarray, V_WD: np.ndarray) -> np.ndarray:
         """What the law adds to the wanted twist.

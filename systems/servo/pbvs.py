@@ -6,7 +6,7 @@ import numpy as np
 
 from robots.kinematics import robust_solve
 from robots.pose import angular_velocity, euler_difference, pose_error, zyx_from_rotation
-from systems.servo.law import Moment, ServoLaw, Step, followed_branch
+from systems.servo.law import Moment, ServoLaw, Step, refuse_jump
 
 
 class Pbvs(ServoLaw):
@@ -16,12 +16,17 @@ class Pbvs(ServoLaw):
     degrees at both ends of the path; without that the source keeps a static error of 6 degrees.
 
     The correcting joint velocity is limited, and so is the correction that it adds up to. The memory holds
-    q_d, the nominal joint positions on the path.
+    q_d, the nominal joint positions on the path, carried on by their velocity and one Newton step a tick.
     """
 
     def _step(self, moment: Moment, memory: np.ndarray) -> Step:
-        q_d = followed_branch(self._inverse, moment.X_WD, memory)
-        velocity = robust_solve(self._kinematics.jacobian(q_d), moment.V_WD)
+        X_Wd, J = self._kinematics.forward_and_jacobian(memory)
+        twists = np.empty((2, 6)).T  # columns that LAPACK need not copy
+        twists[:, 0], twists[:, 1] = pose_error(moment.X_WD, X_Wd), moment.V_WD
+        rates = robust_solve(J, twists)
+        refuse_jump(rates[:, 0])
+        velocity = rates[:, 1]
+        q_d = memory + rates[:, 0] + self.period * velocity
         X_WE, J = self._kinematics.forward_and_jacobian(moment.position)
         correction = pose_error(X_WE, moment.X_WD)
         if moment.measured is not None:
