@@ -14,8 +14,8 @@ from diagrams.packed_log import PackedLog
 from diagrams.scenario import Scenario, ScenarioError
 from diagrams.servo import Servo
 from diagrams.station import SimulatedStation
-from robots.inverse_kinematics import InverseKinematics
 from robots.model import RobotModel, load_robot
+from robots.newton_inverse import inverse_kinematics
 from systems.guard import KINDS
 from systems.paths import CartesianPath
 from systems.servo import LawConfig
@@ -140,7 +140,7 @@ def start_position(robot: RobotModel, scenario: Scenario, path: CartesianPath) -
     Raises:
         ScenarioError: if the start or the path is out of reach.
     """
-    inverse = InverseKinematics(robot)
+    inverse = inverse_kinematics(robot)
     home = np.deg2rad(scenario.home_deg)
     times = np.arange(0.0, path.duration, 4e-3)
     try:

@@ -22,7 +22,9 @@ LIMIT_TOLERANCE = 1e-9  # rad, an angle this far beyond a limit is put on the li
 _SINGULAR = 1e-9  # sine of joint 5, or distance in m of the wrist from axis 1, that leaves an angle open
 _STRUCTURE_TOLERANCE = 1e-9  # of direction cosines, and of lengths in m
 
-_AXES = "zyyxyx"  # the directions of the joint axes at zero joint angles
+AXES = "zyyxyx"  # the directions of the joint axes at zero joint angles
+# The directions, by the number of the joint, in which its origin must not be off the one before.
+FREE_OF_OFFSET = {2: "y", 3: "y", 4: "y", 5: "yz", 6: "yz"}
 _TURN = 2.0 * math.pi
 _ARRAYS = SimpleNamespace(sin=np.sin, cos=np.cos, atan2=np.arctan2)
 # (c1, c2, c5) in the order of `all_branches`; c5 is the sign of the sine of joint 5.
@@ -211,7 +213,7 @@ class InverseKinematics:
         for angle, wanted, lower, upper in zip(q, near, self._lower, self._upper, strict=True):
             angle = wanted + math.remainder(angle - wanted, _TURN)
             if not lower <= angle <= upper:
-                angle = _turned_into(angle, lower, upper)
+                angle = turned_into(angle, lower, upper)
                 if angle is None:
                     return None, math.inf
             fitted.append(angle)
@@ -251,7 +253,7 @@ class InverseKinematics:
         closest = min(range(len(moves)), key=lambda k: sum(move * move for move in moves[k]))
         for i, move in enumerate(moves[closest]):
             angle, lower, upper = near[i] + move, self._lower[i], self._upper[i]
-            if _turned_into(angle, lower, upper) is None:
+            if turned_into(angle, lower, upper) is None:
                 break
         return (
             f"joint {i + 1} would be at {math.degrees(angle):.2f} deg, "
@@ -259,7 +261,7 @@ class InverseKinematics:
         )
 
 
-def _turned_into(angle: float, lower: float, upper: float) -> float | None:
+def turned_into(angle: float, lower: float, upper: float) -> float | None:
     """The angle brought within the limits by the fewest full turns, or None if no turn brings it there."""
     if angle > upper + LIMIT_TOLERANCE:
         angle -= _TURN * math.ceil((angle - upper - LIMIT_TOLERANCE) / _TURN)
@@ -297,25 +299,47 @@ def _last_two(m: Any, wrist: tuple[Any, Any, Any], q4: Any) -> tuple[Any, Any]:
     return m.atan2(s4 * a21 - c4 * a31, a11), m.atan2(-c4 * a23 - s4 * a33, c4 * a22 + s4 * a32)
 
 
-def _structure(robot: RobotModel) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """What the robot looks like at zero joint angles, seen from the base.
+def seen_from_base(robot: RobotModel) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """What the robot looks like at zero joint angles, in the axes of the base.
 
     Returns:
-        The signs of the axes (6,), the offsets between the frames of the links (6, 3) in m, and the rotation
-        of the flange (3, 3).
+        The axes of the joints (6, 3), the offsets between the frames of the links (6, 3) in m, and the
+        rotation of the flange (3, 3).
     """
-    signs, offsets, R_BL = np.empty(NUM_JOINTS), np.empty((NUM_JOINTS, 3)), np.eye(3)
-    for i, (joint, letter) in enumerate(zip(robot.joints, _AXES, strict=True)):
+    axes, offsets, R_BL = np.empty((NUM_JOINTS, 3)), np.empty((NUM_JOINTS, 3)), np.eye(3)
+    for i, joint in enumerate(robot.joints):
         offsets[i] = R_BL @ joint.placement.translation
         R_BL = R_BL @ joint.placement.pose().rotation().matrix()
-        axis = R_BL @ robot.axes[i]
-        signs[i] = np.sign(axis["xyz".index(letter)])
-        if np.abs(axis - signs[i] * np.eye(3)["xyz".index(letter)]).max() > _STRUCTURE_TOLERANCE:
+        axes[i] = R_BL @ robot.axes[i]
+    return axes, offsets, R_BL
+
+
+def has_spherical_wrist(robot: RobotModel) -> bool:
+    """Whether the robot is built exactly as the analytic solution needs it."""
+    try:
+        _structure(robot)
+    except ValueError:
+        return False
+    return True
+
+
+def _structure(robot: RobotModel) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """The signs of the axes (6,), the offsets between the links (6, 3) in m, the rotation of the flange.
+
+    Raises:
+        ValueError: if an axis or an offset is not as it must be.
+    """
+    axes, offsets, R_BF = seen_from_base(robot)
+    signs = np.empty(NUM_JOINTS)
+    for i, letter in enumerate(AXES):
+        unit = np.eye(3)["xyz".index(letter)]
+        signs[i] = np.sign(unit @ axes[i])
+        if np.abs(axes[i] - signs[i] * unit).max() > _STRUCTURE_TOLERANCE:
             raise ValueError(
                 f"inverse kinematics of {robot.name}: the axis of joint {i + 1} must point along {letter} "
-                f"at zero joint angles, got {np.round(axis, 6).tolist()} in the base"
+                f"at zero joint angles, got {np.round(axes[i], 6).tolist()} in the base"
             )
-    for number, directions in {2: "y", 3: "y", 4: "y", 5: "yz", 6: "yz"}.items():
+    for number, directions in FREE_OF_OFFSET.items():
         for letter in directions:
             length = offsets[number - 1, "xyz".index(letter)]
             if abs(length) > _STRUCTURE_TOLERANCE:
@@ -326,4 +350,4 @@ def _structure(robot: RobotModel) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
                 )
     if min(np.linalg.norm(offsets[2]), np.linalg.norm(offsets[3] + offsets[4])) < _STRUCTURE_TOLERANCE:
         raise ValueError(f"inverse kinematics of {robot.name}: the upper arm or the forearm has no length")
-    return signs, offsets, R_BL
+    return signs, offsets, R_BF

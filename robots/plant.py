@@ -24,10 +24,9 @@ from pydrake.multibody.tree import (
 )
 from pydrake.systems.framework import Context
 
+from robots.error_kinematics import ErrorKinematics
 from robots.geometric_errors import GeometricErrors
-from robots.kinematics import rotation_about
-from robots.model import NUM_JOINTS, Link, Placement, RobotModel
-from robots.pose import rotation_from_zyx
+from robots.model import NUM_JOINTS, Link, RobotModel
 
 ELASTICITIES = ("rigid", "joints")
 _LINK_COLOR = Rgba(0.93, 0.45, 0.13, 1.0)
@@ -120,7 +119,8 @@ def add_robot(
         errors: how the true geometry differs from the nominal one; None for exact geometry.
 
     Raises:
-        ValueError: if the elasticity is unknown or the payload is more than the robot may carry.
+        ValueError: if the elasticity is unknown, the payload is more than the robot may carry, or an error
+            has no place in this robot.
     """
     if elasticity not in ELASTICITIES:
         raise ValueError(f"elasticity must be one of {', '.join(ELASTICITIES)}, got '{elasticity}'")
@@ -128,24 +128,20 @@ def add_robot(
         raise ValueError(
             f"payload of {robot.name} must be between 0 and {robot.payload.largest_mass} kg, got {payload} kg"
         )
-    errors = errors or GeometricErrors()
+    if errors is not None:
+        robot = ErrorKinematics(robot).robot_with_errors(errors.vector(robot))
     parent = plant.AddRigidBody("base", _inertia(robot.base_link))
     plant.WeldFrames(plant.world_frame(), parent.body_frame(), robot.base.pose())
     _add_capsule(
         plant, parent, np.zeros(3), robot.joints[0].placement.translation, robot.base_link.radius, _BASE_COLOR
     )
     motors, deflections, springs = [], [], []
-    for i, (joint, link, offset) in enumerate(
-        zip(robot.joints, robot.links, errors.joint_offset(), strict=True), 1
-    ):
+    for i, (joint, link) in enumerate(zip(robot.joints, robot.links, strict=True), 1):
         inertia = _inertia(link)
         if i == NUM_JOINTS and payload > 0.0:
             inertia += _payload_inertia(robot, payload)
         body = plant.AddRigidBody(f"link_{i}", inertia)
-        X_offset = RigidTransform(RotationMatrix(rotation_about(robot.axes[i - 1], offset)), np.zeros(3))
-        socket = plant.AddFrame(
-            FixedOffsetFrame(f"socket_{i}", parent.body_frame(), joint.placement.pose() @ X_offset)
-        )
+        socket = plant.AddFrame(FixedOffsetFrame(f"socket_{i}", parent.body_frame(), joint.placement.pose()))
         damping = float(robot.joint_viscous_friction[i - 1])
         train = joint.drive_train
         driven = body
@@ -167,13 +163,8 @@ def add_robot(
             tip = robot.joints[i].placement.translation
             _add_capsule(plant, body, np.zeros(3), tip, link.radius, _LINK_COLOR)
         parent = body
-    tool = plant.AddFrame(FixedOffsetFrame("tool", parent.body_frame(), _true_tool(robot.tool, errors)))
+    tool = plant.AddFrame(FixedOffsetFrame("tool", parent.body_frame(), robot.tool.pose()))
     return PlantRobot(plant, motors, deflections, springs, tool)
-
-
-def _true_tool(tool: Placement, errors: GeometricErrors) -> RigidTransform:
-    R_FE = rotation_from_zyx(np.deg2rad(tool.zyx_deg + errors.tool_zyx_deg))
-    return RigidTransform(RotationMatrix(R_FE), tool.translation + 1e-3 * errors.tool_translation_mm)
 
 
 def _inertia(link: Link) -> SpatialInertia:

@@ -9,9 +9,10 @@ from pydrake.common.value import Value
 from pydrake.math import RigidTransform
 from pydrake.systems.framework import Context, DiscreteValues, LeafSystem
 
-from robots.inverse_kinematics import InverseKinematics, JointLimitError, UnreachableError
+from robots.inverse_kinematics import JointLimitError, UnreachableError
 from robots.kinematics import Kinematics, rotation_about
 from robots.model import NUM_JOINTS, RobotModel
+from robots.newton_inverse import InverseSolver, inverse_kinematics
 from systems.guard import GuardConfig
 from systems.samples import JointSample, PoseSample
 
@@ -97,7 +98,7 @@ class ServoLaw(LeafSystem):
             if not getattr(config, label) > 0.0:
                 raise ValueError(f"servo law: {label} must be positive, got {getattr(config, label)}")
         self.config, self.period = config, period
-        self._kinematics, self._inverse = Kinematics(robot), InverseKinematics(robot)
+        self._kinematics, self._inverse = Kinematics(robot), inverse_kinematics(robot)
         self._gains = np.repeat([config.rotation, config.translation], 3)
         self._angle_limit = math.radians(config.correction_limit_deg)
         self._guard, self._preview = guard, preview
@@ -224,7 +225,7 @@ def moved_pose(X: np.ndarray, step: np.ndarray) -> np.ndarray:
     return moved
 
 
-def followed_branch(inverse: InverseKinematics, X_WE: np.ndarray, q_near: np.ndarray) -> np.ndarray:
+def followed_branch(inverse: InverseSolver, X_WE: np.ndarray, q_near: np.ndarray) -> np.ndarray:
     """The joint positions of a pose (3, 4) next to the last ones.
 
     Raises:
