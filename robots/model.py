@@ -108,6 +108,15 @@ class PayloadLimits:
 
 
 @dataclass
+class Calibration:
+    """What has been measured on one robot, in a file that a calibration wrote; empty for a robot as drawn."""
+
+    of: str = ""  # the robot that was calibrated: what stood in its scenario
+    compliance: list[float] = field(default_factory=lambda: [0.0] * NUM_JOINTS)  # rad per N m of gravity
+    source: str = ""
+
+
+@dataclass
 class RobotModel:
     """A six-axis serial robot. Load one with `load_robot`."""
 
@@ -118,6 +127,7 @@ class RobotModel:
     base_link: Link = field(default_factory=Link)
     links: list[Link] = field(default_factory=list)
     payload: PayloadLimits = field(default_factory=PayloadLimits)
+    calibration: Calibration = field(default_factory=Calibration)
 
     def _drive_train(self, name: str) -> np.ndarray:
         return np.array([getattr(joint.drive_train, name) for joint in self.joints])
@@ -171,6 +181,11 @@ class RobotModel:
         return self.gear_ratio * self._drive_train("coulomb_friction")
 
     @property
+    def compliance(self) -> np.ndarray:
+        """Compliances of the joints that a calibration has found in rad / (N m), zero if none has, (6,)."""
+        return np.array(self.calibration.compliance)
+
+    @property
     def coulomb_velocity(self) -> np.ndarray:
         """Joint velocity over which the Coulomb friction changes its sign in rad/s, shape (6,)."""
         return self._drive_train("coulomb_velocity")
@@ -218,6 +233,10 @@ def _problem(robot: RobotModel) -> str:
     for label, link in bodies.items():
         problems.append(_not_positive(label, {"mass": link.mass, "radius": link.radius}))
         problems.append(_inertia_problem(label, link.inertia))
+    if len(robot.calibration.compliance) != NUM_JOINTS:
+        problems.append(
+            f"calibration: needs {NUM_JOINTS} compliances, got {len(robot.calibration.compliance)}"
+        )
     if robot.payload.largest_mass < 0.0:
         problems.append(f"payload: largest_mass must not be negative, got {robot.payload.largest_mass}")
     if robot.payload.largest_mass > 0.0:

@@ -102,7 +102,8 @@ class AdmissibleConfigurations:
         """Which of the joint positions in rad (n, 6) are admissible, (n,) bool."""
         q = np.asarray(q, dtype=float)
         tolerance = 1e-9
-        found = ((q >= self._robot.lower - tolerance) & (q <= self._robot.upper + tolerance)).all(axis=1)
+        inside = (q >= self._robot.lower - tolerance) & (q <= self._robot.upper + tolerance)
+        found = np.asarray(inside.all(axis=1))
         if self._config.view is not None:
             found &= self._is_seen(q, self._config.view)
         for index in np.flatnonzero(found):

@@ -119,5 +119,5 @@ class CandidateGrid:
 def _dirichlet(angles: np.ndarray) -> np.ndarray:
     """From the values of a trigonometric polynomial at the nodes to those at some angles, (n, 5)."""
     distance = angles[:, None] - _NODES
-    harmonics = sum(2.0 * np.cos(k * distance) for k in range(1, _DEGREE + 1))
-    return (1.0 + harmonics) / len(_NODES)
+    harmonics = [2.0 * np.cos(k * distance) for k in range(1, _DEGREE + 1)]
+    return (1.0 + np.sum(harmonics, axis=0)) / len(_NODES)

@@ -1,0 +1,197 @@
+"""Tables of measured poses as text files whose column names carry the units.
+
+One row a measurement, separated by commas or semicolons, lines that begin with # are comments. Columns:
+``q1_rad`` ... ``q6_rad`` or ``q1_deg`` ...; ``x_m``, ``y_m``, ``z_m`` or ``x_mm`` ...; for the orientation
+``qw``, ``qx``, ``qy``, ``qz``, or the ZYX Euler angles ``alpha_deg``, ``beta_deg``, ``gamma_deg`` (also in
+``_rad``), or none of them; ``payload_kg`` if there is one. Other columns are left alone.
+"""
+
+import csv
+import io
+import math
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from robots.calibration.measurements import Measurements
+from robots.model import NUM_JOINTS
+from robots.pose import rotation_from_zyx
+
+_JOINTS = tuple(f"q{number}" for number in range(1, NUM_JOINTS + 1))
+_AXES, _QUATERNION, _EULER = ("x", "y", "z"), ("qw", "qx", "qy", "qz"), ("alpha", "beta", "gamma")
+_UNITS = {"rad": 1.0, "deg": math.pi / 180.0, "m": 1.0, "mm": 1e-3}
+_LARGEST = {"rad": 8.0, "deg": 800.0, "m": 20.0, "mm": 20000.0}  # beyond it the unit must be wrong
+_MEANT = {"rad": "degrees", "m": "millimetres", "deg": "something else", "mm": "something else"}
+_QUATERNION_TOLERANCE = 1e-3  # of the length; it is normalised
+_SAME = 1e-9  # rad, of two configurations
+
+
+class MeasurementFileError(ValueError):
+    """A table cannot be used: a column is missing, a unit is wrong, or nothing is left of it."""
+
+
+@dataclass(frozen=True)
+class RowProblem:
+    """A row that was left out, and why."""
+
+    row: int  # number of the line in the file, the header included
+    what: str
+
+
+def read_measurements(path: str | Path) -> tuple[Measurements, list[RowProblem]]:
+    """Reads a table. Rows that cannot be used are left out and named.
+
+    Raises:
+        MeasurementFileError: if the file cannot be read, lacks a column, has a number that only another unit
+            explains, or has no usable row.
+    """
+    try:
+        text = Path(path).read_text(encoding="utf-8-sig")
+    except (OSError, UnicodeDecodeError) as error:
+        raise MeasurementFileError(f"measurements {path}: cannot be read: {error}") from error
+    try:
+        return parse_measurements(text)
+    except MeasurementFileError as error:
+        raise MeasurementFileError(f"measurements {path}: {error}") from error
+
+
+def parse_measurements(text: str) -> tuple[Measurements, list[RowProblem]]:
+    """Reads a table from its text, as `read_measurements`."""
+    lines = [
+        (number, line)
+        for number, line in enumerate(text.splitlines(), 1)
+        if line.strip() and not line.lstrip().startswith("#")
+    ]
+    if not lines:
+        raise MeasurementFileError("the table is empty")
+    separator = ";" if ";" in lines[0][1] else ","
+    try:
+        cells = list(csv.reader(io.StringIO("\n".join(line for _, line in lines)), delimiter=separator))
+    except csv.Error as error:
+        raise MeasurementFileError(f"no table: {error}") from error
+    header = [name.strip() for name in cells[0]]
+    columns = _Columns(header)
+    problems: list[RowProblem] = []
+    rows, numbers = [], []
+    for (line, _), row in zip(lines[1:], cells[1:], strict=False):
+        try:
+            values = columns.numbers(row)
+        except ValueError as error:
+            problems.append(RowProblem(line, str(error)))
+            continue
+        columns.refuse_wrong_units(values, line)
+        rows.append(values)
+        numbers.append(line)
+    if not rows:
+        raise MeasurementFileError(
+            f"no usable row; {problems[0].what}" if problems else "no row but the header"
+        )
+    measurements, more = columns.measurements(np.array(rows), np.array(numbers))
+    return measurements, sorted(problems + more, key=lambda problem: problem.row)
+
+
+class _Columns:
+    """Which columns of a file hold what, in which unit."""
+
+    def __init__(self, header: list[str]) -> None:
+        twice = {name for name in header if name and header.count(name) > 1}
+        if twice:
+            raise MeasurementFileError(f"column {min(twice)} is there twice")
+        self._places: list[int] = []
+        self._units: list[str] = []
+        self._names: list[str] = []
+        for name in _JOINTS:
+            self._take(header, name, ("rad", "deg"))
+        for name in _AXES:
+            self._take(header, name, ("m", "mm"))
+        self._orientation = ""
+        if any(name in header for name in _QUATERNION):
+            self._orientation = "quaternion"
+            for name in _QUATERNION:
+                self._take(header, name, ("",))
+        elif any(f"{name}_{unit}" in header for name in _EULER for unit in ("deg", "rad")):
+            self._orientation = "euler"
+            for name in _EULER:
+                self._take(header, name, ("deg", "rad"))
+        self._has_payload = "payload_kg" in header
+        if self._has_payload:
+            self._take(header, "payload_kg", ("",))
+
+    def _take(self, header: list[str], name: str, units: tuple[str, ...]) -> None:
+        for unit in units:
+            full = f"{name}_{unit}" if unit else name
+            if full in header:
+                self._places.append(header.index(full))
+                self._units.append(unit)
+                self._names.append(full)
+                return
+        wanted = " or ".join(f"{name}_{unit}" if unit else name for unit in units)
+        raise MeasurementFileError(f"column {wanted} is missing; there are {', '.join(header)}")
+
+    def numbers(self, row: list[str]) -> list[float]:
+        """The numbers of a row in the units of the file. Raises ValueError."""
+        values = []
+        for place, name in zip(self._places, self._names, strict=True):
+            text = row[place].strip() if place < len(row) else ""
+            try:
+                value = float(text)
+            except ValueError:
+                raise ValueError(f"{name} is not a number: '{text}'") from None
+            if not math.isfinite(value):
+                raise ValueError(f"{name} is not finite: {text}")
+            values.append(value)
+        return values
+
+    def refuse_wrong_units(self, values: list[float], line: int) -> None:
+        """Refuses a number that is too large for the unit of its column."""
+        for value, unit, name in zip(values, self._units, self._names, strict=True):
+            if unit and abs(value) > _LARGEST[unit]:
+                raise MeasurementFileError(
+                    f"line {line}: {name} is {value:g}, more than any {unit} can be here; "
+                    f"the column seems to hold {_MEANT[unit]}"
+                )
+
+    def measurements(self, table: np.ndarray, lines: np.ndarray) -> tuple[Measurements, list[RowProblem]]:
+        """The table in SI units, without rows that contradict themselves or each other."""
+        table = table * [_UNITS.get(unit, 1.0) for unit in self._units]
+        q, position = table[:, :NUM_JOINTS], table[:, NUM_JOINTS : NUM_JOINTS + 3]
+        rest = table[:, NUM_JOINTS + 3 :]
+        good, problems = np.ones(len(q), dtype=bool), []
+        rotation = None
+        if self._orientation == "quaternion":
+            lengths = np.linalg.norm(rest[:, :4], axis=1)
+            for k in np.flatnonzero(np.abs(lengths - 1.0) > _QUATERNION_TOLERANCE):
+                good[k] = False
+                problems.append(
+                    RowProblem(int(lines[k]), f"the quaternion has the length {lengths[k]:.4g}, not 1")
+                )
+            unit = np.where(good[:, None], rest[:, :4], [1.0, 0.0, 0.0, 0.0])
+            rotation = Rotation.from_quat(unit, scalar_first=True).as_matrix()
+        elif self._orientation == "euler":
+            rotation = rotation_from_zyx(rest[:, :3])
+        payload = rest[:, -1] if self._has_payload else np.zeros(len(q))
+        seen: dict[tuple[int, ...], int] = {}
+        for k in np.flatnonzero(good):
+            key = (*np.round(q[k] / _SAME).astype(np.int64).tolist(), round(payload[k] / _SAME))
+            if key in seen:
+                good[k] = False
+                problems.append(RowProblem(int(lines[k]), f"the configuration of line {seen[key]} once more"))
+            seen.setdefault(key, int(lines[k]))
+        if not good.any():
+            raise MeasurementFileError(f"no usable row; {problems[0].what}")
+        return Measurements(q, position, rotation, payload, lines).select(good), problems
+
+
+def measurement_text(measurements: Measurements) -> str:
+    """The table as text that `parse_measurements` reads back to the last digit but for the orientation."""
+    header = [f"{name}_rad" for name in _JOINTS] + [f"{name}_m" for name in _AXES]
+    columns = [measurements.q, measurements.position]
+    if measurements.rotation is not None:
+        header += _QUATERNION
+        columns.append(Rotation.from_matrix(measurements.rotation).as_quat(canonical=True, scalar_first=True))
+    header.append("payload_kg")
+    table = np.column_stack([*columns, measurements.payload])
+    lines = [",".join(header), *(",".join(map(repr, row)) for row in table.tolist())]
+    return "\n".join(lines) + "\n"

@@ -1,0 +1,51 @@
+"""How well a model predicts poses that it has not been identified from."""
+
+from dataclasses import asdict, dataclass
+
+import numpy as np
+
+from robots.calibration.measurements import Measurements
+from robots.compliant_kinematics import controller_kinematics
+from robots.model import RobotModel
+from robots.pose import pose_error
+
+
+@dataclass(frozen=True)
+class ErrorStatistics:
+    """Absolute errors per axis over a set of poses, as in Probst (2024), table 6.3.
+
+    Along and about the axes of the world, the rotation as a vector; lists of three.
+    """
+
+    mean_mm: list[float]
+    max_mm: list[float]
+    p90_mm: list[float]
+    mean_deg: list[float]
+    max_deg: list[float]
+    p90_deg: list[float]
+
+    def as_dict(self) -> dict[str, list[float]]:
+        """The numbers by name; positions only where no rotation was measured."""
+        return {name: numbers for name, numbers in asdict(self).items() if numbers}
+
+
+def prediction_errors(robot: RobotModel, measurements: Measurements) -> np.ndarray:
+    """Measured less predicted poses: rotation vector in rad, position in m, (n, 6), or (n, 3) in m."""
+    X = np.empty((len(measurements), 4, 4))
+    for payload in np.unique(measurements.payload):
+        rows = measurements.payload == payload
+        X[rows] = controller_kinematics(robot, float(payload)).forward(measurements.q[rows])
+    if measurements.rotation is None:
+        return measurements.position - X[:, :3, 3]
+    return pose_error(measurements.X_WE, X)
+
+
+def statistics(errors: np.ndarray) -> ErrorStatistics:
+    """Of errors (n, 6) or (n, 3) as `prediction_errors` gives them."""
+    millimetres, degrees = 1e3 * np.abs(errors[:, -3:]), np.rad2deg(np.abs(errors[:, :-3]))
+    numbers = [
+        summary.tolist()
+        for unit in (millimetres, degrees)
+        for summary in (unit.mean(axis=0), unit.max(axis=0), np.percentile(unit, 90.0, axis=0))
+    ]
+    return ErrorStatistics(*numbers)

@@ -1,0 +1,110 @@
+"""Tables of measurements: what was written is read, and what is wrong is said with its line."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from robots.calibration.measurement_file import (
+    MeasurementFileError,
+    measurement_text,
+    parse_measurements,
+    read_measurements,
+)
+from robots.calibration.measurements import Measurements
+from robots.kinematics import Kinematics
+from robots.model import load_robot
+
+ROBOT = load_robot("irb1200")
+JOINTS = ",".join(f"q{n}_rad" for n in range(1, 7))
+
+
+def table(count: int = 4, seed: int = 0) -> Measurements:
+    q = np.random.default_rng(seed).uniform(ROBOT.lower, ROBOT.upper, (count, 6))
+    X_WE = Kinematics(ROBOT).forward(q)
+    return Measurements(q, X_WE[:, :3, 3], X_WE[:, :3, :3], np.full(count, 3.5))
+
+
+@pytest.mark.parametrize("with_rotation", [True, False])
+def test_a_table_comes_back(with_rotation: bool):
+    written = table() if with_rotation else table().without_rotation()
+    read, problems = parse_measurements(measurement_text(written))
+    assert problems == []
+    np.testing.assert_array_equal(read.q, written.q)
+    np.testing.assert_array_equal(read.position, written.position)
+    np.testing.assert_array_equal(read.payload, written.payload)
+    assert (read.rotation is None) == (written.rotation is None)
+    np.testing.assert_allclose(read.X_WE, written.X_WE, atol=1e-15)
+    np.testing.assert_array_equal(read.rows, [2, 3, 4, 5])
+
+
+def test_units_separators_comments_and_other_columns_are_understood():
+    text = """# from the cell
+time_s;q1_deg;q2_deg;q3_deg;q4_deg;q5_deg;q6_deg;x_mm;y_mm;z_mm;alpha_deg;beta_deg;gamma_deg
+0.1;90;-45;30;0;10;5;451.5;-3;620;90;0;0
+"""
+    read, problems = parse_measurements(text)
+    assert problems == []
+    np.testing.assert_allclose(read.q[0], np.deg2rad([90, -45, 30, 0, 10, 5]))
+    np.testing.assert_allclose(read.position[0], [0.4515, -0.003, 0.62])
+    assert read.rotation is not None
+    np.testing.assert_allclose(read.rotation[0], [[0, -1, 0], [1, 0, 0], [0, 0, 1]], atol=1e-15)
+    assert read.rows[0] == 3
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("", "the table is empty"),
+        (f"{JOINTS},x_m,y_m\n0,0,0,0,0,0,1,1", "column z_m or z_mm is missing; there are q1_rad"),
+        (f"{JOINTS},x_m,y_m,z_m,qw,qx\n", "column qy is missing"),
+        (f"{JOINTS},x_m,y_m,z_m\n", "no row but the header"),
+        (f"{JOINTS},x_m,y_m,z_m\n0,45,0,0,0,0,0.5,0,0.5", r"line 2: q2_rad is 45, .* seems to hold degrees"),
+        (f"{JOINTS},x_m,y_m,z_m\n0,0,0,0,0,0,500,0,0.5", r"line 2: x_m is 500, .* seems to hold millimetres"),
+        (f"{JOINTS},x_m,y_m,z_m,x_m\n", "column x_m is there twice"),
+    ],
+)
+def test_a_table_that_cannot_be_used_is_refused(text: str, message: str):
+    with pytest.raises(MeasurementFileError, match=message):
+        parse_measurements(text)
+
+
+def test_bad_rows_are_named_and_the_others_used():
+    lines = measurement_text(table(6)).splitlines()
+    lines[2] = lines[2].replace(lines[2].split(",")[3], "nan", 1)  # line 3
+    lines[3] = lines[3].rsplit(",", 3)[0]  # line 4: the end is missing
+    cells = lines[4].split(",")
+    cells[9] = "2.0"  # line 5: no unit quaternion
+    lines[4] = ",".join(cells)
+    lines.append(lines[1])  # line 8: the first measurement once more
+    read, problems = parse_measurements("\n".join(lines))
+    assert [problem.row for problem in problems] == [3, 4, 5, 8]
+    assert ["not finite", "not a number", "quaternion", "of line 2 once more"] == [
+        next(
+            word
+            for word in ("not finite", "not a number", "quaternion", "of line 2 once more")
+            if word in p.what
+        )
+        for p in problems
+    ]
+    np.testing.assert_array_equal(read.rows, [2, 6, 7])
+
+
+def test_a_missing_file_is_named(tmp_path: Path):
+    with pytest.raises(MeasurementFileError, match=r"nothing\.csv: cannot be read"):
+        read_measurements(tmp_path / "nothing.csv")
+
+
+@given(
+    st.text(max_size=300)
+    | st.lists(st.sampled_from([JOINTS, "x_m", "1", ",", ";", "\n", '"', "nan"])).map("".join)
+)
+@settings(max_examples=300, deadline=None)
+def test_no_text_makes_the_reader_stumble(text: str):
+    try:
+        read, _ = parse_measurements(text)
+    except MeasurementFileError:
+        return
+    assert len(read) > 0
