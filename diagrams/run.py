@@ -35,7 +35,8 @@ def run(
     Args:
         scenario: what to do.
         law: which law to use.
-        robot: the nominal robot; None for the one that the scenario names.
+        robot: the robot as the controller knows it; None for the one that the scenario names. Unless it is a
+            calibrated one, the true robot is made from it too.
         seed: of the camera's noise; None for the scenario's.
         progress: is called now and then with the share that is done, 0 to 1.
 
@@ -57,10 +58,11 @@ class Experiment:
         """Builds the diagram and puts everything at rest at the start. Raises what `run` raises."""
         self.scenario, self.law = scenario, law
         self.seed = scenario.seed if seed is None else seed
-        robot = robot or load_robot(scenario.robot)
+        drawn = drawn_robot(scenario, robot)
+        robot = robot or drawn
         builder = DiagramBuilder()
         drive = scenario.servo.laws.get(law, LawConfig()).drive
-        self.station = builder.AddNamedSystem("station", SimulatedStation(robot, scenario.station, drive))
+        self.station = builder.AddNamedSystem("station", SimulatedStation(drawn, scenario.station, drive))
         self.servo = builder.AddNamedSystem("servo", Servo(robot, scenario, law))
         for name in ("position_command", "velocity_command"):
             builder.Connect(self.servo.GetOutputPort(name), self.station.GetInputPort(name))
@@ -132,15 +134,34 @@ class Experiment:
         )
 
 
+def drawn_robot(scenario: Scenario, robot: RobotModel | None) -> RobotModel:
+    """The robot as it is drawn, from which the true one differs by the station's errors.
+
+    Args:
+        scenario: names it.
+        robot: what the controller knows; a calibrated robot knows the errors, any other one is as drawn.
+
+    Raises:
+        ScenarioError: if the calibrated robot is not the scenario's.
+    """
+    if robot is not None and not robot.calibration.of:
+        return robot
+    if robot is not None and robot.calibration.of != scenario.robot:
+        raise ScenarioError(
+            f"{robot.name} was calibrated on '{robot.calibration.of}', the scenario has '{scenario.robot}'"
+        )
+    return load_robot(scenario.robot)
+
+
 def start_position(robot: RobotModel, scenario: Scenario, path: CartesianPath) -> np.ndarray:
-    """Motor positions in rad at which the nominal robot stands off the start by the initial error.
+    """Motor positions in rad at which the robot, as the controller knows it, is off by the initial error.
 
     The whole path is tried first, so that an unreachable one is refused before anything moves.
 
     Raises:
         ScenarioError: if the start or the path is out of reach.
     """
-    inverse = inverse_kinematics(robot)
+    inverse = inverse_kinematics(robot, scenario.station.payload)
     home = np.deg2rad(scenario.home_deg)
     times = np.arange(0.0, path.duration, 4e-3)
     try:

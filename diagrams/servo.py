@@ -6,7 +6,7 @@ from diagrams.scenario import Scenario
 from robots.model import RobotModel
 from systems.guard import CommandGuard
 from systems.reference import Reference
-from systems.servo import LAWS, LawConfig
+from systems.servo import BLIND_LAWS, LAWS, LawConfig
 
 
 class Servo(Diagram):
@@ -46,6 +46,7 @@ class Servo(Diagram):
                 period,
                 preview=preview,
                 memory_span=scenario.station.camera.delay + guard_config.hold_after,
+                payload=scenario.station.payload,
             ),
         )
         guard = builder.AddNamedSystem(
@@ -56,7 +57,7 @@ class Servo(Diagram):
                 period,
                 config.correction_limit,
                 config.correction_limit_deg,
-                uses_camera=law != "open_loop",
+                uses_camera=law not in BLIND_LAWS,
             ),
         )
         builder.Connect(self.reference.GetOutputPort("X_WE_preview"), servo.GetInputPort("X_WE_desired"))

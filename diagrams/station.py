@@ -52,13 +52,14 @@ class SimulatedStation(Diagram):
         out ``truth.motor_torque``  vector 6 in N m, joint side
     """
 
-    def __init__(self, robot: RobotModel, config: StationConfig, drive: str) -> None:
+    def __init__(self, robot: RobotModel, config: StationConfig, drive: str, with_log: bool = True) -> None:
         """Builds the cell.
 
         Args:
             robot: the nominal robot; the true one differs from it by ``config.errors``.
             config: the station part of a scenario.
             drive: ``"position"``, ``"velocity"`` or ``"cascade"``.
+            with_log: whether `record` will be asked for what has happened.
 
         Raises:
             ValueError: if a part refuses its configuration.
@@ -96,7 +97,7 @@ class SimulatedStation(Diagram):
         for name in ("position_command", "velocity_command"):
             builder.ExportInput(self.drive.GetInputPort(name), name)
         logged = {"state": state, "motor_torque": torque, "exposure": camera.GetOutputPort("exposure")}
-        self._log = PackedLog(builder, logged, config.period)
+        self._log = PackedLog(builder, logged, config.period) if with_log else None
         builder.ExportOutput(sensor.GetOutputPort("joint_sample"), "joint_sample")
         builder.ExportOutput(camera.GetOutputPort("pose_sample"), "pose_sample")
         builder.ExportOutput(tip.GetOutputPort("X_WE"), "truth.X_WE")
@@ -131,7 +132,13 @@ class SimulatedStation(Diagram):
         return float(np.abs(np.linalg.eigvals(A)).max())
 
     def record(self, root_context: Context) -> StationRecord:
-        """What the station has measured, and the truth beside it, since the start."""
+        """What the station has measured, and the truth beside it, since the start.
+
+        Raises:
+            RuntimeError: if the station was built without a log.
+        """
+        if self._log is None:
+            raise RuntimeError("the station was built without a log")
         times, data = self._log.read(root_context)
         state = data["state"]
         return StationRecord(

@@ -28,7 +28,7 @@ from robots.inverse_kinematics import InverseKinematics
 from robots.kinematics import Kinematics
 from robots.model import RobotModel, load_robot
 from robots.plant import add_robot
-from systems.servo import LAWS
+from systems.servo import COMPARED_LAWS
 
 REPEATS = 3
 SETTLE, SPAN = 0.5, 4.0  # s: standing at the start, then the first edge of the rectangle
@@ -67,10 +67,10 @@ def main() -> None:
 def benchmarks() -> Iterator[Row]:
     """All benchmarks in turn."""
     robot = load_robot(load_scenario("misaligned").robot)
-    for law in LAWS:
+    for law in COMPARED_LAWS:
         yield from closed_loop(law, robot)
     yield from kinematics(robot)
-    for law in LAWS:
+    for law in COMPARED_LAWS:
         yield convergence(law, robot)
 
 

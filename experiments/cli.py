@@ -29,7 +29,7 @@ from experiments.results import RESULTS, write_results
 from experiments.staging import staged_file, staged_folder
 from experiments.tables import print_summary
 from robots.model import load_robot, shipped_robots
-from systems.servo import LAWS
+from systems.servo import COMPARED_LAWS, LAWS
 
 BAD_INPUT, BROKEN_OFF, INTERRUPTED = 2, 1, 130  # exit codes
 
@@ -50,7 +50,11 @@ SetOption = Annotated[
 ]
 RobotOption = Annotated[
     str | None,
-    typer.Option("--robot", metavar="NAME|FILE", help="A robot in place of the scenario's."),
+    typer.Option(
+        "--robot",
+        metavar="NAME|FILE",
+        help="A robot in place of the scenario's, or a calibrated one for the controller.",
+    ),
 ]
 LawOption = Annotated[
     str | None,
@@ -111,14 +115,16 @@ def compare_command(
             raise ValueError(f"{name} must be at least 1, got {number}")
         cycles = 1 if is_quick else cycles
         prepared = prepare(scenario, settings or [], robot, is_quick)
-        check(prepared, list(LAWS))
+        check(prepared, list(COMPARED_LAWS))
     with _refusing(OSError), ExitStack() as stack:
         stage = stack.enter_context(staged_folder(out))
         copy = stack.enter_context(staged_file(json_file)) if json_file not in (None, "-") else None
-        processes = min(jobs or usable_cores(), cycles * len(LAWS))
-        label = f"{_count(cycles * len(LAWS), 'run')} in {_count(processes, 'process', 'processes')}"
+        processes = min(jobs or usable_cores(), cycles * len(COMPARED_LAWS))
+        label = f"{_count(cycles * len(COMPARED_LAWS), 'run')} in {_count(processes, 'process', 'processes')}"
         with _progress(label) as progress:
-            logs = compare(prepared.scenario, prepared.robot, list(LAWS), cycles, processes, progress)
+            logs = compare(
+                prepared.scenario, prepared.robot, list(COMPARED_LAWS), cycles, processes, progress
+            )
         result = _write(human, stage, prepared, logs)
         if copy:
             shutil.copyfile(stage / "summary.json", copy)
@@ -152,7 +158,7 @@ def run_command(
     with _refusing(OSError), ExitStack() as stack:
         stage = stack.enter_context(staged_folder(out))
         experiment = Experiment(prepared.scenario, law, prepared.robot)
-        view = LiveView(experiment, prepared.robot) if meshcat else None
+        view = LiveView(experiment, prepared.drawn_robot) if meshcat else None
         if view:
             console.print(f"Watch it at {view.address}")
         if realtime is not None:

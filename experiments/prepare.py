@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from diagrams.run import Experiment
+from diagrams.run import Experiment, drawn_robot
 from diagrams.scenario import Scenario, ScenarioError, load_scenario, scenario_text
 from robots.model import RobotModel, load_robot
 
@@ -18,7 +18,12 @@ class Prepared:
 
     title: str  # the scenario's name and how this one differs from it
     scenario: Scenario
-    robot: RobotModel
+    robot: RobotModel  # as the controller knows it
+
+    @property
+    def drawn_robot(self) -> RobotModel:
+        """The robot from which the true one differs by the station's errors."""
+        return drawn_robot(self.scenario, self.robot)
 
     @property
     def text(self) -> str:
@@ -34,7 +39,8 @@ def prepare(
     Args:
         name: a shipped scenario or the path of a scenario file.
         settings: changes such as ``"station.payload=0"``.
-        robot: a shipped robot or the path of a robot file; None for the scenario's.
+        robot: a shipped robot or the path of a robot file; None for the scenario's. A calibrated robot serves
+            the controller alone.
         is_quick: whether to make it `quick`.
 
     Raises:
@@ -42,14 +48,16 @@ def prepare(
     """
     scenario = load_scenario(name, list(settings))
     differences = list(settings)
+    model = load_robot(robot or scenario.robot)
     if robot is not None:
-        scenario = replace(scenario, robot=robot)
+        if not model.calibration.of:  # a calibrated one is what the controller knows, not another machine
+            scenario = replace(scenario, robot=robot)
         differences.append(f"robot={robot}")
     if is_quick:
         scenario, note = quick(scenario, settings)
         differences.append(f"quick: {note}")
     title = Path(name).stem + (f" ({'; '.join(differences)})" if differences else "")
-    return Prepared(title, scenario, load_robot(scenario.robot))
+    return Prepared(title, scenario, model)
 
 
 def quick(scenario: Scenario, settings: Sequence[str] = ()) -> tuple[Scenario, str]:

@@ -40,7 +40,7 @@ def write_results(folder: Path, prepared: Prepared, logs: Mapping[str, Sequence[
     write_json(folder / "timing.json", times)
     write_report(folder / "report.html", prepared.text, result, times, logs)
     write_replay(
-        folder / "replay.html", prepared.robot, first_cycles, errors=prepared.scenario.station.errors
+        folder / "replay.html", prepared.drawn_robot, first_cycles, errors=prepared.scenario.station.errors
     )
     write_figure(folder / "figure.svg", prepared.title, first_cycles)
     return result

@@ -12,6 +12,7 @@ from typing import Protocol
 
 import numpy as np
 
+from robots.compliant_kinematics import CompliantKinematics
 from robots.inverse_kinematics import (
     AXES,
     FREE_OF_OFFSET,
@@ -54,12 +55,18 @@ class InverseSolver(Protocol):
         ...
 
 
-def inverse_kinematics(robot: RobotModel) -> InverseSolver:
-    """The analytic solution where the robot is built for it, Newton's method where it nearly is.
+def inverse_kinematics(robot: RobotModel, payload: float = 0.0) -> InverseSolver:
+    """The analytic solution where the robot is built for it, Newton's method where it nearly is or yields.
+
+    Args:
+        robot: nominal or calibrated.
+        payload: mass at the flange in kg, under which a robot with compliances bends.
 
     Raises:
         ValueError: if the robot is too far from a spherical wrist on a plane arm; the message says where.
     """
+    if robot.compliance.any():
+        return NewtonInverse(robot, CompliantKinematics(robot, payload))
     return InverseKinematics(robot) if has_spherical_wrist(robot) else NewtonInverse(robot)
 
 

@@ -1,5 +1,6 @@
 """Visual-servo laws, one file each, all with the same ports."""
 
+from systems.compensation import Compensation
 from systems.servo.law import LawConfig, ServoLaw
 from systems.servo.numerical_ik import NumericalIk
 from systems.servo.open_loop import OpenLoop
@@ -11,6 +12,22 @@ LAWS: dict[str, type[ServoLaw]] = {
     "numerical_ik": NumericalIk,
     "pbvs": Pbvs,
     "position_level": PositionLevel,
+    "compensation": Compensation,
 }
+# What `truetip compare` compares: the path as planned, and the three laws that see the tip.
+COMPARED_LAWS = ("open_loop", "numerical_ik", "pbvs", "position_level")
+# These do without the camera.
+BLIND_LAWS = ("open_loop", "compensation")
 
-__all__ = ["LAWS", "LawConfig", "NumericalIk", "OpenLoop", "Pbvs", "PositionLevel", "ServoLaw"]
+__all__ = [
+    "BLIND_LAWS",
+    "COMPARED_LAWS",
+    "LAWS",
+    "Compensation",
+    "LawConfig",
+    "NumericalIk",
+    "OpenLoop",
+    "Pbvs",
+    "PositionLevel",
+    "ServoLaw",
+]

@@ -9,8 +9,9 @@ from pydrake.common.value import Value
 from pydrake.math import RigidTransform
 from pydrake.systems.framework import Context, DiscreteValues, LeafSystem
 
+from robots.compliant_kinematics import controller_kinematics
 from robots.inverse_kinematics import JointLimitError, UnreachableError
-from robots.kinematics import Kinematics, rotation_about
+from robots.kinematics import rotation_about
 from robots.model import NUM_JOINTS, RobotModel
 from robots.newton_inverse import InverseSolver, inverse_kinematics
 from systems.guard import GuardConfig
@@ -79,16 +80,18 @@ class ServoLaw(LeafSystem):
         period: float,
         preview: float = 0.0,
         memory_span: float = 0.25,
+        payload: float = 0.0,
     ) -> None:
         """Checks the configuration.
 
         Args:
-            robot: the nominal robot.
+            robot: the robot as the controller knows it, nominal or calibrated.
             config: gains and limits.
             guard: when to use a sample.
             period: tick of the law in s.
             preview: how far ahead of time the wanted pose at the input port is, in s.
             memory_span: the oldest exposure that can still be compared, in s.
+            payload: mass at the flange in kg, under which a robot with compliances bends.
 
         Raises:
             ValueError: if a gain or a limit is not positive.
@@ -98,7 +101,8 @@ class ServoLaw(LeafSystem):
             if not getattr(config, label) > 0.0:
                 raise ValueError(f"servo law: {label} must be positive, got {getattr(config, label)}")
         self.config, self.period = config, period
-        self._kinematics, self._inverse = Kinematics(robot), inverse_kinematics(robot)
+        self._kinematics = controller_kinematics(robot, payload)
+        self._inverse = inverse_kinematics(robot, payload)
         self._gains = np.repeat([config.rotation, config.translation], 3)
         self._angle_limit = math.radians(config.correction_limit_deg)
         self._guard, self._preview = guard, preview
