@@ -29,6 +29,14 @@ class MeasurementProcedure:
     longest_wait: float = 5.0  # s, after which a measurement is made in spite of an oscillation
 
 
+@dataclass(frozen=True)
+class MeasurementRecord:
+    """What was measured at the configurations, and where the tool truly was; row for row."""
+
+    measured: Measurements
+    truth: Measurements  # the true poses at the same measured joint positions
+
+
 class MeasurementRun:
     """A station whose robot goes where it is told and stays until it is measured."""
 
@@ -55,7 +63,7 @@ class MeasurementRun:
 
     def measure(
         self, q: np.ndarray, seed: int = 0, progress: Callable[[float], None] | None = None
-    ) -> Measurements:
+    ) -> MeasurementRecord:
         """Visits configurations in their order, beginning at rest in the first.
 
         Args:
@@ -64,7 +72,7 @@ class MeasurementRun:
             progress: is called after each configuration with the share that is done.
 
         Returns:
-            One row for each configuration at which the camera saw the tool; their numbers begin with one.
+            A row for each configuration at which the camera saw the tool; their numbers begin with one.
 
         Raises:
             ValueError: if the camera saw the tool nowhere.
@@ -74,6 +82,7 @@ class MeasurementRun:
         self._place(q[0], seed)
         self._simulator.Initialize()
         rows: list[tuple[int, np.ndarray, np.ndarray, np.ndarray]] = []
+        truth: list[np.ndarray] = []
         # No cycles of objects arise, and a full search for them takes 40 ms with Drake loaded.
         collecting = gc.isenabled()
         gc.disable()
@@ -82,6 +91,7 @@ class MeasurementRun:
                 row = self._measure_at(goal)
                 if row is not None:
                     rows.append((number, *row))
+                    truth.append(self._true_pose())
                 if progress:
                     progress(number / len(q))
         finally:
@@ -90,8 +100,15 @@ class MeasurementRun:
         if not rows:
             raise ValueError(f"measurement run: the camera saw the tool at none of {len(q)} configurations")
         numbers, positions, translations, rotations = (np.array(part) for part in zip(*rows, strict=True))
-        payload = np.full(len(rows), self._config.payload)
-        return Measurements(positions, translations, rotations, payload, numbers)
+        payload, X_WE = np.full(len(rows), self._config.payload), np.array(truth)
+        return MeasurementRecord(
+            Measurements(positions, translations, rotations, payload, numbers),
+            Measurements(positions, X_WE[:, :3, 3], X_WE[:, :3, :3], payload, numbers),
+        )
+
+    def _true_pose(self) -> np.ndarray:
+        context = self._station.GetMyContextFromRoot(self._context)
+        return self._station.GetOutputPort("truth.X_WE").Eval(context).GetAsMatrix4()
 
     def _place(self, theta: np.ndarray, seed: int) -> None:
         self._station.set_at_rest(self._context, theta, seed)

@@ -1,37 +1,37 @@
-"""The command line: ``truetip compare``, ``run``, ``diagram``, ``scenarios`` and ``robots``."""
+"""The command line. What takes more than a page has a module of its own."""
 
 import math
 import shutil
 import sys
 import time
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import ExitStack, contextmanager
+from collections.abc import Mapping, Sequence
+from contextlib import ExitStack
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Annotated, Any
 
 import typer
-from rich import box
 from rich.console import Console
 from rich.markup import escape
-from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeRemainingColumn
-from rich.table import Table
 
 from diagrams.log import RunLog
 from diagrams.run import Experiment
 from diagrams.scenario import load_scenario, shipped_scenarios
-from experiments.compare import SimulationError, compare, simulating, usable_cores
+from experiments.calibrate_command import calibrate_command
+from experiments.compare import compare, simulating
+from experiments.console import count, print_list, progress_bar, refusing
+from experiments.design_command import design_command
 from experiments.diagram_view import write_diagram
 from experiments.live import LiveView, advance_live
+from experiments.options import OutOption, RobotOption, ScenarioOption, SetOption
 from experiments.prepare import Prepared, check, prepare
 from experiments.report import verdict
 from experiments.results import RESULTS, write_results
 from experiments.staging import staged_file, staged_folder
 from experiments.tables import print_summary
+from experiments.workers import usable_cores
 from robots.model import load_robot, shipped_robots
 from systems.servo import COMPARED_LAWS, LAWS
-
-BAD_INPUT, BROKEN_OFF, INTERRUPTED = 2, 1, 130  # exit codes
 
 app = typer.Typer(
     help="Puts the true tip of an industrial robot on its path: visual-servo laws, simulated and compared.",
@@ -41,26 +41,10 @@ app = typer.Typer(
     context_settings={"help_option_names": ["-h", "--help"]},
 )
 
-ScenarioOption = Annotated[
-    str, typer.Option("--scenario", metavar="NAME|FILE", help="A shipped scenario or a YAML file.")
-]
-SetOption = Annotated[
-    list[str] | None,
-    typer.Option("--set", metavar="KEY=VALUE", help="Change a value, as station.payload=0; repeatable."),
-]
-RobotOption = Annotated[
-    str | None,
-    typer.Option(
-        "--robot",
-        metavar="NAME|FILE",
-        help="A robot in place of the scenario's, or a calibrated one for the controller.",
-    ),
-]
 LawOption = Annotated[
     str | None,
     typer.Option("--law", metavar="NAME", help=f"One of {', '.join(LAWS)}.", show_default="the scenario's"),
 ]
-OutOption = Annotated[Path, typer.Option("--out", metavar="DIR", help="Where the results go.")]
 
 
 def main() -> None:
@@ -109,19 +93,19 @@ def compare_command(
 ) -> None:
     """Run the open loop and the three laws on one scenario and compare them."""
     human = Console(stderr=json_file == "-")
-    with _refusing(ValueError, OSError):
+    with refusing(ValueError, OSError):
         if cycles < 1 or (jobs is not None and jobs < 1):
             name, number = ("--cycles", cycles) if cycles < 1 else ("--jobs", jobs)
             raise ValueError(f"{name} must be at least 1, got {number}")
         cycles = 1 if is_quick else cycles
         prepared = prepare(scenario, settings or [], robot, is_quick)
         check(prepared, list(COMPARED_LAWS))
-    with _refusing(OSError), ExitStack() as stack:
+    with refusing(OSError), ExitStack() as stack:
         stage = stack.enter_context(staged_folder(out))
         copy = stack.enter_context(staged_file(json_file)) if json_file not in (None, "-") else None
         processes = min(jobs or usable_cores(), cycles * len(COMPARED_LAWS))
-        label = f"{_count(cycles * len(COMPARED_LAWS), 'run')} in {_count(processes, 'process', 'processes')}"
-        with _progress(label) as progress:
+        label = f"{count(cycles * len(COMPARED_LAWS), 'run')} in {count(processes, 'process', 'processes')}"
+        with progress_bar(label) as progress:
             logs = compare(
                 prepared.scenario, prepared.robot, list(COMPARED_LAWS), cycles, processes, progress
             )
@@ -149,13 +133,13 @@ def run_command(
 ) -> None:
     """Run one law."""
     console = Console()
-    with _refusing(ValueError, OSError):
+    with refusing(ValueError, OSError):
         if realtime is not None and not 0.0 < realtime < math.inf:
             raise ValueError(f"--realtime must be positive, got {realtime:g}")
         prepared = prepare(scenario, [*(settings or []), *([f"law={law}"] if law else [])], robot)
         law = prepared.scenario.law
         check(prepared, [law])
-    with _refusing(OSError), ExitStack() as stack:
+    with refusing(OSError), ExitStack() as stack:
         stage = stack.enter_context(staged_folder(out))
         experiment = Experiment(prepared.scenario, law, prepared.robot)
         view = LiveView(experiment, prepared.drawn_robot) if meshcat else None
@@ -164,7 +148,7 @@ def run_command(
         if realtime is not None:
             experiment.simulator.set_target_realtime_rate(realtime)
             experiment.simulator.ResetStatistics()  # the pace counts from here
-        with simulating(law, prepared.scenario.seed), _progress(law) as progress:
+        with simulating(law, prepared.scenario.seed), progress_bar(law) as progress:
             if view:
                 advance_live(experiment, view, progress)
             else:
@@ -187,7 +171,7 @@ def diagram_command(
     depth: Annotated[int, typer.Option(metavar="N", help="Levels of diagrams that are opened.")] = 2,
 ) -> None:
     """Draw the diagram that is simulated."""
-    with _refusing(ValueError, OSError):
+    with refusing(ValueError, OSError):
         prepared = prepare(scenario, [*(settings or []), *([f"law={law}"] if law else [])], robot)
         experiment = Experiment(prepared.scenario, prepared.scenario.law, prepared.robot)
         with staged_file(out) as path:
@@ -195,43 +179,20 @@ def diagram_command(
     Console().print(f"The diagram: {escape(str(out))}")
 
 
+app.command("design")(design_command)
+app.command("calibrate")(calibrate_command)
+
+
 @app.command("scenarios")
 def scenarios_command() -> None:
     """List the scenarios that come with truetip."""
-    _print_list((name, load_scenario(name).description) for name in shipped_scenarios())
+    print_list((name, load_scenario(name).description) for name in shipped_scenarios())
 
 
 @app.command("robots")
 def robots_command() -> None:
     """List the robots that come with truetip."""
-    _print_list((name, load_robot(name).name) for name in shipped_robots())
-
-
-@contextmanager
-def _refusing(*refusals: type[Exception]) -> Iterator[None]:
-    """Turns what the user can mend into one line and an exit code; a defect still shows itself."""
-    try:
-        yield
-    except refusals as error:
-        _fail(str(error), BAD_INPUT)
-    except SimulationError as error:
-        _fail(str(error), BROKEN_OFF)
-    except KeyboardInterrupt:
-        _fail("interrupted, nothing was written", INTERRUPTED)
-
-
-def _fail(message: str, code: int) -> None:
-    typer.echo(f"truetip: {' '.join(message.split())}", err=True)
-    raise typer.Exit(code)
-
-
-@contextmanager
-def _progress(label: str) -> Iterator[Callable[[float], None]]:
-    """A progress bar on stderr; gives the function that tells it the share that is done."""
-    columns = (TextColumn("{task.description}"), BarColumn(), TaskProgressColumn(), TimeRemainingColumn())
-    with Progress(*columns, console=Console(stderr=True), transient=True) as bar:
-        task = bar.add_task(label, total=1.0)
-        yield lambda share: bar.update(task, completed=share)
+    print_list((name, load_robot(name).name) for name in shipped_robots())
 
 
 def _write(
@@ -256,19 +217,6 @@ def _wait(console: Console, view: LiveView) -> None:
             time.sleep(1.0)
     except KeyboardInterrupt:
         console.print()
-
-
-def _print_list(rows: Iterator[tuple[str, str]]) -> None:
-    table = Table(box=box.SIMPLE, show_header=False)
-    table.add_column(no_wrap=True, style="bold")
-    table.add_column()
-    for name, text in rows:
-        table.add_row(escape(name), escape(text))
-    Console().print(table)
-
-
-def _count(number: int, one: str, many: str = "") -> str:
-    return f"{number} {one if number == 1 else many or one + 's'}"
 
 
 if __name__ == "__main__":

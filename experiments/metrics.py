@@ -176,7 +176,12 @@ def write_json(path: str | Path, data: Any) -> None:
         OSError: if the folder is missing or cannot be written.
         ValueError: if a number is NaN or infinite.
     """
-    write_text(path, json.dumps(data, indent=2, allow_nan=False, ensure_ascii=False) + "\n")
+    write_text(path, json_text(data))
+
+
+def json_text(data: Any) -> str:
+    """The data as JSON in its own order of keys. Raises ValueError if a number is NaN or infinite."""
+    return json.dumps(data, indent=2, allow_nan=False, ensure_ascii=False) + "\n"
 
 
 def _rounded(value: Any) -> Any:
