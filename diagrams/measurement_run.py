@@ -25,7 +25,9 @@ class MeasurementProcedure:
     speed_share: float = 0.5  # of the robot's largest joint speeds
     settle: float = 0.4  # s, least time of rest before the measurement
     window: float = 0.2  # s, over which samples are averaged
-    stillness: float = 2e-6  # m, oscillation in the window that counts as rest, beside the camera's noise
+    # Oscillation in the window that counts as rest, beside the camera's noise.
+    stillness: float = 2e-6  # m
+    rotation_stillness: float = 4e-6  # rad
     longest_wait: float = 5.0  # s, after which a measurement is made in spite of an oscillation
 
 
@@ -53,13 +55,10 @@ class MeasurementRun:
         self._mover = builder.AddNamedSystem("mover", mover)
         for name in ("position_command", "velocity_command"):
             builder.Connect(self._mover.GetOutputPort(name), self._station.GetInputPort(name))
-        diagram = builder.Build()
-        self._simulator = Simulator(diagram)
-        self._context = self._simulator.get_mutable_context()
-        self._place(np.zeros(len(robot.lower)), scenario.seed)
+        self._diagram = builder.Build()
+        self._start(np.zeros(len(robot.lower)), scenario.seed)
         rate = self._station.fastest_rate(self._context)
         self._integration = Integration(scenario.integrator, scenario.station.period, rate)
-        self._integration.initialize(self._simulator)
 
     def measure(
         self, q: np.ndarray, seed: int = 0, progress: Callable[[float], None] | None = None
@@ -77,10 +76,8 @@ class MeasurementRun:
         Raises:
             ValueError: if the camera saw the tool nowhere.
         """
-        self._simulator.reset_context(self._context)
-        self._context.SetTime(0.0)
-        self._place(q[0], seed)
-        self._simulator.Initialize()
+        self._start(q[0], seed)
+        self._integration.initialize(self._simulator)
         rows: list[tuple[int, np.ndarray, np.ndarray, np.ndarray]] = []
         truth: list[np.ndarray] = []
         # No cycles of objects arise, and a full search for them takes 40 ms with Drake loaded.
@@ -110,7 +107,10 @@ class MeasurementRun:
         context = self._station.GetMyContextFromRoot(self._context)
         return self._station.GetOutputPort("truth.X_WE").Eval(context).GetAsMatrix4()
 
-    def _place(self, theta: np.ndarray, seed: int) -> None:
+    def _start(self, theta: np.ndarray, seed: int) -> None:
+        # A simulator of its own for each run: an integrator remembers the steps that it has made.
+        self._simulator = Simulator(self._diagram)
+        self._context = self._simulator.get_mutable_context()
         self._station.set_at_rest(self._context, theta, seed)
         self._mover.set_at_rest(self._mover.GetMyMutableContextFromRoot(self._context), theta)
 
@@ -125,9 +125,11 @@ class MeasurementRun:
             if not poses:
                 return None
             positions = np.array([pose.X_WE.translation() for pose in poses])
-            waited = (begin - rest) * self._config.period
-            if self._is_still(positions) or waited > self._procedure.longest_wait:
-                turns = Rotation.from_matrix([pose.X_WE.rotation().matrix() for pose in poses])
+            turns = Rotation.from_matrix([pose.X_WE.rotation().matrix() for pose in poses])
+            swings = (turns * turns[0].inv()).as_rotvec()
+            is_still = _is_still(positions, self._procedure.stillness)
+            is_still = is_still and _is_still(swings, self._procedure.rotation_stillness)
+            if is_still or (begin - rest) * self._config.period > self._procedure.longest_wait:
                 theta = np.mean([joint.position for joint in joints], axis=0)
                 return theta, positions.mean(axis=0), turns.mean().as_matrix()
             begin += self._ticks(self._procedure.window)
@@ -145,16 +147,17 @@ class MeasurementRun:
                 poses[pose.time] = pose
         return joints, list(poses.values())
 
-    def _is_still(self, positions: np.ndarray) -> bool:
-        """Whether the spread is the camera's noise alone, which shows in the steps from sample to sample."""
-        if len(positions) < 3:
-            return True
-        spread = float(positions.var(axis=0, ddof=1).max())
-        noise = 0.5 * float(np.square(np.diff(positions, axis=0)).mean(axis=0).max())
-        return spread <= 1.6 * noise + self._procedure.stillness**2
-
     def _tick_at(self, time: float) -> int:
         return int(np.ceil(time / self._config.period - 1e-9))
 
     def _ticks(self, duration: float) -> int:
         return max(1, round(duration / self._config.period))
+
+
+def _is_still(samples: np.ndarray, oscillation: float) -> bool:
+    """Whether samples (n, 3) spread by noise alone, which shows in the steps from one to the next."""
+    if len(samples) < 3:
+        return True
+    spread = float(samples.var(axis=0, ddof=1).max())
+    noise = 0.5 * float(np.square(np.diff(samples, axis=0)).mean(axis=0).max())
+    return spread <= 1.6 * noise + oscillation**2

@@ -24,6 +24,12 @@ from diagrams.run import Experiment
 from diagrams.scenario import Scenario, load_scenario
 from experiments.bench_bare import BarePlant
 from experiments.metrics import write_json
+from robots.calibration.admissible import AdmissibleConfigurations
+from robots.calibration.design import design_measurements
+from robots.calibration.identification import identify
+from robots.calibration.measurements import Measurements
+from robots.error_kinematics import ErrorKinematics
+from robots.geometric_errors import GeometricErrors
 from robots.inverse_kinematics import InverseKinematics
 from robots.kinematics import Kinematics
 from robots.model import RobotModel, load_robot
@@ -37,6 +43,7 @@ REQUIRED_REAL_TIME = {7: 6.0, 0: 3.0}  # by the load in kg
 CONFIGURATIONS, DRAKE_CONFIGURATIONS, POSES = 100_000, 2_000, 2_000
 REFERENCE_ACCURACY = 1e-8
 REQUIRED_CONVERGENCE = 1.0  # um
+REQUIRED_B3, REQUIRED_DESIGN_TIME, REQUIRED_IDENTIFICATION = 3.34, 5.0, 50.0  # the times in s and ms
 
 Row = tuple[str, str, float, str, float, str]  # name, what it is, value, unit, yardstick, what that is
 
@@ -70,6 +77,7 @@ def benchmarks() -> Iterator[Row]:
     for law in COMPARED_LAWS:
         yield from closed_loop(law, robot)
     yield from kinematics(robot)
+    yield from calibration(robot)
     for law in COMPARED_LAWS:
         yield convergence(law, robot)
 
@@ -153,6 +161,23 @@ def _drake_kinematics(robot: RobotModel, q: np.ndarray) -> Callable[[], None]:
             )
 
     return calculate
+
+
+def calibration(robot: RobotModel) -> Iterator[Row]:
+    """The choice of 75 configurations and the identification from them, against what is required."""
+    admissible = AdmissibleConfigurations(robot)
+    started = time.perf_counter()
+    design = design_measurements(robot, admissible=admissible)
+    seconds = time.perf_counter() - started
+    yield "design_b3", "design of 75, B3", design.value, "", REQUIRED_B3, "required"
+    yield "design_time", "design of 75, time", seconds, "s", REQUIRED_DESIGN_TIME, "allowed"
+    rng = np.random.default_rng(0)
+    wrong = GeometricErrors(rng.uniform(1.0, 3.5, 6), np.full(3, 10.0), np.array([0.0, 0.0, 0.1]))
+    X_WE = ErrorKinematics(robot).forward(design.configurations, wrong.vector(robot))
+    table = Measurements(design.configurations, X_WE[:, :3, 3], X_WE[:, :3, :3])
+    identify(robot, table)
+    best = 1e3 * min(_seconds(lambda: identify(robot, table)) for _ in range(REPEATS))
+    yield "identification", "identification of 75 poses", best, "ms", REQUIRED_IDENTIFICATION, "allowed"
 
 
 def convergence(law: str, robot: RobotModel) -> Row:

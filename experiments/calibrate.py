@@ -49,6 +49,7 @@ class CalibrationStudy:
     truth: np.ndarray | None  # (48,) base parameters, where they are known
     before: ErrorStatistics | None
     after: ErrorStatistics | None
+    geometry_only: ErrorStatistics | None  # what is left without the compliances, where these were identified
     after_noise_free: ErrorStatistics | None
 
 
@@ -62,8 +63,8 @@ class _Stretch:
 def validation_configurations(robot: RobotModel, count: int, seed: int) -> np.ndarray:
     """Admissible configurations spread over the source's ranges, in a short order, (count, 6) in rad.
 
-    The first three joints stand on a grid, 5 by 5 by 5 for the source's 125 configurations, the wrist anywhere.
-    What is not admissible is replaced by random configurations.
+    The first three joints stand on a grid, 5 by 5 by 5 for the source's 125 configurations, the wrist
+    anywhere. What is not admissible is replaced by random configurations.
     """
     rng = np.random.default_rng([seed, 1])
     lower, upper = np.deg2rad([(axis.lower_deg, axis.upper_deg) for axis in SOURCE_RANGES]).T

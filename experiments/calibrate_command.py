@@ -3,6 +3,7 @@
 import sys
 import time
 from contextlib import ExitStack
+from dataclasses import replace
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -110,6 +111,9 @@ def calibrate_command(
         config = identification_config(compliance, fixed or [], NOISES[noise])
         identified = identify(prepared.robot, table, config)
         calibrated = identified.calibrated_robot(prepared.scenario.robot)
+        rigid = None
+        if compliance:
+            rigid = identify(prepared.robot, table, replace(config, compliance=False)).calibrated_robot()
         study = CalibrationStudy(
             nominal=prepared.robot,
             calibrated=calibrated,
@@ -122,6 +126,7 @@ def calibrate_command(
             else true_base_parameters(prepared.scenario, prepared.robot, position_only),
             before=validated(prepared.robot, sets.validation, position_only),
             after=validated(calibrated, sets.validation, position_only),
+            geometry_only=validated(rigid, sets.validation, position_only) if rigid else None,
             after_noise_free=validated(calibrated, sets.validation_truth, position_only),
         )
         path = None if measurements else _path(prepared.scenario, prepared.robot, calibrated)

@@ -43,6 +43,7 @@ def calibration_json(study: CalibrationStudy, path: Mapping[str, Any] | None) ->
             for name, found in (
                 ("before", study.before),
                 ("after", study.after),
+                ("after_geometry_only", study.geometry_only),
                 ("after_noise_free", study.after_noise_free),
             )
         },
@@ -104,6 +105,7 @@ def _validation_rows(study: CalibrationStudy) -> list[list[str]]:
     rows = []
     stages = {
         "uncalibrated": study.before,
+        "geometry only": study.geometry_only,
         "calibrated": study.after,
         "without noise": study.after_noise_free,
     }

@@ -17,7 +17,7 @@ from experiments.plot_page import Section, write_plot_page
 from experiments.report_files import write_text
 from experiments.robot_plot import joints_figure, tips_figure
 from experiments.staging import staged_file
-from robots.calibration.admissible import AdmissibleConfigurations
+from robots.calibration.admissible import AdmissibleConfig, AdmissibleConfigurations, View
 from robots.calibration.criteria import NAMES
 from robots.calibration.design import MeasurementDesign, design_measurements
 from robots.model import RobotModel, load_robot
@@ -41,6 +41,13 @@ def design_command(
     anywhere: Annotated[
         bool, typer.Option("--anywhere", help="Do not mind the floor, the base and the joint limits.")
     ] = False,
+    camera: Annotated[
+        str | None,
+        typer.Option(
+            metavar="X,Y,Z",
+            help="Place of a camera in m that must see the tool; without it they stand all around.",
+        ),
+    ] = None,
     seed: Annotated[int, typer.Option(metavar="N", help="Another seed, another design as good.")] = 0,
     out: Annotated[
         str | None, typer.Option(metavar="FILE.csv", help="The configurations, in the order of the visits.")
@@ -59,7 +66,8 @@ def design_command(
         copy = stack.enter_context(staged_file(json_file)) if json_file not in (None, "-") else None
         model = load_robot(robot)
         before, started = _peak_mb(), time.perf_counter()
-        admissible = None if anywhere else AdmissibleConfigurations(model)
+        view = None if camera is None else View(_place(camera))
+        admissible = None if anywhere else AdmissibleConfigurations(model, AdmissibleConfig(view=view))
         with progress_bar(f"{count} configurations") as progress:
             design = design_measurements(
                 model, count, criterion, position_only, admissible=admissible, seed=seed, progress=progress
@@ -85,6 +93,14 @@ def design_command(
     human.print(f"{seconds:.1f} s, {result['peak_mb']:.0f} MB beside the program itself")
     for path in filter(None, (str(report), out)):
         human.print(escape(path), soft_wrap=True)
+
+
+def _place(text: str) -> tuple[float, float, float]:
+    try:
+        x, y, z = (float(part) for part in text.split(","))
+    except ValueError:
+        raise ValueError(f"--camera must be three numbers in m such as 1.5,0,1.2, got '{text}'") from None
+    return x, y, z
 
 
 def design_verdict(design: MeasurementDesign) -> str:

@@ -11,6 +11,8 @@ from plotly.offline import get_plotlyjs
 from experiments.report_files import write_text
 from experiments.report_page import page
 
+_CONFIG = {"responsive": True, "displayModeBar": False}
+
 
 @dataclass(frozen=True)
 class Section:
@@ -42,7 +44,7 @@ def write_plot_page(path: str | Path, title: str, verdict: str, sections: Sequen
                 plot_bgcolor="rgba(0,0,0,0)",
                 font={"color": "#7a8696"},
             )
-            content = content.to_html(full_html=False, include_plotlyjs=False, config={"responsive": True})
+            content = content.to_html(full_html=False, include_plotlyjs=False, config=_CONFIG)
         note = f"<p class=note>{escape(section.note)}</p>" if section.note else ""
         body.append(f"<section class=card><h2>{escape(section.title)}</h2>{note}{content}</section>")
     write_text(path, page(escape(title), "\n".join(body), "", "{}", ""))

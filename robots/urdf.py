@@ -10,7 +10,6 @@ from pydrake.math import RigidTransform
 from robots.model import Link, RobotModel
 from robots.pose import zyx_from_rotation
 
-
 _LARGEST_EFFORT = 1e6  # N m: robot files do not limit it, and URDF insists on a number
 
 

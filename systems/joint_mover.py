@@ -30,7 +30,9 @@ class JointMover(LeafSystem):
         """
         super().__init__()
         if not (np.min(speed) > 0.0 and shortest > 0.0):
-            raise ValueError(f"joint mover: speeds and duration must be positive, got {speed} and {shortest} s")
+            raise ValueError(
+                f"joint mover: speeds and duration must be positive, got {speed} rad/s and {shortest} s"
+            )
         self._speed, self._shortest = speed, shortest
         state = self.DeclareDiscreteState(_DURATION + 1)
         prerequisites = {self.time_ticket(), self.discrete_state_ticket(state)}

@@ -46,7 +46,7 @@ def test_newton_meets_the_path_to_rounding():
 
 @pytest.mark.parametrize("gain", [2.0, 20.0])
 def test_the_integrated_law_follows_within_its_step_and_does_not_drift(gain: float):
-    """The trapezoidal rule errs by T^2 / 12 times the third derivative; the feedback keeps it from adding up."""
+    """The trapezoidal rule errs by T^2 / 12 times the third derivative; feedback keeps it from adding up."""
     errors = commanded("compensation", calibrated(), gain=gain)
     assert np.abs(errors).max() < 2e-5
     assert np.abs(errors[-1]).max() < 1e-7  # after a dwell of 2 s, four time constants of the smaller gain

@@ -81,14 +81,14 @@ def test_bad_rows_are_named_and_the_others_used():
     lines.append(lines[1])  # line 8: the first measurement once more
     read, problems = parse_measurements("\n".join(lines))
     assert [problem.row for problem in problems] == [3, 4, 5, 8]
-    assert ["not finite", "not a number", "quaternion", "of line 2 once more"] == [
+    assert [
         next(
             word
             for word in ("not finite", "not a number", "quaternion", "of line 2 once more")
             if word in p.what
         )
         for p in problems
-    ]
+    ] == ["not finite", "not a number", "quaternion", "of line 2 once more"]
     np.testing.assert_array_equal(read.rows, [2, 6, 7])
 
 

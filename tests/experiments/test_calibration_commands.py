@@ -1,0 +1,150 @@
+"""truetip design and truetip calibrate as a person runs them."""
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+from typer.testing import CliRunner, Result
+
+from experiments.cli import app
+from robots.calibration.measurement_file import read_measurements
+from robots.model import load_robot
+from tests.experiments.browser import open_page
+
+SMALL = ["--set", "station.elasticity=rigid", "--set", "reference.settle=0.2", "--set", "reference.dwell=0.6"]
+QUIET = ["--set", "station.camera.position_sigma=0", "--set", "station.camera.orientation_sigma_deg=0"]
+
+
+def invoke(*arguments: str) -> Result:
+    return CliRunner().invoke(app, arguments)
+
+
+@pytest.fixture(scope="module")
+def calibrated(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A folder with all that a calibration of a rigid robot without noise leaves."""
+    folder = tmp_path_factory.mktemp("calibration")
+    options = ["--count", "20", "--out", str(folder), "--json", str(folder / "result.json")]
+    files = ["--write", str(folder / "robot.yaml"), "--urdf", str(folder / "robot.urdf")]
+    result = invoke("calibrate", *SMALL, *QUIET, *options, *files)
+    assert result.exit_code == 0, result.output
+    return folder
+
+
+def test_a_design_is_written_with_its_bound_and_its_picture(tmp_path: Path):
+    table, page = tmp_path / "design.csv", tmp_path / "design.html"
+    result = invoke("design", "--count", "12", "--json", "-", "--out", str(table), "--report", str(page))
+    assert result.exit_code == 0, result.output
+    numbers = json.loads(result.stdout)
+    assert set(numbers) >= {"criterion", "count", "b3", "bound", "seconds", "peak_mb"}
+    assert 0.9 * numbers["bound"] < numbers["b3"] <= numbers["bound"]
+    q = np.loadtxt(table, delimiter=",", skiprows=1)
+    robot = load_robot("irb1200")
+    assert q.shape == (12, 6)
+    assert (q >= robot.lower).all()
+    assert (q <= robot.upper).all()
+    assert "plotly" in page.read_text()
+
+
+def test_a_calibration_tells_what_it_is_worth(calibrated: Path):
+    result = json.loads((calibrated / "result.json").read_text())
+    assert result["identifiable"] == 30
+    assert result["parameters"]["max_abs_error"] < 1e-5  # the true robot has dependent errors too
+    validation = result["validation"]
+    assert max(validation["before"]["mean_mm"]) > 10.0
+    assert max(validation["after"]["max_mm"]) < 5e-3  # twice what still oscillates when it counts as rest
+    assert max(validation["after_noise_free"]["max_mm"]) < 5e-3
+    path = result["path"]
+    assert max(path["after"]["static_mm"]) < 0.02 < 1.0 < max(path["before"]["static_mm"])
+    assert result["design"]["b3"] <= result["design"]["bound"]
+
+
+def test_its_tables_serve_as_measurements_and_give_the_same_robot(calibrated: Path, tmp_path: Path):
+    tables = [
+        "--measurements",
+        str(calibrated / "measurements.csv"),
+        "--validation",
+        str(calibrated / "validation.csv"),
+    ]
+    again = tmp_path / "again.yaml"
+    result = invoke("calibrate", *tables, "--write", str(again), "--out", str(tmp_path), "--json", "-")
+    assert result.exit_code == 0, result.output
+    numbers = json.loads(result.stdout)
+    assert numbers["path"] is None
+    assert max(numbers["validation"]["after"]["max_mm"]) < 5e-3
+    one, two = load_robot(str(calibrated / "robot.yaml")), load_robot(str(again))
+    for a, b in zip(one.joints, two.joints, strict=True):
+        np.testing.assert_allclose(a.placement.translation, b.placement.translation, atol=1e-12)
+
+
+def test_a_run_with_the_calibrated_robot_is_on_its_path_without_a_camera(calibrated: Path, tmp_path: Path):
+    robot = str(calibrated / "robot.yaml")
+    result = invoke("run", "--law", "open_loop", "--robot", robot, *SMALL, "--out", str(tmp_path))
+    assert result.exit_code == 0, result.output
+    summary = json.loads((tmp_path / "summary.json").read_text())
+    assert max(summary["runs"]["open_loop"]["true"]["static_mm"]) < 0.02
+    other = invoke("run", "--robot", robot, "--set", "robot=other.yaml", *SMALL, "--out", str(tmp_path))
+    assert other.exit_code == 2
+    assert "was calibrated on 'irb1200', the scenario has 'other.yaml'" in other.stderr
+
+
+def test_bad_rows_are_named_and_do_no_harm(calibrated: Path, tmp_path: Path):
+    lines = (calibrated / "measurements.csv").read_text().splitlines()
+    lines[3] = lines[3].replace(lines[3].split(",")[6], "nan", 1)
+    cells = lines[6].split(",")
+    cells[6] = repr(float(cells[6]) + 1.0)  # a pose one metre off
+    lines[6] = ",".join(cells)
+    (tmp_path / "bad.csv").write_text("\n".join(lines))
+    result = invoke(
+        "calibrate", "--measurements", str(tmp_path / "bad.csv"), "--out", str(tmp_path), "--json", "-"
+    )
+    assert result.exit_code == 0, result.output
+    assert "line 4: x_m is not finite" in " ".join(result.stderr.split())
+    assert json.loads(result.stdout)["outliers"] == [7]
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (["design", "--count", "3"], "count must be between 5"),
+        (["design", "--criterion", "x"], "criterion must be one of b3, d, i, got 'x'"),
+        (["design", "--robot", "none"], "robot 'none': no file"),
+        (["design", "--camera", "here"], "--camera must be three numbers in m such as 1.5,0,1.2, got 'here'"),
+        (["calibrate", "--noise", "loud"], "--noise must be one of none, source, got 'loud'"),
+        (["calibrate", "--validation", "x.csv"], "--validation needs --measurements"),
+        (["calibrate", "--measurements", "none.csv"], "measurements none.csv: cannot be read"),
+        (["calibrate", "--count", "2"], "--count must be at least 5, got 2"),
+    ],
+)
+def test_wrong_arguments_are_refused_in_one_line(
+    arguments: list[str], message: str, tmp_path: Path, monkeypatch
+):
+    monkeypatch.chdir(tmp_path)
+    result = invoke(*arguments)
+    assert result.exit_code == 2
+    assert message in result.stderr
+    assert len(result.stderr.strip().splitlines()) == 1
+    assert list(tmp_path.iterdir()) == []  # nothing half-written
+
+
+def test_measurements_that_hide_parameters_are_refused_by_name(calibrated: Path, tmp_path: Path):
+    lines = (calibrated / "measurements.csv").read_text().splitlines()
+    (tmp_path / "few.csv").write_text("\n".join(lines[:5]))
+    result = invoke("calibrate", "--measurements", str(tmp_path / "few.csv"), "--out", str(tmp_path / "out"))
+    assert result.exit_code == 2
+    assert "4 measurements do not determine" in result.stderr
+    assert not (tmp_path / "out").exists()
+
+
+def test_the_page_of_a_calibration_opens_offline_without_errors(calibrated: Path):
+    opened = open_page(calibrated / "report.html")
+    # The three-dimensional picture draws advice on speed from the browser.
+    advice = ("Canvas2D", "[.WebGL", "[GroupMarkerNotSet")
+    assert not [line for line in opened.console if not line.startswith(advice)]
+    assert opened.dom.count("js-plotly-plot") >= 3
+
+
+def test_the_written_measurements_can_be_read_by_others(calibrated: Path):
+    table, problems = read_measurements(calibrated / "measurements.csv")
+    assert len(table) == 20
+    assert problems == []

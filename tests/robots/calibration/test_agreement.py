@@ -1,0 +1,68 @@
+"""An independent implementation, figaroh on pinocchio, identifies the same robot from the same data.
+
+Where it is not installed (``pip install -e ".[agreement]"``) this test is skipped.
+"""
+
+import numpy as np
+import pytest
+from scipy.optimize import least_squares
+
+from robots.calibration.identification import identify
+from robots.calibration.measurements import SOURCE_NOISE, Measurements
+from robots.error_kinematics import ErrorKinematics
+from robots.error_parameters import NUM_PARAMETERS
+from robots.kinematics import Kinematics
+from robots.model import Placement, load_robot
+from robots.urdf import urdf_text
+
+tools = pytest.importorskip("figaroh.calibration.calibration_tools", reason="figaroh is not installed")
+pinocchio = pytest.importorskip("pinocchio", reason="pinocchio is not installed")
+
+
+def test_predictions_of_both_agree_on_noisy_positions():
+    """Least squares of positions have one minimum, however the parameters are chosen.
+
+    figaroh moves the six placements and the marker, 39 numbers, by finite differences; both stop within
+    1e-11 m of the minimum.
+    """
+    robot = load_robot("irb1200")
+    robot.tool = Placement(np.array([0.03, -0.05, 0.21]), np.array([-75.0, 40.0, 12.0]))
+    rng = np.random.default_rng(0)
+    q = rng.uniform(0.9 * robot.lower, 0.9 * robot.upper, (60, 6))
+    X_WE = ErrorKinematics(robot).forward(q, 5e-3 * rng.normal(size=NUM_PARAMETERS))
+    table = Measurements(q, X_WE[:, :3, 3], X_WE[:, :3, :3]).noisy(SOURCE_NOISE, rng).without_rotation()
+    ours = identify(robot, table)
+
+    model = pinocchio.buildModelFromXML(urdf_text(robot))
+    data = model.createData()
+    joints = [f"joint_{number}" for number in range(1, 7)]
+    names = [f"{axis}_{joint}" for joint in joints for axis in tools.FULL_PARAMTPL]
+    names += [f"{axis}_1" for axis in tools.EE_TPL[:3]]
+    config = {
+        "calib_model": "full_params",
+        "param_name": names,
+        "start_frame": "universe",
+        "end_frame": "tool",
+        "non_geom": False,
+        "actJoint_idx": [model.getJointId(joint) for joint in joints],
+        "measurability": [True, True, True, False, False, False],
+        "calibration_index": 3,
+        "NbMarkers": 1,
+    }
+
+    def predicted(x: np.ndarray, q: np.ndarray) -> np.ndarray:
+        flat = tools.calc_updated_fkm(model, data, x, q, {**config, "NbSample": len(q)})
+        return flat.reshape(3, len(q)).T
+
+    def residuals(x: np.ndarray) -> np.ndarray:
+        return (predicted(x, table.q) - table.position).ravel()
+
+    theirs = least_squares(
+        residuals, np.zeros(len(names)), method="trf", jac="3-point", xtol=1e-14, ftol=1e-14, gtol=1e-14
+    )
+    fresh = rng.uniform(robot.lower, robot.upper, (100, 6))
+    position = Kinematics(ours.calibrated_robot()).forward(fresh)[:, :3, 3]
+    assert np.abs(predicted(theirs.x, fresh) - position).max() < 1e-9  # 1e-6 mm
+    assert (
+        np.abs(predicted(np.zeros(len(names)), fresh) - position).max() > 1e-3
+    )  # there was an error to find
