@@ -62,9 +62,12 @@ class Experiment:
         robot = robot or drawn
         builder = DiagramBuilder()
         drive = scenario.servo.laws.get(law, LawConfig()).drive
-        self.station = builder.AddNamedSystem("station", SimulatedStation(drawn, scenario.station, drive))
+        has_torque = scenario.servo.feedforward.kind != "none"
+        self.station = builder.AddNamedSystem(
+            "station", SimulatedStation(drawn, scenario.station, drive, takes_torque=has_torque)
+        )
         self.servo = builder.AddNamedSystem("servo", Servo(robot, scenario, law))
-        for name in ("position_command", "velocity_command"):
+        for name in ("position_command", "velocity_command", *(["torque_feedforward"] if has_torque else [])):
             builder.Connect(self.servo.GetOutputPort(name), self.station.GetInputPort(name))
         for name in ("joint_sample", "pose_sample"):
             builder.Connect(self.station.GetOutputPort(name), self.servo.GetInputPort(name))

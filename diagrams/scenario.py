@@ -16,6 +16,7 @@ from robots.model import NUM_JOINTS
 from robots.plant import ELASTICITIES
 from systems.camera import CameraConfig
 from systems.drive import KINDS, DriveConfig
+from systems.feedforward import FEEDFORWARDS, FeedforwardConfig
 from systems.guard import GuardConfig
 from systems.paths import ReferenceConfig
 from systems.servo import LAWS, LawConfig
@@ -41,6 +42,7 @@ class ServoConfig:
     """The controller: gains of each law, and the guard."""
 
     laws: dict[str, LawConfig] = field(default_factory=lambda: {name: LawConfig() for name in LAWS})
+    feedforward: FeedforwardConfig = field(default_factory=FeedforwardConfig)
     guard: GuardConfig = field(default_factory=GuardConfig)
 
 
@@ -77,6 +79,8 @@ _RANGES: dict[str, tuple[float, float, str]] = {
     "reference.settle": (0.0, 600.0, "s"),
     "reference.dwell": (0.0, 600.0, "s"),
     "reference.preview": (0.0, 1.0, "s"),
+    "servo.feedforward.stiffness_error": (-0.9, 10.0, ""),
+    "servo.feedforward.inertia_error": (-0.9, 10.0, ""),
     "servo.guard.hold_after": (1e-3, 10.0, "s"),
     "servo.guard.stop_after": (1e-3, 60.0, "s"),
     "servo.guard.stop_time": (1e-3, 10.0, "s"),
@@ -138,6 +142,7 @@ def _check(scenario: Scenario) -> None:
         for label, bounds in _LAW_RANGES.items():
             _in_range(f"servo.laws.{law}.{label}", getattr(config, label), bounds)
     _one_of("law", scenario.law, LAWS)
+    _one_of("servo.feedforward.kind", scenario.servo.feedforward.kind, ("none", *FEEDFORWARDS))
     _one_of("station.kind", scenario.station.kind, ("simulated",))
     _one_of("station.elasticity", scenario.station.elasticity, ELASTICITIES)
     integrator = scenario.integrator

@@ -1,9 +1,11 @@
 """The controller as a diagram: the same one against a simulated and against a real station."""
 
 from pydrake.systems.framework import Diagram, DiagramBuilder
+from pydrake.systems.primitives import Adder
 
 from diagrams.scenario import Scenario
-from robots.model import RobotModel
+from robots.model import NUM_JOINTS, RobotModel
+from systems.feedforward import FEEDFORWARDS
 from systems.guard import CommandGuard
 from systems.reference import Reference
 from systems.servo import BLIND_LAWS, LAWS, LawConfig
@@ -17,6 +19,7 @@ class Servo(Diagram):
         in  ``pose_sample``       PoseSample
         out ``position_command``  vector 6 in rad
         out ``velocity_command``  vector 6 in rad/s
+        out ``torque_feedforward``  vector 6 in N m, only with a feedforward
     and to look at:
         out ``X_WE_desired``      RigidTransform
         out ``correction``        vector 6 in rad and m, rotation first
@@ -49,6 +52,8 @@ class Servo(Diagram):
                 payload=scenario.station.payload,
             ),
         )
+        feedforward = scenario.servo.feedforward
+        has_torque = feedforward.kind != "none"
         guard = builder.AddNamedSystem(
             "guard",
             CommandGuard(
@@ -58,13 +63,35 @@ class Servo(Diagram):
                 config.correction_limit,
                 config.correction_limit_deg,
                 uses_camera=law not in BLIND_LAWS,
+                passes_torque=has_torque,
             ),
         )
         builder.Connect(self.reference.GetOutputPort("X_WE_preview"), servo.GetInputPort("X_WE_desired"))
         builder.Connect(self.reference.GetOutputPort("V_WE_preview"), servo.GetInputPort("V_WE_desired"))
-        for name in ("position_command", "velocity_command", "correction", "measurement"):
+        for name in ("correction", "measurement"):
             builder.Connect(servo.GetOutputPort(name), guard.GetInputPort(name))
         joints = builder.ExportInput(servo.GetInputPort("joint_sample"), "joint_sample")
+        commands = {name: servo.GetOutputPort(name) for name in ("position_command", "velocity_command")}
+        if has_torque:
+            model = FEEDFORWARDS[feedforward.kind](robot, feedforward, period, scenario.station.payload)
+            ahead = builder.AddNamedSystem("feedforward", model)
+            for name in ("X_WE", "V_WE", "A_WE"):
+                source = self.reference.GetOutputPort(f"{name}_preview")
+                builder.Connect(source, ahead.GetInputPort(f"{name}_desired"))
+            builder.ConnectInput(joints, ahead.GetInputPort("joint_sample"))
+            for name, offset in (
+                ("position_command", "position_offset"),
+                ("velocity_command", "velocity_offset"),
+            ):
+                total = builder.AddNamedSystem(f"{name}_with_feedforward", Adder(2, NUM_JOINTS))
+                builder.Connect(commands[name], total.get_input_port(0))
+                builder.Connect(ahead.GetOutputPort(offset), total.get_input_port(1))
+                commands[name] = total.get_output_port()
+            torque = guard.GetInputPort("torque_feedforward")
+            builder.Connect(ahead.GetOutputPort("torque_feedforward"), torque)
+            builder.ExportOutput(guard.GetOutputPort("torque_feedforward"), "torque_feedforward")
+        for name, port in commands.items():
+            builder.Connect(port, guard.GetInputPort(name))
         builder.ConnectInput(joints, guard.GetInputPort("joint_sample"))
         builder.ExportInput(servo.GetInputPort("pose_sample"), "pose_sample")
         builder.ExportOutput(guard.GetOutputPort("position_command"), "position_command")

@@ -8,6 +8,7 @@ from pydrake.multibody.plant import MultibodyPlant
 from pydrake.systems.framework import Context, Diagram, DiagramBuilder
 from pydrake.systems.primitives import (
     ConstantVectorSource,
+    DiscreteTimeDelay,
     RandomSource,
     Selector,
     SelectorParams,
@@ -45,6 +46,8 @@ class SimulatedStation(Diagram):
         in  ``velocity_command``  vector 6 in rad/s
         out ``joint_sample``      JointSample
         out ``pose_sample``       PoseSample
+    and if its drives take it:
+        in  ``torque_feedforward``  vector 6 in N m, joint side
 
     Only a simulated station has these; nothing but logs and metrics may use them:
         out ``truth.X_WE``          RigidTransform
@@ -52,7 +55,14 @@ class SimulatedStation(Diagram):
         out ``truth.motor_torque``  vector 6 in N m, joint side
     """
 
-    def __init__(self, robot: RobotModel, config: StationConfig, drive: str, with_log: bool = True) -> None:
+    def __init__(
+        self,
+        robot: RobotModel,
+        config: StationConfig,
+        drive: str,
+        with_log: bool = True,
+        takes_torque: bool = False,
+    ) -> None:
         """Builds the cell.
 
         Args:
@@ -60,6 +70,7 @@ class SimulatedStation(Diagram):
             config: the station part of a scenario.
             drive: ``"position"``, ``"velocity"`` or ``"cascade"``.
             with_log: whether `record` will be asked for what has happened.
+            takes_torque: whether the drives take a torque feedforward.
 
         Raises:
             ValueError: if a part refuses its configuration.
@@ -73,7 +84,6 @@ class SimulatedStation(Diagram):
             "drive", Drive(robot, drive, config.drive, config.period, config.payload)
         )
         motor_state = builder.AddNamedSystem("motor_state", motor_state_selector(self.robot))
-        no_torque = builder.AddNamedSystem("no_feedforward", ConstantVectorSource(np.zeros(NUM_JOINTS)))
         sensor = builder.AddNamedSystem("joint_sensor", JointSensor(_RUNAWAY * float(robot.speed.max())))
         tip = builder.AddNamedSystem("tip", TipPose(self.robot))
         camera = builder.AddNamedSystem("camera", PoseCamera(config.camera))
@@ -86,7 +96,16 @@ class SimulatedStation(Diagram):
         torque = self.drive.GetOutputPort("motor_torque")
         builder.Connect(state, motor_state.get_input_port())
         builder.Connect(motor_state.get_output_port(), self.drive.GetInputPort("motor_state"))
-        builder.Connect(no_torque.get_output_port(), self.drive.GetInputPort("torque_feedforward"))
+        ahead = self.drive.GetInputPort("torque_feedforward")
+        if takes_torque:
+            # As late as the positions that it belongs to. The delay takes one period to read its input.
+            delay = round((config.drive.command_delay + config.drive.dead_time) / config.period) - 1
+            late = builder.AddNamedSystem("torque_delay", DiscreteTimeDelay(config.period, delay, NUM_JOINTS))
+            builder.ExportInput(late.get_input_port(), "torque_feedforward")
+            builder.Connect(late.get_output_port(), ahead)
+        else:
+            no_torque = builder.AddNamedSystem("no_feedforward", ConstantVectorSource(np.zeros(NUM_JOINTS)))
+            builder.Connect(no_torque.get_output_port(), ahead)
         builder.Connect(self.drive.GetOutputPort("joint_torque"), self.plant.get_actuation_input_port())
         builder.Connect(motor_state.get_output_port(), sensor.GetInputPort("motor_state"))
         builder.Connect(torque, sensor.GetInputPort("motor_torque"))

@@ -23,7 +23,7 @@ from experiments.console import count, print_list, progress_bar, refusing
 from experiments.design_command import design_command
 from experiments.diagram_view import write_diagram
 from experiments.live import LiveView, advance_live
-from experiments.options import OutOption, RobotOption, ScenarioOption, SetOption
+from experiments.options import FeedforwardOption, OutOption, RobotOption, ScenarioOption, SetOption
 from experiments.prepare import Prepared, check, prepare
 from experiments.report import verdict
 from experiments.results import RESULTS, write_results
@@ -76,6 +76,7 @@ def compare_command(
     scenario: ScenarioOption = "misaligned",
     settings: SetOption = None,
     robot: RobotOption = None,
+    feedforward: FeedforwardOption = None,
     out: OutOption = Path("out"),
     json_file: Annotated[
         str | None,
@@ -98,7 +99,7 @@ def compare_command(
             name, number = ("--cycles", cycles) if cycles < 1 else ("--jobs", jobs)
             raise ValueError(f"{name} must be at least 1, got {number}")
         cycles = 1 if is_quick else cycles
-        prepared = prepare(scenario, settings or [], robot, is_quick)
+        prepared = prepare(scenario, _settings(settings, None, feedforward), robot, is_quick)
         check(prepared, list(COMPARED_LAWS))
     with refusing(OSError), ExitStack() as stack:
         stage = stack.enter_context(staged_folder(out))
@@ -124,6 +125,7 @@ def run_command(
     scenario: ScenarioOption = "misaligned",
     settings: SetOption = None,
     robot: RobotOption = None,
+    feedforward: FeedforwardOption = None,
     out: OutOption = Path("out"),
     meshcat: Annotated[bool, typer.Option("--meshcat", help="Show it live in a browser.")] = False,
     realtime: Annotated[
@@ -136,7 +138,7 @@ def run_command(
     with refusing(ValueError, OSError):
         if realtime is not None and not 0.0 < realtime < math.inf:
             raise ValueError(f"--realtime must be positive, got {realtime:g}")
-        prepared = prepare(scenario, [*(settings or []), *([f"law={law}"] if law else [])], robot)
+        prepared = prepare(scenario, _settings(settings, law, feedforward), robot)
         law = prepared.scenario.law
         check(prepared, [law])
     with refusing(OSError), ExitStack() as stack:
@@ -172,7 +174,7 @@ def diagram_command(
 ) -> None:
     """Draw the diagram that is simulated."""
     with refusing(ValueError, OSError):
-        prepared = prepare(scenario, [*(settings or []), *([f"law={law}"] if law else [])], robot)
+        prepared = prepare(scenario, _settings(settings, law, None), robot)
         experiment = Experiment(prepared.scenario, prepared.scenario.law, prepared.robot)
         with staged_file(out) as path:
             write_diagram(path, experiment.diagram, depth)
@@ -193,6 +195,12 @@ def scenarios_command() -> None:
 def robots_command() -> None:
     """List the robots that come with truetip."""
     print_list((name, load_robot(name).name) for name in shipped_robots())
+
+
+def _settings(settings: list[str] | None, law: str | None, feedforward: str | None) -> list[str]:
+    """The changes of a scenario that options of their own make, behind those of --set."""
+    own = {"law": law, "servo.feedforward.kind": feedforward}
+    return [*(settings or []), *(f"{key}={value}" for key, value in own.items() if value)]
 
 
 def _write(

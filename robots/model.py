@@ -171,6 +171,11 @@ class RobotModel:
         return self._drive_train("stiffness")
 
     @property
+    def joint_damping(self) -> np.ndarray:
+        """Damping of the gears, parallel to their stiffness, in N m s / rad, joint side, shape (6,)."""
+        return self._drive_train("damping")
+
+    @property
     def joint_viscous_friction(self) -> np.ndarray:
         """Viscous friction of the motors in N m s / rad on the link side, Probst (2024) eq. (2.63)."""
         return self.gear_ratio**2 * self._drive_train("viscous_friction")

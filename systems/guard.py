@@ -53,6 +53,10 @@ class CommandGuard(LeafSystem):
         in  ``joint_sample``      JointSample
         out ``position_command``  vector 6 in rad: always finite, in range, within the speed limits
         out ``velocity_command``  vector 6 in rad/s, likewise
+    and where torques are fed forward:
+        in  ``torque_feedforward``  vector 6 in N m
+        out ``torque_feedforward``  vector 6 in N m, zero while the law's command is not followed
+    in any case:
         out ``guard_status``      vector: how many ticks each of `KINDS` has happened, in that order
 
     The command that was issued last is the state; the output is computed from it and the law's newest
@@ -67,6 +71,7 @@ class CommandGuard(LeafSystem):
         correction_limit: float,
         correction_limit_deg: float,
         uses_camera: bool = True,
+        passes_torque: bool = False,
     ) -> None:
         """Checks the configuration.
 
@@ -77,6 +82,7 @@ class CommandGuard(LeafSystem):
             correction_limit: the law's limit in m; reaching it is counted.
             correction_limit_deg: the same for the orientation.
             uses_camera: False for a law that does without samples, so that a blind camera does not stop it.
+            passes_torque: whether there are ports for a torque feedforward.
 
         Raises:
             ValueError: if a time is not positive, or the stop would come before the hold.
@@ -126,6 +132,11 @@ class CommandGuard(LeafSystem):
         )
         for name, part in (("position_command", _POSITIONS), ("velocity_command", _VELOCITIES)):
             self.DeclareVectorOutputPort(name, NUM_JOINTS, self._slice(part), {self._next.ticket()})
+        if passes_torque:
+            torque = self.DeclareVectorInputPort("torque_feedforward", NUM_JOINTS)
+            self._torque = torque
+            prerequisites = {self._next.ticket(), torque.ticket()}
+            self.DeclareVectorOutputPort("torque_feedforward", NUM_JOINTS, self._calc_torque, prerequisites)
         self.DeclarePeriodicDiscreteUpdateEvent(period, 0.0, self._remember)
 
     def _slice(self, part: slice):
@@ -133,6 +144,12 @@ class CommandGuard(LeafSystem):
             output.set_value(self._next.Eval(context)[0][part])
 
         return calc
+
+    def _calc_torque(self, context: Context, output: BasicVector) -> None:
+        kinds, torque = self._next.Eval(context)[1], self._torque.Eval(context)
+        # A torque belongs to the motion that it was computed for.
+        follows = not {_NO_COMMAND, _STOPPED, _VELOCITY, _POSITION}.intersection(kinds)
+        output.set_value(torque if follows and np.isfinite(torque).all() else np.zeros(NUM_JOINTS))
 
     def _calc_next(self, context: Context, value) -> None:
         """The next state, which kinds of intervention it takes, and when the last sample arrived."""

@@ -30,7 +30,8 @@ class NumericalIk(ServoLaw):
 
     def _step(self, moment: Moment, memory: np.ndarray) -> Step:
         q_d, q, last_velocity = memory[:6], memory[6:12], memory[12:]
-        halfway = 0.5 * (q + q_d)
+        # Where both will be at this tick, to which the wanted pose and twist belong.
+        halfway = 0.5 * (q + q_d) + self.period * last_velocity
         X_WE, J = self._kinematics.forward_and_jacobian(halfway)
         correction = J @ (q - q_d)
         twists = np.empty((2, 6)).T  # columns that LAPACK need not copy

@@ -18,6 +18,7 @@ from robots.identifiability import identifiable_parameters
 from robots.kinematics import Kinematics
 from robots.model import load_robot
 from robots.plant import add_robot
+from robots.pose import pose_error
 
 ROBOT = load_robot("irb1200")
 MODEL = ErrorKinematics(ROBOT)
@@ -182,6 +183,22 @@ def test_the_compliant_kinematics_are_the_statics_of_the_elastic_plant():
         np.testing.assert_allclose(X_WE, table.X_WE, atol=1e-10)
         rigid = Kinematics(ROBOT).forward(table.q)
         assert np.abs(rigid - table.X_WE)[:, :3, 3].max() > 5e-4  # there is something to explain
+
+
+def test_the_compliant_jacobian_is_the_derivative_by_the_motors():
+    """Central differences of 1e-5 are right to 1e-10; the compliance's second order is some 1e-6."""
+    compliant = CompliantKinematics(
+        replace(
+            ROBOT, calibration=replace(ROBOT.calibration, compliance=(1.0 / ROBOT.joint_stiffness).tolist())
+        ),
+        7.0,
+    )
+    q, h = configurations(10, 11), 1e-5
+    J = compliant.jacobian(q)
+    for k, step in enumerate(h * np.eye(6)):
+        difference = pose_error(compliant.forward(q + step), compliant.forward(q - step)) / (2.0 * h)
+        np.testing.assert_allclose(J[..., k], difference, atol=2e-5)
+    assert np.abs(J - Kinematics(ROBOT).jacobian(compliant.link_positions(q))).max() > 2e-4
 
 
 def test_sag_is_left_by_the_geometry_and_explained_by_compliances():

@@ -1,0 +1,16 @@
+"""Rigid inverse dynamics as feedforward: the torque of a robot that does not bend."""
+
+import numpy as np
+
+from systems.feedforward.feedforward import Drive, Feedforward, JointReference
+
+
+class RigidFeedforward(Feedforward):
+    """Motors and links move alike; the torque is that of inverse dynamics with friction."""
+
+    memory_size = 0
+
+    def _drive(self, reference: JointReference, load: np.ndarray, memory: np.ndarray) -> Drive:
+        zero = np.zeros_like(load)
+        torque = self._motor_torque(reference.velocity, reference.acceleration, load)
+        return Drive(zero, zero, torque, memory)
