@@ -22,6 +22,7 @@ from experiments.compare import compare, simulating
 from experiments.console import count, print_list, progress_bar, refusing
 from experiments.design_command import design_command
 from experiments.diagram_view import write_diagram
+from experiments.frame_commands import align_command, chain_command, frame_command, tool_command
 from experiments.live import LiveView, advance_live
 from experiments.options import FeedforwardOption, OutOption, RobotOption, ScenarioOption, SetOption
 from experiments.prepare import Prepared, check, prepare
@@ -183,6 +184,10 @@ def diagram_command(
 
 app.command("design")(design_command)
 app.command("calibrate")(calibrate_command)
+app.command("frame")(frame_command)
+app.command("chain")(chain_command)
+app.command("tool")(tool_command)
+app.command("align")(align_command)
 
 
 @app.command("scenarios")

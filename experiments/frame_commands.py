@@ -1,6 +1,6 @@
 """``truetip frame``, ``chain``, ``tool`` and ``align``: frames and tools from measurements in text files."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Annotated, Any
@@ -10,17 +10,22 @@ import typer
 from pydrake.math import RigidTransform
 from rich.console import Console
 
-from experiments.frame_tables import MM, pose_json, print_facts, print_pose, print_residuals, write_json
+from experiments.console import refusing
+from experiments.frame_tables import MM, pose_json, print_facts, print_pose, print_residuals, write_result
 from robots.calibration.frame_chain import FrameChain, chain_of_frames
 from robots.calibration.frame_files import ORIENTATIONS, points_of, poses_of, transform_of
 from robots.calibration.frames import three_point_frame
-from robots.calibration.hand_eye import ROTATION_SIGMA, TRANSLATION_SIGMA, align_camera, align_hand_eye
+from robots.calibration.hand_eye import (
+    ROTATION_SIGMA,
+    TRANSLATION_SIGMA,
+    Alignment,
+    align_camera,
+    align_hand_eye,
+)
 from robots.calibration.least_squares import UndeterminedError
 from robots.calibration.number_table import NumberTable, parse_table, read_table
 from robots.calibration.point_registration import register_points
 from robots.calibration.tool_centre import tool_centre
-
-BAD_INPUT = 2  # exit code
 
 FilesArgument = Annotated[list[Path], typer.Argument(metavar="FILE...", show_default=False)]
 UnitOption = Annotated[str, typer.Option("--unit", metavar="mm|m", help="Unit of the lengths in the files.")]
@@ -53,20 +58,20 @@ def frame_command(files: FilesArgument, unit: UnitOption = "mm", json_file: Json
     console = Console(stderr=json_file == "-")
     poses: list[RigidTransform] = []
     frames: list[dict[str, Any]] = []
-    with _refusing():
+    with refusing(ValueError, OSError):
         for table in [read_table(path) for path in files]:
             with _blaming([table]):
                 X_DK, facts = _frame(table, unit)
             poses.append(X_DK)
             frames.append({"file": table.name, "pose": pose_json(X_DK), **facts})
+        relative = [poses[0].InvertAndCompose(X_DK) for X_DK in poses[1:]]
+        write_result({"frames": frames, "in_first_frame": [pose_json(X) for X in relative]}, json_file)
     for X_DK, frame in zip(poses, frames, strict=True):
         print_pose(console, frame["file"], X_DK)
         print_facts(console, frame)
         print_residuals(console, frame)
-    relative = [poses[0].InvertAndCompose(X_DK) for X_DK in poses[1:]]
     for path, X in zip(files[1:], relative, strict=True):
         print_pose(console, f"{path} in {files[0]}", X)
-    _write({"frames": frames, "in_first_frame": [pose_json(X) for X in relative]}, json_file)
 
 
 def _frame(table: NumberTable, unit: str) -> tuple[RigidTransform, dict[str, Any]]:
@@ -74,8 +79,8 @@ def _frame(table: NumberTable, unit: str) -> tuple[RigidTransform, dict[str, Any
     if table.columns == 3:
         if len(table.lines) not in (3, 4):
             raise table.error(
-                f"a frame takes three points (origin, x, y) or four (and z), got {len(table.lines)}; for more "
-                "of them, write nominal and measured coordinates, six numbers a line"
+                f"a frame takes three points (origin, x, y) or four (and z), got {len(table.lines)}; for "
+                "more, write nominal and measured coordinates, six numbers a line"
             )
         frame = three_point_frame(points_of(table, unit))
         return frame.X_DK, {"skew_deg": np.rad2deg(frame.skew)}
@@ -87,7 +92,7 @@ def _frame(table: NumberTable, unit: str) -> tuple[RigidTransform, dict[str, Any
             "the standard deviation of a point must be positive", np.flatnonzero(deviations <= 0.0)
         )
     weights = np.square(deviations.min() / deviations)
-    fit = register_points(points_of(table, unit), points_of(table, unit, slice(3, 6)), weights)
+    fit = register_points(points_of(table, unit, slice(0, 3)), points_of(table, unit, slice(3, 6)), weights)
     deviations = fit.statistics.standard_deviations
     return fit.X_DK, {
         "rms_mm": MM * fit.rms,
@@ -116,25 +121,25 @@ def chain_command(
     with the four lines of its homogeneous matrix.
     """
     console = Console(stderr=json_file == "-")
-    with _refusing():
+    with refusing(ValueError, OSError):
         tables = [read_table(path) for path in files]
         with _blaming(tables):
             if all(table.columns == 4 for table in tables):
                 chain = FrameChain(tuple(RigidTransform(transform_of(table, unit)) for table in tables))
             else:
                 chain = chain_of_frames([points_of(table, unit) for table in tables], is_closed)
+        facts: dict[str, Any] = {}
+        if is_closed:
+            facts["closing_distance_mm"] = MM * chain.closing_distance
+            facts["closing_angle_deg"] = np.rad2deg(chain.closing_angle)
+        if any(rms is not None for rms in chain.repeat_rms):
+            facts["repeat_rms_mm"] = [None if rms is None else MM * rms for rms in chain.repeat_rms]
+        links = [pose_json(X) for X in chain.links]
+        write_result({"links": links, "chain": pose_json(chain.X_0N), **facts}, json_file)
     for number, X in enumerate(chain.links, 1):
         print_pose(console, f"frame {number} in frame {number - 1}", X)
     print_pose(console, f"the whole chain: frame {len(chain.links)} in frame 0", chain.X_0N)
-    facts: dict[str, Any] = {}
-    if is_closed:
-        facts["closing_distance_mm"] = MM * chain.closing_distance
-        facts["closing_angle_deg"] = np.rad2deg(chain.closing_angle)
-    if any(chain.repeat_rms):
-        facts["repeat_rms_mm"] = [rms and MM * rms for rms in chain.repeat_rms]
     print_facts(console, facts)
-    links = [pose_json(X) for X in chain.links]
-    _write({"links": links, "chain": pose_json(chain.X_0N), **facts}, json_file)
 
 
 def tool_command(
@@ -149,7 +154,7 @@ def tool_command(
 ) -> None:
     """The tool centre point by pivoting: the tip stays on one spot, every line is a pose of the flange."""
     console = Console(stderr=json_file == "-")
-    with _refusing():
+    with refusing(ValueError, OSError):
         table = read_table(file)
         X_BF = poses_of(table, unit, angles, orientation)
         rows = np.arange(len(X_BF))
@@ -159,22 +164,22 @@ def tool_command(
             if without_outliers and outliers:
                 rows = np.delete(rows, outliers)
                 tool = tool_centre(X_BF[rows])
-    half_widths = MM * tool.statistics.half_widths()
-    result = {
-        "tool_mm": MM * tool.p_FE,
-        "tool_confidence_95_mm": half_widths[:3],
-        "pivot_mm": MM * tool.p_BP,
-        "pivot_confidence_95_mm": half_widths[3:],
-        "standard_deviation_of_a_pose_mm": MM * tool.standard_deviation_of_a_pose,
-        "standard_deviation_of_a_coordinate_mm": MM * tool.statistics.sigma,
-        "degrees_of_freedom": tool.statistics.degrees_of_freedom,
-        "outlier_lines": [table.lines[row] for row in outliers],
-        "residual_lines": [table.lines[row] for row in rows],
-        "residuals_mm": MM * tool.residual,
-    }
+        half_widths = MM * tool.statistics.half_widths()
+        result = {
+            "tool_mm": MM * tool.p_FE,
+            "tool_confidence_95_mm": half_widths[:3],
+            "pivot_mm": MM * tool.p_BP,
+            "pivot_confidence_95_mm": half_widths[3:],
+            "standard_deviation_of_a_pose_mm": MM * tool.standard_deviation_of_a_pose,
+            "standard_deviation_of_a_coordinate_mm": MM * tool.statistics.sigma,
+            "degrees_of_freedom": tool.statistics.degrees_of_freedom,
+            "outlier_lines": [table.lines[row] for row in outliers],
+            "residual_lines": [table.lines[row] for row in rows],
+            "residuals_mm": MM * tool.residual,
+        }
+        write_result(result, json_file)
     print_facts(console, result)
     print_residuals(console, result)
-    _write(result, json_file)
 
 
 def align_command(
@@ -183,7 +188,7 @@ def align_command(
     angles: AnglesOption = "deg",
     orientation: OrientationOption = "ZYX",
     body_on_flange: Annotated[
-        str | None, typer.Option(metavar="POSE", help="The body on the flange, if known: x;y;z;... ")
+        str | None, typer.Option(metavar="POSE", help="The body on the flange, if known: x;y;z;...")
     ] = None,
     camera_in_base: Annotated[
         str | None, typer.Option(metavar="POSE", help="The camera in the robot's base, if known: x;y;z;...")
@@ -206,14 +211,12 @@ def align_command(
     """
     console = Console(stderr=json_file == "-")
     sigmas = np.deg2rad(rotation_sigma_deg), translation_sigma_mm / MM
-    with _refusing():
+    with refusing(ValueError, OSError):
         flange, body = _two_halves([read_table(path) for path in files])
         X_BF, X_CD = (poses_of(half, unit, angles, orientation) for half in (flange, body))
         given = {"--body-on-flange": body_on_flange, "--camera-in-base": camera_in_base}
         X_FD, X_BC = (
-            None
-            if text is None
-            else RigidTransform(poses_of(parse_table(text, name), unit, angles, orientation)[0])
+            None if text is None else _single_pose(parse_table(text, name), unit, angles, orientation)
             for name, text in given.items()
         )
         if camera_on_flange and any(given.values()):
@@ -225,28 +228,41 @@ def align_command(
             else:
                 names = ("body_on_flange", "camera_in_base")
                 alignment = align_camera(X_BF, X_CD, X_FD, X_BC, *sigmas)
-    result: dict[str, Any] = {}
-    deviations = alignment.statistics.standard_deviations.reshape(2, 2, 3)
-    for name, X, (rotation, translation) in zip(
-        names, (alignment.X_FD, alignment.X_BC), deviations, strict=True
-    ):
+        poses = dict(zip(names, (alignment.X_FD, alignment.X_BC), strict=True))
+        result = _alignment(alignment, poses, body)
+        write_result(result, json_file)
+    for name, X in poses.items():
         print_pose(console, name.replace("_", " "), X)
-        result[name] = pose_json(X)
+    print_facts(console, result)
+    print_residuals(console, result)
+
+
+def _alignment(
+    alignment: Alignment, poses: Mapping[str, RigidTransform], table: NumberTable
+) -> dict[str, Any]:
+    """What is to be said about two poses that were found by their names, and about the fit."""
+    result: dict[str, Any] = {name: pose_json(X) for name, X in poses.items()}
+    deviations = alignment.statistics.standard_deviations.reshape(2, 2, 3)
+    for name, (rotation, translation) in zip(poses, deviations, strict=True):
         result[f"{name}_rotation_standard_deviation_deg"] = np.rad2deg(rotation)
         result[f"{name}_translation_standard_deviation_mm"] = MM * translation
-    result |= {
+    return result | {
         "rotation_rms_deg": np.rad2deg(alignment.rotation_rms),
         "translation_rms_mm": MM * alignment.translation_rms,
         "sigma_over_assumed": alignment.statistics.sigma,
         "degrees_of_freedom": alignment.statistics.degrees_of_freedom,
-        "outlier_lines": [body.lines[row] for row in alignment.statistics.outliers],
-        "residual_lines": list(body.lines),
+        "outlier_lines": [table.lines[row] for row in alignment.statistics.outliers],
+        "residual_lines": list(table.lines),
         "residuals_mm": MM * alignment.residual[:, 3:],
         "residuals_deg": np.rad2deg(alignment.residual[:, :3]),
     }
-    print_facts(console, result)
-    print_residuals(console, result)
-    _write(result, json_file)
+
+
+def _single_pose(table: NumberTable, unit: str, angles: str, orientation: str) -> RigidTransform:
+    (X, *others) = poses_of(table, unit, angles, orientation)
+    if others:
+        raise table.error(f"one pose expected, got {len(table.lines)}")
+    return RigidTransform(X)
 
 
 def _two_halves(tables: Sequence[NumberTable]) -> tuple[NumberTable, NumberTable]:
@@ -273,18 +289,3 @@ def _blaming(tables: Sequence[NumberTable]) -> Iterator[None]:
         yield
     except UndeterminedError as error:
         raise tables[error.part].error(str(error), error.rows) from error
-
-
-@contextmanager
-def _refusing() -> Iterator[None]:
-    """Turns what the user can mend into one line and an exit code."""
-    try:
-        yield
-    except (ValueError, OSError) as error:
-        typer.echo(f"truetip: {' '.join(str(error).split())}", err=True)
-        raise typer.Exit(BAD_INPUT) from error
-
-
-def _write(result: dict[str, Any], json_file: str | None) -> None:
-    with _refusing():
-        write_json(result, json_file)

@@ -1,6 +1,5 @@
 """Frames, tools and alignments as people read them: in mm and degrees, on a terminal and as JSON."""
 
-import json
 import math
 import sys
 from collections.abc import Mapping
@@ -13,6 +12,7 @@ from rich.console import Console
 from rich.markup import escape
 from rich.table import Table
 
+from experiments.metrics import json_text
 from experiments.staging import staged_file
 from robots.pose import zyx_from_rotation
 
@@ -36,10 +36,10 @@ def print_pose(console: Console, title: str, X: RigidTransform) -> None:
     for name in ("x axis", "y axis", "z axis", "origin mm"):
         table.add_column(name, justify="right", no_wrap=True)
     for name, row, coordinate in zip("xyz", X.rotation().matrix(), MM * X.translation(), strict=True):
-        table.add_row(name, *(f"{value:.6f}" for value in row), f"{coordinate:.4f}")
+        table.add_row(name, *(f"{value:z.6f}" for value in row), f"{coordinate:z.4f}")
     console.print(table)
     alpha, beta, gamma = np.rad2deg(zyx_from_rotation(X.rotation().matrix()))
-    console.print(f"  ZYX angles {alpha:.4f}°, {beta:.4f}°, {gamma:.4f}°\n")
+    console.print(f"  ZYX angles {alpha:z.4f}°, {beta:z.4f}°, {gamma:z.4f}°\n")
 
 
 def print_facts(console: Console, result: Mapping[str, Any]) -> None:
@@ -69,7 +69,7 @@ def print_residuals(console: Console, result: Mapping[str, Any]) -> None:
     table.add_column("")
     for row, line in enumerate(result["residual_lines"]):
         vectors = [result[name][row] for name in units]
-        cells = [f"{value:.4f}" for vector in vectors for value in (*vector, np.linalg.norm(vector))]
+        cells = [f"{value:z.4f}" for vector in vectors for value in (*vector, np.linalg.norm(vector))]
         table.add_row(str(line), *cells, "outlier" if line in result["outlier_lines"] else "")
     console.print(table)
 
@@ -80,10 +80,10 @@ def _text(value: Any) -> str:
         return ", ".join(_text(item) for item in value) or "none"
     if value is None or math.isnan(value):
         return "–"
-    return str(value) if isinstance(value, int) else f"{value:.4f}"
+    return str(value) if isinstance(value, int) else f"{value:z.4f}"
 
 
-def write_json(result: Mapping[str, Any], file: str | None) -> None:
+def write_result(result: Mapping[str, Any], file: str | None) -> None:
     """Writes a result to a file, to stdout for ``-``, or nowhere; numbers that do not exist are null.
 
     Raises:
@@ -91,7 +91,7 @@ def write_json(result: Mapping[str, Any], file: str | None) -> None:
     """
     if file is None:
         return
-    text = json.dumps(_plain(result), indent=2, allow_nan=False) + "\n"
+    text = json_text(_plain(result))
     if file == "-":
         sys.stdout.write(text)
         return

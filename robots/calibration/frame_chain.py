@@ -69,6 +69,8 @@ def chain_of_frames(sights: Sequence[np.ndarray], closed: bool = False) -> Frame
     for part, points in enumerate(sights):
         first = _first_sight(part, len(sights), closed)
         try:
+            if len(points) < 3:
+                raise UndeterminedError(f"a frame takes at least three points, got {len(points)}")
             X = three_point_frame(points[:3]).X_DK
             if first < part:
                 X, rms = _seen_again(X_DK[first], sights[first], X, points)
@@ -97,7 +99,8 @@ def _seen_again(
         nominal = (first - X_first.translation()) @ X_first.rotation().matrix()
         fit = register_points(nominal, again)
         return fit.X_DK, fit.rms
-    ratio = np.ptp(again, axis=0).max() / np.ptp(first, axis=0).max()
+    sizes = [np.linalg.norm(points - points[0], axis=1).max() for points in (first, again)]
+    ratio = sizes[1] / sizes[0]
     if not 1.0 / _SIZE_RATIO < ratio < _SIZE_RATIO:
         raise UndeterminedError(
             f"the frame is {ratio:.3g} times as large as when it was first seen (are units mixed?)"

@@ -71,7 +71,7 @@ def fit_statistics(jacobian: np.ndarray, residual: np.ndarray, negligible: float
 
 
 def _outliers(jacobian: np.ndarray, residual: np.ndarray, negligible: float) -> tuple[int, ...]:
-    """Takes out the worst measurement and fits again, as long as the rest is better without it by chance.
+    """Takes out the worst measurement and fits again, as long as the fit gains more than chance would give.
 
     How much the fit gains by leaving one out follows from that fit alone, and its ratio to what remains
     is Fisher's F. The risk is shared by the n measurements (Bonferroni), since the worst of them is tested.

@@ -40,9 +40,7 @@ class Registration:
         return float(np.sqrt(np.mean(np.sum(self.residual**2, axis=1))))
 
 
-def register_points(
-    p_K: np.ndarray, p_D: np.ndarray, weights: np.ndarray | None = None
-) -> Registration:
+def register_points(p_K: np.ndarray, p_D: np.ndarray, weights: np.ndarray | None = None) -> Registration:
     """The pose X_DK that brings nominal points p_K to measured ones p_D with the least squared distance.
 
     Args:

@@ -51,16 +51,16 @@ def tool_centre(X_BF: np.ndarray) -> ToolCentre:
     X_BF = np.asarray(X_BF, dtype=float)
     n = len(X_BF)
     if n < MINIMUM_POSES:
-        reason = "; along the axis that turns one pose into the other, the tip stays unknown" if n == 2 else ""
+        reason = (
+            "; along the axis that turns one pose into the other, the tip stays unknown" if n == 2 else ""
+        )
         raise UndeterminedError(f"pivoting takes at least {MINIMUM_POSES} poses, got {n}{reason}")
     R_BF, p_BF = X_BF[:, :3, :3], X_BF[:, :3, 3]
     refuse_alike_orientations(R_BF, "flange")
     jacobian = np.concatenate([R_BF, np.broadcast_to(-np.eye(3), (n, 3, 3))], axis=-1)
     solution = np.linalg.lstsq(jacobian.reshape(3 * n, 6), -p_BF.ravel(), rcond=None)[0]
     residual = p_BF + jacobian @ solution
-    return ToolCentre(
-        solution[:3], solution[3:], residual, fit_statistics(jacobian, residual, _NEGLIGIBLE)
-    )
+    return ToolCentre(solution[:3], solution[3:], residual, fit_statistics(jacobian, residual, _NEGLIGIBLE))
 
 
 def refuse_alike_orientations(R: np.ndarray, body: str) -> None:
@@ -80,14 +80,15 @@ def refuse_alike_orientations(R: np.ndarray, body: str) -> None:
     tilt = np.arcsin(np.sqrt(np.clip(1.0 - shortened**2, 0.0, 1.0)))
     if tilt[0] >= MINIMUM_TILT:
         return
-    least = f"{np.rad2deg(MINIMUM_TILT):g}"
+    least = f"{np.rad2deg(MINIMUM_TILT):g} degrees"
     if tilt[1] < MINIMUM_TILT:
         raise UndeterminedError(
             f"the orientations of the {body} are too much alike: {np.rad2deg(tilt[2]):.2g} degrees about "
-            f"their mean, must be at least {least} about every axis"
+            f"their mean, must be at least {least} about every axis (are the angles in the right unit?)"
         )
     axis = directions[0] * np.sign(directions[0][np.argmax(np.abs(directions[0]))])
+    x, y, z = axis + 0.0
     raise UndeterminedError(
-        f"the {body} turns about one axis only, ({', '.join(f'{c + 0.0:.2f}' for c in axis)}) in its own frame: "
-        f"tilt it by at least {least} degrees about another one, or the offset along that axis stays unknown"
+        f"the {body} turns about one axis only, ({x:.2f}, {y:.2f}, {z:.2f}) in its own frame; tilt it by at "
+        f"least {least} about another one, or the offset along that axis stays unknown"
     )

@@ -1,0 +1,136 @@
+"""Text files of numbers: read strictly, refused by file and line.
+
+A line holds one measurement; its numbers are separated by ``;``, by ``,`` or by blanks, the same in the whole
+file. ``#`` begins a comment. Decimal commas are read where ``;`` or blanks separate; where commas do, "1,5"
+could be one number or two, and a file that could be read both ways is refused.
+"""
+
+import math
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+_NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?")
+_FRACTION = re.compile(r"\d+([eE][+-]?\d+)?")
+_DECIMAL_COMMA = re.compile(r"[+-]?(\d+,\d*|,\d+)([eE][+-]?\d+)?")
+
+
+class NumberFileError(ValueError):
+    """A file cannot be read as measurements; the message says in which line."""
+
+
+@dataclass(frozen=True)
+class NumberTable:
+    """The numbers of a file, one row a measurement."""
+
+    name: str  # of the file
+    values: np.ndarray  # (n, columns), as written
+    lines: tuple[int, ...]  # of the rows, from one
+
+    @property
+    def columns(self) -> int:
+        """How many numbers a row has."""
+        return self.values.shape[1]
+
+    def where(self, rows: Sequence[int] | np.ndarray = ()) -> str:
+        """File and lines of some rows, of all if none is given."""
+        lines = sorted(self.lines[row] for row in rows) or [self.lines[0], self.lines[-1]]
+        if len(set(lines)) == 1:
+            return f"{self.name}, line {lines[0]}"
+        return f"{self.name}, lines {lines[0]} to {lines[-1]}"
+
+    def error(self, message: str, rows: Sequence[int] | np.ndarray = ()) -> NumberFileError:
+        """The refusal of some rows, or of all."""
+        return NumberFileError(f"{self.where(rows)}: {message}")
+
+
+def read_table(path: str | Path) -> NumberTable:
+    """Reads the numbers of a file.
+
+    Raises:
+        NumberFileError: if the file is missing, empty, not text, not rectangular, or holds anything that
+            is not a finite number.
+    """
+    try:
+        text = Path(path).read_text(encoding="utf-8-sig")
+    except UnicodeDecodeError as error:
+        raise NumberFileError(f"{path}: not a text file in UTF-8") from error
+    except OSError as error:
+        raise NumberFileError(f"{path}: {(error.strerror or str(error)).lower()}") from error
+    return parse_table(text, str(path))
+
+
+def parse_table(text: str, name: str) -> NumberTable:
+    """The numbers of a text; ``name`` is where it came from.
+
+    Raises:
+        NumberFileError: see `read_table`.
+    """
+    numbered = [(number, line.split("#")[0].strip()) for number, line in enumerate(text.splitlines(), 1)]
+    lines = {number: line for number, line in numbered if line}
+    if not lines:
+        raise NumberFileError(f"{name}: no measurements, only comments or blank lines")
+    separator = _separator(list(lines.values()))
+    fields = {number: [field.strip() for field in line.split(separator)] for number, line in lines.items()}
+    _refuse_ragged_rows(name, fields)
+    if separator == ",":
+        _refuse_hidden_decimal_commas(name, fields)
+    _refuse_two_decimal_marks(name, fields)
+    values = [[_number(name, line, field) for field in row] for line, row in fields.items()]
+    return NumberTable(name, np.array(values), tuple(fields))
+
+
+def _separator(lines: Sequence[str]) -> str | None:
+    if any(";" in line for line in lines):
+        return ";"
+    # "1,5 2,0" are decimal commas between blanks; "1, 5, 2" has a comma in front of every blank.
+    if any("," in line for line in lines):
+        between_blanks = all(re.search(r"[^,\s]\s+[^,\s]", line) for line in lines)
+        return None if between_blanks else ","
+    return None
+
+
+def _refuse_ragged_rows(name: str, fields: dict[int, list[str]]) -> None:
+    (first, row), *others = fields.items()
+    for line, other in others:
+        if len(other) != len(row):
+            raise NumberFileError(
+                f"{name}, line {line}: {len(other)} numbers, but {len(row)} in line {first} "
+                "(decimal commas? then separate by ;)"
+            )
+
+
+def _refuse_hidden_decimal_commas(name: str, fields: dict[int, list[str]]) -> None:
+    """Without a point in the file, "1,5,2,0" may be four numbers or two."""
+    rows = list(fields.values())
+    if any("." in field for row in rows for field in row) or len(rows[0]) % 2:
+        return
+    if all(_FRACTION.fullmatch(field) for row in rows for field in row[1::2]):
+        raise NumberFileError(
+            f"{name}, line {next(iter(fields))}: may be decimal commas: every second number is a row of "
+            "digits and none has a point; separate by ; or write 1.0 for 1"
+        )
+
+
+def _refuse_two_decimal_marks(name: str, fields: dict[int, list[str]]) -> None:
+    marked = {mark: line for line, row in fields.items() for mark in ".," if any(mark in f for f in row)}
+    if len(marked) == 2:
+        raise NumberFileError(
+            f"{name}, line {max(marked.values())}: decimal points and decimal commas in one file"
+        )
+
+
+def _number(name: str, line: int, field: str) -> float:
+    value = math.nan
+    if _NUMBER.fullmatch(field):
+        value = float(field)
+    elif _DECIMAL_COMMA.fullmatch(field):
+        value = float(field.replace(",", "."))
+    if not math.isfinite(value):
+        raise NumberFileError(
+            f"{name}, line {line}: '{field}' is not a finite number (separators are ; or , or blanks)"
+        )
+    return value
