@@ -22,6 +22,7 @@ from experiments.compare import compare, simulating
 from experiments.console import count, print_list, progress_bar, refusing
 from experiments.design_command import design_command
 from experiments.diagram_view import write_diagram
+from experiments.drivetrain_command import drivetrain_command
 from experiments.frame_commands import align_command, chain_command, frame_command, tool_command
 from experiments.live import LiveView, advance_live
 from experiments.options import FeedforwardOption, OutOption, RobotOption, ScenarioOption, SetOption
@@ -184,6 +185,7 @@ def diagram_command(
 
 app.command("design")(design_command)
 app.command("calibrate")(calibrate_command)
+app.command("drivetrain")(drivetrain_command)
 app.command("frame")(frame_command)
 app.command("chain")(chain_command)
 app.command("tool")(tool_command)

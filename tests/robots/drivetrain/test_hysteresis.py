@@ -1,0 +1,138 @@
+"""Hysteresis operators: memory, exact inverse, and how near the smooth one comes."""
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from hypothesis.extra.numpy import arrays
+from scipy.integrate import trapezoid
+
+from robots.drivetrain.counterbalance import Counterbalance
+from robots.drivetrain.hysteresis import PrandtlIshlinskii, SmoothPrandtlIshlinskii, pade_delay, play
+from robots.drivetrain.motor import MotorLag
+from robots.drivetrain.parts import PARTS, part_from
+
+# The weights of table 2.1 with the thresholds from zero that the inverse needs (errata).
+OPERATOR = PrandtlIshlinskii((0.2, 0.2, 0.2, 0.2, 0.2), (0.0, 0.1, 0.2, 0.3, 0.4))
+signals = arrays(float, 50, elements=st.floats(-3.0, 3.0))
+
+
+@given(signals)
+def test_the_inverse_undoes_the_operator(x: np.ndarray):
+    inverse, starts = OPERATOR.inverse()
+    np.testing.assert_allclose(inverse.response(OPERATOR.response(x), starts), x, atol=1e-12)
+
+
+@given(signals, arrays(float, 5, elements=st.floats(-0.09, 0.09)))
+def test_and_from_any_start_that_the_operator_can_have(x: np.ndarray, start: np.ndarray):
+    start = play(0.0, start, np.array(OPERATOR.thresholds))
+    inverse, starts = OPERATOR.inverse(start)
+    np.testing.assert_allclose(inverse.response(OPERATOR.response(x, start), starts), x, atol=1e-12)
+
+
+def test_a_deflection_that_lags_its_torque_loses_energy_in_a_cycle():
+    """Torque times change of deflection; the inverse, a torque that leads its deflection, loses as much."""
+    x = np.sin(np.linspace(0.0, 4.0 * np.pi, 4001))
+    y = OPERATOR.response(x)
+    cycle = slice(2000, 4001)
+    work = trapezoid(x[cycle], y[cycle])
+    # Each play operator of threshold r loses 4 r (1 - r) in a cycle of amplitude one.
+    expected = sum(
+        w * 4.0 * r * (1.0 - r) for w, r in zip(OPERATOR.weights, OPERATOR.thresholds, strict=True)
+    )
+    assert work == pytest.approx(expected, rel=1e-3)
+    inverse, starts = OPERATOR.inverse()
+    torque = inverse.response(y, starts)
+    assert trapezoid(torque[cycle], y[cycle]) == pytest.approx(expected, rel=1e-3)
+
+
+def test_small_motions_move_only_the_operator_without_threshold():
+    x = np.concatenate([np.linspace(0.0, 1.0, 100), [1.0, 0.95, 1.0]])
+    y = OPERATOR.response(x)
+    assert y[-1] == pytest.approx(y[-3])
+    assert y[-3] - y[-2] == pytest.approx(0.2 * 0.05)
+
+
+@pytest.mark.parametrize("order", [1, 3, 6])
+def test_the_pade_delay_is_stable_and_late_by_its_delay(order: int):
+    """At low frequencies amplitude one and phase -w T, better with the order."""
+    numerator, denominator = pade_delay(0.01, order)
+    assert (np.roots(denominator).real < 0.0).all()
+    w = 2.0 * np.pi * np.array([0.1, 1.0])
+    response = np.polyval(numerator, 1j * w) / np.polyval(denominator, 1j * w)
+    np.testing.assert_allclose(response, np.exp(-1j * w * 0.01), atol=0.01 if order == 1 else 1e-7)
+
+
+def test_the_sixth_order_keeps_the_phase_to_50_hz():
+    """Errata of (2.18): 5e-5 degrees at 50 Hz for n = 6 and 10 ms."""
+    s = 2j * np.pi * 50.0
+    numerator, denominator = pade_delay(0.01, 6)
+    response = np.polyval(numerator, s) / np.polyval(denominator, s)
+    error = np.angle(response / np.exp(-1j * 2.0 * np.pi * 50.0 * 0.01), deg=True)
+    assert abs(error) == pytest.approx(5e-5, rel=0.2)
+
+
+def test_the_smooth_operator_approaches_the_exact_one():
+    times = np.arange(0.0, 4.0, 1e-3)
+    x = np.sin(0.5 * np.pi * times) * np.sin(2.0 * np.pi * times)
+    exact = OPERATOR.response(x)
+    gaps = [
+        np.abs(SmoothPrandtlIshlinskii(OPERATOR, sharpness, 0.01, 3).response(x, 1e-3) - exact).max()
+        for sharpness in (25.0, 100.0)
+    ]
+    assert gaps[1] < 0.4 * gaps[0] < 0.04
+
+
+def test_a_motor_follows_its_current_with_one_time_constant():
+    motor, torque = MotorLag(0.01, 2.0), 0.0
+    for _ in range(1000):
+        torque += 1e-5 * float(motor.torque_rate(np.array(torque), np.array(3.0)))
+    assert torque == pytest.approx(6.0 * (1.0 - np.exp(-1.0)), rel=1e-3)
+    assert motor.current(
+        np.array(torque), motor.torque_rate(np.array(torque), np.array(3.0))
+    ) == pytest.approx(3.0)
+
+
+def test_a_counterbalance_pulls_back_to_its_dead_centre_and_stores_what_it_takes():
+    spring = Counterbalance(2e5, 5e3, 0.6, 0.2, dead_centre_deg=-90.0)
+    q = np.linspace(-np.pi, 0.4, 200)
+    h = 1e-6
+    difference = -(spring.energy(q + h) - spring.energy(q - h)) / (2.0 * h)
+    np.testing.assert_allclose(spring.torque(q), difference, rtol=1e-5, atol=1e-2)
+    assert spring.torque(np.array(-np.pi / 2.0)) == pytest.approx(0.0, abs=1e-9)
+    assert spring.torque(np.array(0.0)) < 0.0 < spring.torque(np.array(-np.pi))
+
+
+def test_every_part_has_a_name_in_yaml_and_says_whether_it_can_be_inverted():
+    spring = part_from({"kind": "cubic_spring", "c_0": 2e4, "gamma": 500})
+    assert spring.torque(np.array(0.01)) == pytest.approx(2e4 * 0.01 * 1.05)
+    gear = part_from(
+        {
+            "kind": "backlash",
+            "spring": {"kind": "cubic_spring", "c_0": 1.0, "gamma": 0},
+            "damping": 0,
+            "gap": 0,
+        }
+    )
+    assert gear.spring.c_0 == 1.0
+    assert all(isinstance(part.invertible, bool) for part in PARTS.values())
+    with pytest.raises(ValueError, match=r"kind must be one of sigmoid_friction, .* got 'rust'"):
+        part_from({"kind": "rust"})
+    with pytest.raises(ValueError, match="cubic_spring has no parameter 'd', it has c_0, gamma"):
+        part_from({"kind": "cubic_spring", "d": 1.0})
+    with pytest.raises(ValueError, match=r"cubic_spring: .*missing 1 required"):
+        part_from({"kind": "cubic_spring", "c_0": 1.0})
+
+
+@pytest.mark.parametrize(
+    ("weights", "thresholds", "message"),
+    [
+        ((1.0, 1.0), (0.1, 0.2), r"must begin with 0 and increase, got \[0.1, 0.2\]"),
+        ((1.0, 1.0, 1.0), (0.0, 0.2, 0.2), "must begin with 0 and increase"),
+        ((1.0, -2.0), (0.0, 0.1), "partial sums of weights must be positive"),
+        ((1.0,), (0.0, 0.1), "equally many"),
+    ],
+)
+def test_operators_without_an_inverse_are_refused(weights, thresholds, message: str):
+    with pytest.raises(ValueError, match=message):
+        PrandtlIshlinskii(weights, thresholds)
