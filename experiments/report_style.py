@@ -7,6 +7,7 @@ TITLES = {
     "numerical_ik": "Numerical IK",
     "pbvs": "PBVS",
     "position_level": "Position level",
+    "compensation": "Compensation",
 }
 
 # From the palette of Okabe and Ito, which colour-blind readers tell apart; the baseline is grey.
@@ -15,8 +16,9 @@ COLORS = {
     "numerical_ik": "#0f7cc0",
     "pbvs": "#d55e00",
     "position_level": "#009e73",
+    "compensation": "#b89400",
 }
-_FURTHER_COLORS = ("#c2739f", "#b89400", "#56b4e9", "#7a5195")
+_FURTHER_COLORS = ("#c2739f", "#a0522d", "#56b4e9", "#7a5195")
 WANTED_COLOR = "#cc79a7"
 
 

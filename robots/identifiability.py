@@ -64,8 +64,15 @@ def identifiable_parameters(robot: RobotModel, position_only: bool = False) -> I
         position_only: whether only the position of the tool is measured.
 
     Raises:
-        ValueError: if a column is neither clearly dependent nor clearly independent of the others.
+        ValueError: if a column is neither clearly dependent nor clearly independent of the others, or if the
+            robot is a calibrated one: its axes are no longer exactly parallel, so dependent parameters
+            become independent ones that no measurement can tell apart.
     """
+    if robot.is_calibrated:
+        raise ValueError(
+            f"error parameters of {robot.name}: it is calibrated already; start from the robot as drawn, "
+            f"{robot.calibration.of or 'the one that was calibrated'}"
+        )
     model = ErrorKinematics(robot)
     q = np.random.default_rng(0).uniform(robot.lower, robot.upper, (_CONFIGURATIONS, len(robot.lower)))
     Theta = model.regressor(q, np.zeros(NUM_PARAMETERS))

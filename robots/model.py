@@ -129,6 +129,11 @@ class RobotModel:
     payload: PayloadLimits = field(default_factory=PayloadLimits)
     calibration: Calibration = field(default_factory=Calibration)
 
+    @property
+    def is_calibrated(self) -> bool:
+        """Whether the geometry is that of one robot, found by a calibration."""
+        return bool(self.calibration.source)
+
     def _drive_train(self, name: str) -> np.ndarray:
         return np.array([getattr(joint.drive_train, name) for joint in self.joints])
 

@@ -22,6 +22,8 @@ _SHARPNESS = (60.0, 200.0, 600.0, 2000.0)  # of the soft smallest eigenvalue, fr
 _MULTIPLICATIVE_STEPS = 60
 _RANK = 2  # of the certificate for B3; the smallest eigenvalue of the best design is rarely triple
 _IDLE = 1e-5  # a share below this is dropped
+_LARGEST_CUT = 0.1  # of a share in one multiplicative step
+_BLIND = 0.5  # share of the criterion's value below which what is kept has lost a direction
 _HOPELESS = 0.97  # times the gain of a candidate that deserves its share
 
 
@@ -109,6 +111,8 @@ class _WorkingSet:
         gains = self._gains(root)
         if self._direction is None:
             kept = (self._shares > _IDLE) & (gains > _HOPELESS * (self._shares @ gains))
+            if not self._sees_everything(kept):
+                kept = self._shares > _IDLE
         else:
             kept = (self._shares > _IDLE) | (gains > _HOPELESS * gains.max())
         new = np.setdiff1d(numbers, self._numbers[kept])
@@ -116,6 +120,11 @@ class _WorkingSet:
         self._information = np.concatenate([self._information[kept], self._inform(new)])
         shares = np.concatenate([self._shares[kept], np.full(len(new), 0.05 / max(1, len(new)))])
         self._shares = shares / shares.sum()
+
+    def _sees_everything(self, kept: np.ndarray) -> bool:
+        """Whether a part of the set keeps much of the criterion's value; a gradient sees one direction only."""
+        whole, part = self._mean(self._shares), self._mean(np.where(kept, self._shares, 0.0))
+        return float(self._criterion.value(part)) > _BLIND * float(self._criterion.value(whole))
 
     def _gains(self, root: np.ndarray) -> np.ndarray:
         return np.einsum("nir,ir->n", self._information @ root, root)
@@ -131,8 +140,8 @@ class _WorkingSet:
             power = min(1.0, 130.0 / sharpness) if is_b3 else 1.0
             for _ in range(_MULTIPLICATIVE_STEPS):
                 gains = self._gains(each.gradient_root(self._mean(shares)))
-                # Screened gains are never negative but for rounding.
-                shares = shares * np.power(np.maximum(gains, 0.0) / (shares @ gains), power)
+                # A gain sees one direction only: a share that fell to zero here could never come back.
+                shares = shares * np.power(np.maximum(gains / (shares @ gains), _LARGEST_CUT), power)
                 shares = shares / shares.sum()
         self._shares = shares
         return roots[-1].gradient_root(self._mean(shares))

@@ -6,7 +6,7 @@ import pytest
 from robots.error_kinematics import ErrorKinematics
 from robots.error_parameters import NUM_PARAMETERS, error_parameters, parameter_names
 from robots.identifiability import identifiable_parameters, unseen_parameters
-from robots.model import Placement, RobotModel, load_robot
+from robots.model import Calibration, Placement, RobotModel, load_robot
 from robots.pose import pose_error
 
 WITH_POSE = """
@@ -108,3 +108,10 @@ def test_a_set_of_configurations_that_moves_one_joint_only_names_what_it_cannot_
 def test_the_units_of_the_parameters():
     units = [parameter.unit for parameter in error_parameters(plain())]
     assert units == ["rad"] * 6 + ["m"] * 24 + ["rad"] * 18
+
+
+def test_a_calibrated_robot_has_no_parameters_of_its_own():
+    robot = plain()
+    robot.calibration = Calibration("irb1200", source="a measurement")
+    with pytest.raises(ValueError, match="start from the robot as drawn, irb1200"):
+        identifiable_parameters(robot)

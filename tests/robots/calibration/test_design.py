@@ -93,6 +93,12 @@ def test_a_position_only_design_sees_what_positions_can_show():
     assert 0.95 * design.bound < design.value <= design.bound
 
 
+def test_no_direction_is_lost_on_the_way():
+    """On the full grid one candidate may serve one parameter alone; dropped, the rest would see nothing."""
+    design = design_measurements(ROBOT, 40, position_only=True)
+    assert 0.98 * design.bound < design.value <= design.bound
+
+
 def test_the_same_seed_gives_the_same_design():
     once, again, other = (design_measurements(ROBOT, 20, ranges=COARSE, seed=seed) for seed in (3, 3, 4))
     np.testing.assert_array_equal(once.configurations, again.configurations)
