@@ -122,7 +122,7 @@ class _WorkingSet:
         self._shares = shares / shares.sum()
 
     def _sees_everything(self, kept: np.ndarray) -> bool:
-        """Whether a part of the set keeps much of the criterion's value; a gradient sees one direction only."""
+        """Whether a part of the set keeps much of the criterion's value: a gradient sees one direction."""
         whole, part = self._mean(self._shares), self._mean(np.where(kept, self._shares, 0.0))
         return float(self._criterion.value(part)) > _BLIND * float(self._criterion.value(whole))
 
