@@ -67,8 +67,9 @@ class Experiment:
             "station", SimulatedStation(drawn, scenario.station, drive, takes_torque=has_torque)
         )
         self.servo = builder.AddNamedSystem("servo", Servo(robot, scenario, law))
-        for name in ("position_command", "velocity_command", *(["torque_feedforward"] if has_torque else [])):
-            builder.Connect(self.servo.GetOutputPort(name), self.station.GetInputPort(name))
+        for name in ("position_command", "velocity_command", "torque_feedforward"):
+            if self.station.HasInputPort(name):
+                builder.Connect(self.servo.GetOutputPort(name), self.station.GetInputPort(name))
         for name in ("joint_sample", "pose_sample"):
             builder.Connect(self.station.GetOutputPort(name), self.servo.GetInputPort(name))
         ports = ("position_command", "velocity_command", "correction", "guard_status")
@@ -121,7 +122,7 @@ class Experiment:
             time=record.time,
             X_WE_desired=self.path.sample(record.time)[0],
             X_WE_true=record.X_WE_true,
-            X_WE_measured=record.X_WE_measured,
+            X_WE_measured=measured_along(self.path, record.time, record.exposure_time, record.X_WE_measured),
             joint_position=record.joint_position,
             joint_effort=record.joint_effort,
             link_position=record.link_position,
@@ -129,12 +130,37 @@ class Experiment:
             velocity_command=data["velocity_command"],
             correction=data["correction"],
             guard_counts=dict(zip(KINDS, counts[-1].tolist(), strict=True)),
-            guard_events=_events(record.time, counts),
+            guard_events=guard_events(record.time, counts),
             path_start=self.path.path_start,
             dwell_start=self.path.dwell_start,
             path_end=self.path.duration,
             wall_time=self._wall_time,
         )
+
+
+def measured_along(
+    path: CartesianPath, times: np.ndarray, exposure_times: np.ndarray, X_WE: np.ndarray
+) -> np.ndarray:
+    """Measured poses at the times of a log, NaN where there is none, shape (n, 4, 4).
+
+    A pose that was exposed between two times of the log is carried along the path to the nearest one, so
+    that its difference from the wanted pose stays what it was.
+    """
+    poses = np.full((len(times), 4, 4), np.nan)
+    if not len(times) or not len(exposure_times):
+        return poses
+    half = 0.5 * float(np.median(np.diff(times))) if len(times) > 1 else 0.0
+    nearest = np.clip(np.searchsorted(times, exposure_times - half - 1e-9), 0, len(times) - 1)
+    kept = np.abs(times[nearest] - exposure_times) <= half + 1e-9
+    wanted_then, wanted_now = path.sample(exposure_times[kept])[0], path.sample(times[nearest[kept]])[0]
+    seen, now = X_WE[kept], nearest[kept]
+    is_same = np.abs(times[now] - exposure_times[kept]) < 1e-9
+    shift = wanted_now[:, :3, :3] @ wanted_then[:, :3, :3].swapaxes(1, 2)
+    poses[now] = seen
+    moved = now[~is_same]
+    poses[moved, :3, :3] = (shift @ seen[:, :3, :3])[~is_same]
+    poses[moved, :3, 3] = (seen[:, :3, 3] + wanted_now[:, :3, 3] - wanted_then[:, :3, 3])[~is_same]
+    return poses
 
 
 def drawn_robot(scenario: Scenario, robot: RobotModel | None) -> RobotModel:
@@ -179,8 +205,13 @@ def start_position(robot: RobotModel, scenario: Scenario, path: CartesianPath) -
         ) from error
 
 
-def _events(times: np.ndarray, counts: np.ndarray) -> list[GuardEvent]:
-    """One event for each unbroken run of ticks in which a kind was counted."""
+def guard_events(times: np.ndarray, counts: np.ndarray) -> list[GuardEvent]:
+    """One event for each unbroken run of ticks in which a kind was counted.
+
+    Args:
+        times: of the ticks in s, shape (n,).
+        counts: of `systems.guard.KINDS` until each tick, shape (n, kinds).
+    """
     events = []
     increments = np.diff(counts, axis=0, prepend=0) > 0
     for column, kind in enumerate(KINDS):

@@ -12,12 +12,17 @@ from pydrake.systems.analysis import GetIntegrationSchemes
 from diagrams.integration import IntegratorConfig
 from diagrams.scenario_file import ScenarioError, conformed, one_line, read_tree, shipped_scenarios
 from robots.geometric_errors import GeometricErrors
-from robots.model import NUM_JOINTS
+from robots.model import NUM_JOINTS, Placement
 from robots.plant import ELASTICITIES
 from systems.camera import CameraConfig
 from systems.drive import KINDS, DriveConfig
+from systems.egm.controller import EgmRunConfig
+from systems.egm.motion import EgmMotionConfig
+from systems.egm.signals import SignalCodec, SignalLayout
+from systems.faulty_link import SHARES, FaultConfig
 from systems.feedforward import FEEDFORWARDS, FeedforwardConfig
 from systems.guard import GuardConfig
+from systems.mocap.receiver import MocapReceiverConfig
 from systems.paths import ReferenceConfig
 from systems.servo import LAWS, LawConfig
 
@@ -25,16 +30,47 @@ __all__ = ["Scenario", "ScenarioError", "load_scenario", "scenario_text", "shipp
 
 
 @dataclass
+class EgmConfig:
+    """Externally Guided Motion on the controller."""
+
+    motion: EgmMotionConfig = field(default_factory=EgmMotionConfig)
+    run: EgmRunConfig = field(default_factory=EgmRunConfig)
+
+
+@dataclass
+class LinkConfig:
+    """Where the controller and the camera of a real station are, and what to do when they fall silent."""
+
+    address: str = "127.0.0.1"  # of this machine, to listen on for the controller
+    port: int = 6510  # where the controller sends its messages
+    controller: str = ""  # its address; empty to take whoever speaks first
+    connect: float = 10.0  # s to wait for controller and camera
+    break_after: float = 0.1  # s of silence after which the controller counts as gone
+    on_break: str = "end"  # what a run does then, or when the controller stops: end, or resume
+    resume_within: float = 10.0  # s in which it must be back
+    signal_port: int = 0  # of this machine, where test signals arrive; 0 for none
+    signals: SignalLayout = field(default_factory=SignalLayout)
+    has_camera: bool = True
+    camera: MocapReceiverConfig = field(default_factory=MocapReceiverConfig)
+    camera_frame: Placement = field(default_factory=Placement)  # of the camera system in the world
+    tool_frame: Placement = field(default_factory=Placement)  # of the tool in the body that the camera tracks
+
+
+@dataclass
 class StationConfig:
     """The robot cell: what the controller does not see, and what it is connected to."""
 
-    kind: str = "simulated"
+    kind: str = "simulated"  # or egm: a controller and a camera at the addresses of ``link``
     period: float = 4e-3  # s, between two commands and between two joint samples
     elasticity: str = "joints"  # of the true robot: rigid or joints
     payload: float = 0.0  # kg at the flange
     errors: GeometricErrors = field(default_factory=GeometricErrors)
     drive: DriveConfig = field(default_factory=DriveConfig)
     camera: CameraConfig = field(default_factory=CameraConfig)
+    interface: str = "direct"  # from command to drives: direct, or egm as a controller under EGM plans
+    egm: EgmConfig = field(default_factory=EgmConfig)
+    link: LinkConfig = field(default_factory=LinkConfig)
+    faults: FaultConfig = field(default_factory=FaultConfig)
 
 
 @dataclass
@@ -64,6 +100,8 @@ class Scenario:
     integrator: IntegratorConfig = field(default_factory=IntegratorConfig)
 
 
+STATIONS = ("simulated", "egm")
+
 # Where a number is allowed to lie; a delay of 4 means milliseconds written as seconds.
 _RANGES: dict[str, tuple[float, float, str]] = {
     "seed": (0, 2**32 - 1, ""),
@@ -75,6 +113,23 @@ _RANGES: dict[str, tuple[float, float, str]] = {
     "station.camera.delay": (0.0, 1.0, "s"),
     "station.camera.position_sigma": (0.0, 0.02, "m"),
     "station.camera.orientation_sigma_deg": (0.0, 10.0, "deg"),
+    "station.egm.motion.gain": (0.0, 20.0, "1/s"),
+    "station.egm.motion.bandwidth": (0.0, 1000.0, "Hz"),
+    "station.egm.motion.ramp_in": (0.0, 10.0, "s"),
+    "station.egm.motion.largest_speed_deviation_deg_s": (0.0, 1000.0, "deg/s"),
+    "station.egm.motion.stop_time": (0.0, 10.0, "s"),
+    "station.egm.run.timeout": (0.01, 60.0, "s"),
+    "station.egm.run.condition_deg": (1e-6, 360.0, "deg"),
+    "station.egm.run.condition_time": (1e-3, 3600.0, "s"),
+    "station.link.port": (0, 65535, ""),
+    "station.link.signal_port": (0, 65535, ""),
+    "station.link.camera.server.port": (0, 65535, ""),
+    "station.link.connect": (0.1, 3600.0, "s"),
+    "station.link.break_after": (0.01, 10.0, "s"),
+    "station.link.resume_within": (0.1, 3600.0, "s"),
+    **{f"station.faults.{name}": (0.0, 1.0, "") for name in SHARES},
+    "station.faults.jitter": (0.0, 1.0, "s"),
+    "station.faults.clock_drift_ppm": (-1e5, 1e5, "ppm"),
     "reference.acceleration": (1e-3, 100.0, "1/s^2"),
     "reference.settle": (0.0, 600.0, "s"),
     "reference.dwell": (0.0, 600.0, "s"),
@@ -84,6 +139,7 @@ _RANGES: dict[str, tuple[float, float, str]] = {
     "servo.guard.hold_after": (1e-3, 10.0, "s"),
     "servo.guard.stop_after": (1e-3, 60.0, "s"),
     "servo.guard.stop_time": (1e-3, 10.0, "s"),
+    "servo.guard.resume_time": (1e-3, 60.0, "s"),
     "servo.guard.largest_deviation": (1e-4, 2.0, "m"),
     "servo.guard.largest_deviation_deg": (0.01, 180.0, "deg"),
 }
@@ -143,7 +199,10 @@ def _check(scenario: Scenario) -> None:
             _in_range(f"servo.laws.{law}.{label}", getattr(config, label), bounds)
     _one_of("law", scenario.law, LAWS)
     _one_of("servo.feedforward.kind", scenario.servo.feedforward.kind, ("none", *FEEDFORWARDS))
-    _one_of("station.kind", scenario.station.kind, ("simulated",))
+    _one_of("station.kind", scenario.station.kind, STATIONS)
+    _one_of("station.interface", scenario.station.interface, ("direct", "egm"))
+    _one_of("station.link.on_break", scenario.station.link.on_break, ("end", "resume"))
+    SignalCodec(scenario.station.link.signals)
     _one_of("station.elasticity", scenario.station.elasticity, ELASTICITIES)
     integrator = scenario.integrator
     _one_of("integrator.scheme", integrator.scheme, ("auto", *GetIntegrationSchemes()))

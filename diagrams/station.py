@@ -20,6 +20,7 @@ from robots.model import NUM_JOINTS, RobotModel
 from robots.plant import PlantRobot, add_robot
 from systems.camera import BLOCK, PoseCamera
 from systems.drive import Drive
+from systems.egm.motion import EgmMotion
 from systems.joint_sensor import JointSensor
 from systems.tip_pose import TipPose
 
@@ -33,7 +34,8 @@ class StationRecord:
     time: np.ndarray  # (n,) s
     joint_position: np.ndarray  # (n, 6) rad
     joint_effort: np.ndarray  # (n, 6) N m, joint side
-    X_WE_measured: np.ndarray  # (n, 4, 4), NaN where there is no valid sample
+    exposure_time: np.ndarray  # (m,) s, of the valid samples of the camera
+    X_WE_measured: np.ndarray  # (m, 4, 4), what the camera saw
     X_WE_true: np.ndarray  # (n, 4, 4)
     link_position: np.ndarray  # (n, 6) rad, behind the elastic gears
 
@@ -68,15 +70,23 @@ class SimulatedStation(Diagram):
         Args:
             robot: the nominal robot; the true one differs from it by ``config.errors``.
             config: the station part of a scenario.
-            drive: ``"position"``, ``"velocity"`` or ``"cascade"``.
+            drive: ``"position"``, ``"velocity"`` or ``"cascade"``; under EGM, where ``"velocity"``
+                follows speeds alone, there is no other difference.
             with_log: whether `record` will be asked for what has happened.
-            takes_torque: whether the drives take a torque feedforward.
+            takes_torque: whether the drives take a torque feedforward; EGM has none.
 
         Raises:
             ValueError: if a part refuses its configuration.
         """
         super().__init__()
         builder = DiagramBuilder()
+        motion = None
+        if config.interface == "egm":
+            # The controller plans the motion; its drives follow positions, whatever it is told.
+            motion = EgmMotion(config.egm.motion, config.period, takes_position=drive != "velocity")
+            builder.AddNamedSystem("egm", motion)
+            drive, takes_torque = "cascade", False
+        self._motion = motion
         self.plant = builder.AddNamedSystem("plant", MultibodyPlant(0.0))
         self.robot = add_robot(self.plant, robot, config.elasticity, config.payload, config.errors)
         self.plant.Finalize()
@@ -114,7 +124,9 @@ class SimulatedStation(Diagram):
         builder.Connect(self._noise.get_output_port(), noise)
 
         for name in ("position_command", "velocity_command"):
-            builder.ExportInput(self.drive.GetInputPort(name), name)
+            if motion:
+                builder.Connect(motion.GetOutputPort(name), self.drive.GetInputPort(name))
+            builder.ExportInput((motion or self.drive).GetInputPort(name), name)
         logged = {"state": state, "motor_torque": torque, "exposure": camera.GetOutputPort("exposure")}
         self._log = PackedLog(builder, logged, config.period) if with_log else None
         builder.ExportOutput(sensor.GetOutputPort("joint_sample"), "joint_sample")
@@ -129,10 +141,22 @@ class SimulatedStation(Diagram):
         """Puts the motors at theta (rad, shape (6,)), everything at rest, and seeds the camera's noise."""
         self.robot.set_at_rest(self.plant.GetMyMutableContextFromRoot(root_context), theta)
         self.drive.set_at_rest(root_context, theta)
+        if self._motion:
+            self._motion.set_at_rest(self._motion.GetMyMutableContextFromRoot(root_context), theta)
         # Not SetRandomContext of the diagram: that would draw the friction parameters too.
         self._noise.SetRandomContext(
             self._noise.GetMyMutableContextFromRoot(root_context), RandomGenerator(seed)
         )
+
+    def planned_position(self, root_context: Context) -> np.ndarray:
+        """Where the controller wanted the joints to be at its last cycle, in rad, shape (6,).
+
+        Raises:
+            RuntimeError: if the drives take commands directly and nothing plans.
+        """
+        if self._motion is None:
+            raise RuntimeError("only a controller under EGM plans")
+        return self._motion.planned_position(self._motion.GetMyContextFromRoot(root_context))
 
     def fastest_rate(self, root_context: Context) -> float:
         """The largest eigenvalue in magnitude of plant and drive, linearised about rest, in 1/s."""
@@ -142,9 +166,9 @@ class SimulatedStation(Diagram):
         n = self.plant.num_positions()
         K, D = np.zeros(n), np.zeros(n)
         K[motors], D[motors] = stiffness, damping
-        for joint, spring in zip(self.robot.deflections, self.robot.springs, strict=True):
-            K[joint.position_start()] += spring.default_stiffness()
-        for joint in (*self.robot.motors, *self.robot.deflections):
+        sprung = self.robot.sprung
+        K[[joint.position_start() for joint in sprung]] = self.robot.sprung_stiffness
+        for joint in (*self.robot.motors, *sprung):
             D[joint.velocity_start()] += joint.default_damping()
         M_inverse = np.linalg.inv(self.plant.CalcMassMatrix(context))
         A = np.block([[np.zeros((n, n)), np.eye(n)], [-M_inverse * K, -M_inverse * D]])
@@ -160,25 +184,25 @@ class SimulatedStation(Diagram):
             raise RuntimeError("the station was built without a log")
         times, data = self._log.read(root_context)
         state = data["state"]
+        exposure_time, X_WE_measured = _exposures(data["exposure"])
         return StationRecord(
             time=times,
             joint_position=state[:, self.robot.motor_indices()[:NUM_JOINTS]],
             joint_effort=data["motor_torque"],
-            X_WE_measured=_by_exposure(data["exposure"], times),
+            exposure_time=exposure_time,
+            X_WE_measured=X_WE_measured,
             X_WE_true=self.robot.tool_poses(state),
             link_position=self.robot.link_positions(state),
         )
 
 
-def _by_exposure(exposures: np.ndarray, times: np.ndarray) -> np.ndarray:
-    """Puts logged exposures (n, 14) beside the log times at which they were made; NaN elsewhere."""
-    poses = np.full((len(times), 4, 4), np.nan)
-    exposures = exposures[exposures[:, 1] > 0.0]
-    nearest = np.minimum(np.searchsorted(times, exposures[:, 0] - 1e-9), len(times) - 1)
-    exact = np.abs(times[nearest] - exposures[:, 0]) < 1e-9
-    poses[nearest[exact], :3] = exposures[exact, 2:].reshape(-1, 3, 4)
-    poses[nearest[exact], 3] = [0.0, 0.0, 0.0, 1.0]
-    return poses
+def _exposures(logged: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Times (m,) and poses (m, 4, 4) of the valid exposures in what was logged of a camera, (n, 14)."""
+    valid = logged[logged[:, 1] > 0.0]
+    _, first = np.unique(valid[:, 0], return_index=True)
+    poses = np.tile(np.eye(4), (len(first), 1, 1))
+    poses[:, :3] = valid[first, 2:].reshape(-1, 3, 4)
+    return valid[first, 0], poses
 
 
 def motor_state_selector(robot: PlantRobot) -> Selector:

@@ -18,6 +18,7 @@ from diagrams.log import RunLog
 from diagrams.run import Experiment
 from diagrams.scenario import load_scenario, shipped_scenarios
 from experiments.calibrate_command import calibrate_command
+from experiments.cell_command import cell_command
 from experiments.compare import compare, simulating
 from experiments.console import count, print_list, progress_bar, refusing
 from experiments.design_command import design_command
@@ -25,6 +26,7 @@ from experiments.diagram_view import write_diagram
 from experiments.drivetrain_command import drivetrain_command
 from experiments.frame_commands import align_command, chain_command, frame_command, tool_command
 from experiments.live import LiveView, advance_live
+from experiments.modes_command import modes_command
 from experiments.options import FeedforwardOption, OutOption, RobotOption, ScenarioOption, SetOption
 from experiments.prepare import Prepared, check, prepare
 from experiments.report import verdict
@@ -183,6 +185,8 @@ def diagram_command(
     Console().print(f"The diagram: {escape(str(out))}")
 
 
+app.command("cell")(cell_command)
+app.command("modes")(modes_command)
 app.command("design")(design_command)
 app.command("calibrate")(calibrate_command)
 app.command("drivetrain")(drivetrain_command)

@@ -36,19 +36,19 @@ class CompliantKinematics:
         self._rigid = Kinematics(robot)
         self._compliance = robot.compliance
         self._plant = MultibodyPlant(0.0)
-        add_robot(self._plant, robot, "rigid", payload)
+        self._parts = add_robot(self._plant, robot, "rigid", payload)
         self._plant.Finalize()
         # Scratch memory only: written before every use.
         self._context = self._plant.CreateDefaultContext()
 
     def gravity_torque(self, q: np.ndarray) -> np.ndarray:
-        """Generalised forces of gravity at link positions in rad, N m, (..., 6) -> (..., 6)."""
+        """What gravity and a counterbalance do at link positions in rad, in N m, (..., 6) -> (..., 6)."""
         q = np.asarray(q, dtype=float)
         if q.shape[-1:] != (NUM_JOINTS,):
             raise ValueError(f"joint positions must have the shape (..., {NUM_JOINTS}), got {q.shape}")
         if q.ndim == 1:
             self._plant.SetPositions(self._context, q)
-            return self._plant.CalcGravityGeneralizedForces(self._context)
+            return self._parts.load(self._context)
         flat = [self.gravity_torque(each) for each in q.reshape(-1, NUM_JOINTS)]
         return np.array(flat).reshape(q.shape)
 

@@ -10,6 +10,7 @@ the last link) and E the tool. At zero joint angles the frame of link i sits at
 """
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass, field, fields, is_dataclass
 from importlib.resources import files
 from pathlib import Path
@@ -19,6 +20,9 @@ import numpy as np
 from pydrake.common.yaml import yaml_load_typed
 from pydrake.math import RigidTransform, RotationMatrix
 
+from robots.beam import Beam, beam_surrogate
+from robots.counterbalance_spring import CounterbalanceSpring
+from robots.drivetrain.counterbalance import Counterbalance
 from robots.pose import rotation_from_zyx
 
 NUM_JOINTS = 6
@@ -71,18 +75,32 @@ class DriveTrain:
 
 
 @dataclass
+class Tilting:
+    """How the bearing of a joint yields across its axis: two springs about two axes square to it.
+
+    Reiner (2010), section 2.4.1. For a joint about z the axes are x and y, about x they are y and z, about y
+    they are z and x.
+    """
+
+    stiffness: list[float] = field(default_factory=list)  # N m / rad, two
+    damping: list[float] = field(default_factory=list)  # N m s / rad, two
+    source: str = ""
+
+
+@dataclass
 class Joint:
-    """A revolute joint and the frame of the link that it moves."""
+    """A revolute joint and the frame of the link that it moves; without ``tilting`` its bearing is stiff."""
 
     axis: np.ndarray = field(default_factory=lambda: np.array([0.0, 0.0, 1.0]))
     placement: Placement = field(default_factory=Placement)
     limits: JointLimits = field(default_factory=JointLimits)
     drive_train: DriveTrain = field(default_factory=DriveTrain)
+    tilting: Tilting | None = None
 
 
 @dataclass
 class Link:
-    """A rigid body; ``inertia`` holds the principal moments about the centre of mass."""
+    """A body, rigid without a ``beam``; ``inertia`` holds the principal moments about the centre of mass."""
 
     mass: float = 0.0  # kg
     inertia: np.ndarray = field(default_factory=lambda: np.zeros(3))  # kg m^2, along x, y, z
@@ -91,6 +109,7 @@ class Link:
     center_of_mass_source: str = ""
     radius: float = 0.05  # m, of the capsules that picture the link
     radius_source: str = ""
+    beam: Beam | None = None
 
 
 @dataclass
@@ -128,6 +147,7 @@ class RobotModel:
     links: list[Link] = field(default_factory=list)
     payload: PayloadLimits = field(default_factory=PayloadLimits)
     calibration: Calibration = field(default_factory=Calibration)
+    counterbalance: CounterbalanceSpring | None = None
 
     @property
     def is_calibrated(self) -> bool:
@@ -196,6 +216,13 @@ class RobotModel:
         return np.array(self.calibration.compliance)
 
     @property
+    def counterbalance_at_axis_2(self) -> Counterbalance | None:
+        """What the counterbalance does about axis 2, None where there is none."""
+        joint = self.joints[1]
+        spring = self.counterbalance
+        return None if spring is None else spring.about_axis(self.axes[1], joint.placement.pose())
+
+    @property
     def coulomb_velocity(self) -> np.ndarray:
         """Joint velocity over which the Coulomb friction changes its sign in rad/s, shape (6,)."""
         return self._drive_train("coulomb_velocity")
@@ -237,12 +264,19 @@ def _problem(robot: RobotModel) -> str:
     """The first reason why the robot is impossible, or an empty string."""
     if len(robot.joints) != NUM_JOINTS or len(robot.links) != NUM_JOINTS:
         return f"needs {NUM_JOINTS} joints and links, got {len(robot.joints)} and {len(robot.links)}"
-    problems = [_malformed_number(robot, "")]
-    problems += [_joint_problem(joint, number) for number, joint in enumerate(robot.joints, 1)]
+    malformed = _malformed_number(robot, "")
+    if malformed:
+        return malformed
+    problems = [_joint_problem(joint, number) for number, joint in enumerate(robot.joints, 1)]
+    if robot.base_link.beam is not None:
+        problems.append("base_link: stands still and takes no beam")
     bodies = {"base_link": robot.base_link} | {f"link {n}": link for n, link in enumerate(robot.links, 1)}
     for label, link in bodies.items():
         problems.append(_not_positive(label, {"mass": link.mass, "radius": link.radius}))
         problems.append(_inertia_problem(label, link.inertia))
+        problems.append(_beam_problem(label, link))
+    if not any(problems):
+        problems.append(_refusal(lambda: robot.counterbalance_at_axis_2))
     if len(robot.calibration.compliance) != NUM_JOINTS:
         problems.append(
             f"calibration: needs {NUM_JOINTS} compliances, got {len(robot.calibration.compliance)}"
@@ -285,7 +319,34 @@ def _joint_problem(joint: Joint, number: int) -> str:
         "stiffness": train.stiffness,
         "coulomb_velocity": train.coulomb_velocity,
     }
-    return _not_positive(f"joint {number}", positive)
+    return _not_positive(f"joint {number}", positive) or _tilting_problem(f"joint {number}: tilting", joint)
+
+
+def _tilting_problem(where: str, joint: Joint) -> str:
+    tilting = joint.tilting
+    if tilting is None:
+        return ""
+    if len(tilting.stiffness) != 2 or len(tilting.damping) != 2:
+        return f"{where} needs two stiffnesses and two dampings, got {tilting.stiffness}, {tilting.damping}"
+    if min(tilting.damping) < 0.0:
+        return f"{where}: damping must not be negative, got {min(tilting.damping)}"
+    return _not_positive(where, {"stiffness": min(tilting.stiffness)})
+
+
+def _beam_problem(where: str, link: Link) -> str:
+    beam = link.beam
+    if beam is None:
+        return ""
+    problem = _refusal(lambda: beam_surrogate(beam, link.mass, link.center_of_mass, link.inertia))
+    return problem and f"{where}: {problem}"
+
+
+def _refusal(build: Callable[[], object]) -> str:
+    try:
+        build()
+    except ValueError as error:
+        return str(error)
+    return ""
 
 
 def _not_positive(where: str, values: dict[str, float]) -> str:

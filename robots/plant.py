@@ -1,12 +1,15 @@
-"""Puts a robot into a MultibodyPlant: rigid or with elastic gears, nominal or with its true geometry.
+"""Puts a robot into a MultibodyPlant: rigid or elastic in gears or structure, nominal or as it truly is.
 
 Elastic gears are two coaxial revolute joints in series: ``motor_i`` turns a massless rotor against the
 inertia of the motor, ``deflection_i`` sprung and damped turns the link against the rotor. In these
 coordinates the plant is the flexible-joint model without gyroscopic coupling of the rotors: link
 positions are motor + deflection.
+
+An elastic structure has more sprung joints behind the gears: ``tilt_a_i``, ``tilt_b_i`` where a bearing
+tilts across its axis, ``beam_i_...`` where a link is a beam.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from pydrake.geometry import Capsule, Rgba
@@ -15,20 +18,30 @@ from pydrake.multibody.plant import MultibodyPlant
 from pydrake.multibody.tree import (
     FixedOffsetFrame,
     Frame,
+    LinearSpringDamper,
+    MultibodyForces,
     RevoluteJoint,
     RevoluteSpring,
     RigidBody,
     RotationalInertia,
     SpatialInertia,
-    UnitInertia,
 )
 from pydrake.systems.framework import Context
 
+from robots.counterbalance_spring import free_length
+from robots.elastic_structure import (
+    SprungJoints,
+    add_beam_link,
+    add_bearing,
+    add_rigid_link,
+    link_inertia,
+    massless,
+)
 from robots.error_kinematics import ErrorKinematics
 from robots.geometric_errors import GeometricErrors
-from robots.model import NUM_JOINTS, Link, RobotModel
+from robots.model import NUM_JOINTS, Joint, Link, RobotModel
 
-ELASTICITIES = ("rigid", "joints")
+ELASTICITIES = ("rigid", "joints", "structure")
 _LINK_COLOR = Rgba(0.93, 0.45, 0.13, 1.0)
 _BASE_COLOR = Rgba(0.35, 0.36, 0.38, 1.0)
 
@@ -38,9 +51,11 @@ class PlantRobot:
     """The parts of a plant that belong to one robot, in joint order.
 
     Attributes:
-        deflections: the sprung joints, empty for a rigid robot.
+        deflections: the sprung joints of the gears, empty for a rigid robot.
         springs: the springs of these joints.
         tool: frame E.
+        structure: the sprung joints of bearings and beams, empty without an elastic structure.
+        structure_springs: the springs of these joints.
     """
 
     plant: MultibodyPlant
@@ -48,6 +63,19 @@ class PlantRobot:
     deflections: list[RevoluteJoint]
     springs: list[RevoluteSpring]
     tool: Frame
+    structure: list[RevoluteJoint] = field(default_factory=list)
+    structure_springs: list[RevoluteSpring] = field(default_factory=list)
+    has_counterbalance: bool = False
+
+    @property
+    def sprung(self) -> list[RevoluteJoint]:
+        """All sprung joints: those of the gears, then those of the structure."""
+        return [*self.deflections, *self.structure]
+
+    @property
+    def sprung_stiffness(self) -> np.ndarray:
+        """The stiffness of all sprung joints in N m / rad, in the order of `sprung`."""
+        return np.array([spring.default_stiffness() for spring in (*self.springs, *self.structure_springs)])
 
     def motor_indices(self) -> list[int]:
         """Where motor positions, then motor velocities stand in the plant's state; 12 numbers."""
@@ -57,7 +85,7 @@ class PlantRobot:
         ]
 
     def link_positions(self, state: np.ndarray) -> np.ndarray:
-        """Link positions in rad from plant states.
+        """Link positions in rad from plant states: motors and gears, without what the structure yields.
 
         Args:
             state: states or positions of the plant, shape (..., at least num_positions).
@@ -86,18 +114,26 @@ class PlantRobot:
             pose[:] = self.tool.CalcPoseInWorld(context).GetAsMatrix4()
         return poses
 
+    def load(self, context: Context) -> np.ndarray:
+        """What gravity and the counterbalance do to all joints in N m, shape (num_velocities,)."""
+        if not self.has_counterbalance:
+            return self.plant.CalcGravityGeneralizedForces(context)
+        forces = MultibodyForces(self.plant)
+        self.plant.CalcForceElementsContribution(context, forces)
+        # Springs and dampers of joints act as generalized forces; the load is all that acts on bodies.
+        forces.mutable_generalized_forces()[:] = 0.0
+        return self.plant.CalcGeneralizedForces(context, forces)
+
     def set_at_rest(self, context: Context, theta: np.ndarray) -> None:
-        """Puts the motors at theta (rad, shape (6,)), still, with the gears sagging under gravity."""
+        """Puts the motors at theta (rad, shape (6,)), still, with gears and structure sagging under load."""
         positions = np.zeros(self.plant.num_positions())
         positions[[joint.position_start() for joint in self.motors]] = theta
         self.plant.SetVelocities(context, np.zeros(self.plant.num_velocities()))
         self.plant.SetPositions(context, positions)
-        rows = [joint.position_start() for joint in self.deflections]
-        stiffness = np.array([spring.default_stiffness() for spring in self.springs])
+        rows, stiffness = [joint.position_start() for joint in self.sprung], self.sprung_stiffness
         # The sag changes the lever arms by about a thousandth, so each pass gains three digits.
         for _ in range(6 if rows else 0):
-            torque = self.plant.CalcGravityGeneralizedForces(context)
-            positions[rows] = torque[rows] / stiffness
+            positions[rows] = self.load(context)[rows] / stiffness
             self.plant.SetPositions(context, positions)
 
 
@@ -111,10 +147,11 @@ def add_robot(
     """Adds a robot to a plant that is not yet finalized. Capsules picture it if there is a SceneGraph.
 
     Viscous friction of the motors is the damping of their joints, eq. (2.63) of Probst (2024); Coulomb
-    friction is left to the drives, because a continuous plant has none.
+    friction is left to the drives, because a continuous plant has none. A counterbalance is a spring between
+    links 1 and 2, whatever is elastic.
 
     Args:
-        elasticity: ``"rigid"`` or ``"joints"``.
+        elasticity: ``"rigid"``, ``"joints"`` for elastic gears, ``"structure"`` for bearings and beams too.
         payload: mass at the flange in kg.
         errors: how the true geometry differs from the nominal one; None for exact geometry.
 
@@ -130,46 +167,89 @@ def add_robot(
         )
     if errors is not None:
         robot = ErrorKinematics(robot).robot_with_errors(errors.vector(robot))
-    parent = plant.AddRigidBody("base", _inertia(robot.base_link))
+    parent = plant.AddRigidBody("base", link_inertia(robot.base_link))
     plant.WeldFrames(plant.world_frame(), parent.body_frame(), robot.base.pose())
     _add_capsule(
         plant, parent, np.zeros(3), robot.joints[0].placement.translation, robot.base_link.radius, _BASE_COLOR
     )
-    motors, deflections, springs = [], [], []
-    for i, (joint, link) in enumerate(zip(robot.joints, robot.links, strict=True), 1):
-        inertia = _inertia(link)
-        if i == NUM_JOINTS and payload > 0.0:
-            inertia += _payload_inertia(robot, payload)
-        body = plant.AddRigidBody(f"link_{i}", inertia)
-        socket = plant.AddFrame(FixedOffsetFrame(f"socket_{i}", parent.body_frame(), joint.placement.pose()))
-        damping = float(robot.joint_viscous_friction[i - 1])
-        train = joint.drive_train
-        driven = body
-        if elasticity == "joints":
-            driven = plant.AddRigidBody(f"rotor_{i}", _massless())
-            deflection = plant.AddJoint(
-                RevoluteJoint(
-                    f"deflection_{i}", driven.body_frame(), body.body_frame(), joint.axis, train.damping
-                )
-            )
-            springs.append(plant.AddForceElement(RevoluteSpring(deflection, 0.0, train.stiffness)))
-            deflections.append(deflection)
-        motor = plant.AddJoint(RevoluteJoint(f"motor_{i}", socket, driven.body_frame(), joint.axis, damping))
-        actuator = plant.AddJointActuator(f"motor_{i}", motor)
-        actuator.set_default_rotor_inertia(train.rotor_inertia)
-        actuator.set_default_gear_ratio(train.ratio)
-        motors.append(motor)
-        if i < NUM_JOINTS:
-            tip = robot.joints[i].placement.translation
-            _add_capsule(plant, body, np.zeros(3), tip, link.radius, _LINK_COLOR)
-        parent = body
+    motors, gears, structure = [], SprungJoints(), SprungJoints()
+    bodies = []  # of each link the first body and the last
+    for i, joint in enumerate(robot.joints):
+        socket = plant.AddFrame(
+            FixedOffsetFrame(f"socket_{i + 1}", parent.body_frame(), joint.placement.pose())
+        )
+        carried = _payload_inertia(robot, payload) if i + 1 == NUM_JOINTS and payload > 0.0 else None
+        link = robot.links[i]
+        hinges = SprungJoints()
+        if elasticity == "structure" and link.beam is not None:
+            bodies.append(add_beam_link(plant, hinges, i + 1, link, carried))
+        else:
+            bodies.append(add_rigid_link(plant, i + 1, link, carried))
+        first, parent = bodies[-1]
+        driven = first
+        if elasticity != "rigid":
+            driven = _add_gear(plant, gears, structure, i + 1, joint, first, elasticity == "structure")
+        structure.extend(hinges)
+        motors.append(_add_motor(plant, robot, i, socket, driven))
+        if i + 1 < NUM_JOINTS:
+            _picture_link(plant, bodies[-1], link, robot.joints[i + 1].placement.translation)
+    if robot.counterbalance is not None:
+        _add_counterbalance(plant, robot, bodies[0][1], bodies[1][0])
     tool = plant.AddFrame(FixedOffsetFrame("tool", parent.body_frame(), robot.tool.pose()))
-    return PlantRobot(plant, motors, deflections, springs, tool)
+    return PlantRobot(
+        plant,
+        motors,
+        gears.joints,
+        gears.springs,
+        tool,
+        structure.joints,
+        structure.springs,
+        robot.counterbalance is not None,
+    )
 
 
-def _inertia(link: Link) -> SpatialInertia:
-    return SpatialInertia.MakeFromCentralInertia(
-        link.mass, link.center_of_mass, RotationalInertia(*map(float, link.inertia))
+def _add_gear(
+    plant: MultibodyPlant,
+    gears: SprungJoints,
+    structure: SprungJoints,
+    number: int,
+    joint: Joint,
+    link: RigidBody,
+    tilts: bool,
+) -> RigidBody:
+    """Puts the elastic gear, and the bearing if it tilts, before a link; returns the rotor."""
+    rotor = plant.AddRigidBody(f"rotor_{number}", massless())
+    behind = link
+    if tilts and joint.tilting is not None:
+        behind = plant.AddRigidBody(f"gear_{number}", massless())
+    train = joint.drive_train
+    frames = rotor.body_frame(), behind.body_frame()
+    gears.add(plant, f"deflection_{number}", frames, joint.axis, train.stiffness, train.damping)
+    if behind is not link:
+        add_bearing(plant, structure, number, joint, behind, link)
+    return rotor
+
+
+def _add_motor(
+    plant: MultibodyPlant, robot: RobotModel, i: int, socket: Frame, driven: RigidBody
+) -> RevoluteJoint:
+    joint, damping = robot.joints[i], float(robot.joint_viscous_friction[i])
+    name = f"motor_{i + 1}"
+    motor = plant.AddJoint(RevoluteJoint(name, socket, driven.body_frame(), joint.axis, damping))
+    actuator = plant.AddJointActuator(name, motor)
+    actuator.set_default_rotor_inertia(joint.drive_train.rotor_inertia)
+    actuator.set_default_gear_ratio(joint.drive_train.ratio)
+    return motor
+
+
+def _add_counterbalance(plant: MultibodyPlant, robot: RobotModel, base: RigidBody, arm: RigidBody) -> None:
+    spring, part = robot.counterbalance, robot.counterbalance_at_axis_2
+    assert spring is not None
+    assert part is not None
+    plant.AddForceElement(
+        LinearSpringDamper(
+            base, spring.base_pivot, arm, spring.arm_pivot, free_length(part), spring.stiffness, 0.0
+        )
     )
 
 
@@ -180,8 +260,16 @@ def _payload_inertia(robot: RobotModel, mass: float) -> SpatialInertia:
     )
 
 
-def _massless() -> SpatialInertia:
-    return SpatialInertia(0.0, np.zeros(3), UnitInertia(0.0, 0.0, 0.0), skip_validity_check=True)
+def _picture_link(
+    plant: MultibodyPlant, bodies: tuple[RigidBody, RigidBody], link: Link, tip: np.ndarray
+) -> None:
+    """Draws a link from its joint to the next one, the halves of a beam apart so that one sees it bend."""
+    first, last = bodies
+    if first is last:
+        _add_capsule(plant, first, np.zeros(3), tip, link.radius, _LINK_COLOR)
+        return
+    _add_capsule(plant, first, np.zeros(3), 0.5 * tip, link.radius, _LINK_COLOR)
+    _add_capsule(plant, last, 0.5 * tip, tip, link.radius, _LINK_COLOR)
 
 
 def _add_capsule(

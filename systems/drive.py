@@ -8,10 +8,12 @@ from dataclasses import dataclass, field
 import numpy as np
 from pydrake.multibody.plant import MultibodyPlant
 from pydrake.systems.controllers import InverseDynamics, PidController
-from pydrake.systems.framework import Context, Diagram, DiagramBuilder, LeafSystem
+from pydrake.systems.framework import Context, Diagram, DiagramBuilder, InputPort, LeafSystem, OutputPort
 from pydrake.systems.primitives import (
     Adder,
+    ConstantVectorSource,
     LinearSystem,
+    MatrixGain,
     MultilayerPerceptron,
     PerceptronActivationType,
 )
@@ -68,7 +70,8 @@ class Drive(Diagram):
 
     All three kinds are one PID law on the interpolated command, because the PI loops of a cascade
     multiply out to it. A velocity-controlled joint follows the integral of its velocity command.
-    Gravity is compensated with the nominal rigid model of the robot and its payload at the motors' positions.
+    Gravity, and the counterbalance if there is one, are compensated with the nominal rigid model of the
+    robot and its payload at the motors' positions.
     """
 
     def __init__(
@@ -102,10 +105,7 @@ class Drive(Diagram):
         self._rigid_plant.Finalize()
         self._gains = kp, ki, kd = _pid_gains(robot, kind, config, self._rigid_plant)
         controller = builder.AddNamedSystem("controller", PidController(kp, ki, kd))
-        gravity = builder.AddNamedSystem(
-            "gravity",
-            InverseDynamics(self._rigid_plant, InverseDynamics.InverseDynamicsMode.kGravityCompensation),
-        )
+        load_input, load = _load_compensation(builder, self._rigid_plant, robot.counterbalance is not None)
         self._friction = builder.AddNamedSystem("friction", _coulomb_friction())
         motor_torque = builder.AddNamedSystem("motor_torque", Adder(3, NUM_JOINTS))
         joint_torque = builder.AddNamedSystem("joint_torque", Adder(2, NUM_JOINTS))
@@ -114,7 +114,7 @@ class Drive(Diagram):
         builder.Connect(self._setpoint.get_output_port(), self._interpolator.GetInputPort("setpoint"))
         builder.Connect(self._setpoint.get_output_port(), controller.get_input_port_desired_state())
         builder.Connect(controller.get_output_port_control(), motor_torque.get_input_port(0))
-        builder.Connect(gravity.get_output_port_generalized_force(), motor_torque.get_input_port(1))
+        builder.Connect(load, motor_torque.get_input_port(1))
         builder.Connect(motor_torque.get_output_port(), joint_torque.get_input_port(0))
         builder.Connect(self._friction.get_output_port(), joint_torque.get_input_port(1))
 
@@ -122,8 +122,8 @@ class Drive(Diagram):
         builder.ExportInput(self._interpolator.GetInputPort("velocity_command"), "velocity_command")
         builder.ExportInput(motor_torque.get_input_port(2), "torque_feedforward")
         motor_state = builder.ExportInput(self._friction.get_input_port(), "motor_state")
-        for system in (controller, gravity):
-            builder.ConnectInput(motor_state, system.get_input_port_estimated_state())
+        for port in (controller.get_input_port_estimated_state(), load_input):
+            builder.ConnectInput(motor_state, port)
         builder.ExportOutput(motor_torque.get_output_port(), "motor_torque")
         builder.ExportOutput(joint_torque.get_output_port(), "joint_torque")
         builder.BuildInto(self)
@@ -170,6 +170,23 @@ def _pid_gains(
             velocity,
         )
     raise ValueError(f"drive kind must be one of {', '.join(KINDS)}, got '{kind}'")
+
+
+def _load_compensation(
+    builder: DiagramBuilder, plant: MultibodyPlant, has_counterbalance: bool
+) -> tuple[InputPort, OutputPort]:
+    """From the motor state to the torque that holds the rigid robot at its position."""
+    modes = InverseDynamics.InverseDynamicsMode
+    if not has_counterbalance:
+        gravity = builder.AddNamedSystem("gravity", InverseDynamics(plant, modes.kGravityCompensation))
+        return gravity.get_input_port_estimated_state(), gravity.get_output_port_generalized_force()
+    # The mode for gravity leaves springs between bodies out; without motion the other one has just the two.
+    load = builder.AddNamedSystem("load", InverseDynamics(plant, modes.kInverseDynamics))
+    still = builder.AddNamedSystem("still", MatrixGain(np.diag([1.0] * NUM_JOINTS + [0.0] * NUM_JOINTS)))
+    at_rest = builder.AddNamedSystem("at_rest", ConstantVectorSource(np.zeros(NUM_JOINTS)))
+    builder.Connect(still.get_output_port(), load.get_input_port_estimated_state())
+    builder.Connect(at_rest.get_output_port(), load.get_input_port_desired_acceleration())
+    return still.get_input_port(), load.get_output_port_generalized_force()
 
 
 def _joint_inertias(rigid_plant: MultibodyPlant) -> np.ndarray:

@@ -17,16 +17,21 @@ KINDS = (
     "no_command",  # the law gave no finite command; the last one is held
     "measurement_refused",  # a sample too far from the path to be true
     "measurement_held",  # no usable sample for a while; the law holds its correction
-    "stopped",  # no usable sample or no command for too long; the robot is brought to rest and stays there
+    "stopped",  # no usable sample or no command for too long, or the robot does not run; it is at rest
+    "resumed",  # the robot is led from rest back to the law's command
 )
-_VELOCITY, _POSITION, _CORRECTION, _NO_COMMAND, _REFUSED, _HELD, _STOPPED = range(len(KINDS))
+_VELOCITY, _POSITION, _CORRECTION, _NO_COMMAND, _REFUSED, _HELD, _STOPPED, _RESUMED = range(len(KINDS))
 
 # The state beside the counts: what was issued last (NaN before the first command), the velocity from which
-# a braking began, the mode, the times of the first tick and of the last command, the refused samples seen.
+# a braking began, the mode, the times of the first tick and of the last command, the refused samples seen,
+# and the way back after a stop: how long it is in s, how much of it is done, and where it began as seen from
+# the law's command, position and velocity.
 _POSITIONS, _VELOCITIES, _ISSUED, _BRAKING_FROM = slice(0, 6), slice(6, 12), slice(0, 12), slice(12, 18)
-_MODE, _FIRST_TICK, _LAST_COMMAND, _REFUSED_SEEN = range(18, 22)
-_WIDTH = 22
-_GOING, _HOLDING, _STOPPING = 0.0, 1.0, 2.0
+_MODE, _FIRST_TICK, _LAST_COMMAND, _REFUSED_SEEN, _WAY, _DONE = range(18, 24)
+_OFFSET, _OFFSET_RATE = slice(24, 30), slice(30, 36)
+_WIDTH = 36
+_GOING, _HOLDING, _STOPPING, _RESUMING, _IDLE = 0.0, 1.0, 2.0, 3.0, 4.0
+_RESUME_SPEED = 0.25  # share of the largest joint speed that the way back may add
 
 
 @dataclass
@@ -36,6 +41,8 @@ class GuardConfig:
     hold_after: float = 0.05  # s without a usable sample: the correction is held, the path goes on
     stop_after: float = 0.5  # s without a usable sample or command: smooth stop
     stop_time: float = 0.25  # s from full motion to rest
+    resume: bool = False  # whether to go on when what caused a stop is over
+    resume_time: float = 1.0  # s, at least, from rest back to the law's command
     speed_share: float = 1.0  # of the robot's largest joint speeds
     largest_deviation: float = 0.2  # m from the path: a sample further away is taken for a false detection
     largest_deviation_deg: float = 40.0
@@ -60,7 +67,8 @@ class CommandGuard(LeafSystem):
         out ``guard_status``      vector: how many ticks each of `KINDS` has happened, in that order
 
     The command that was issued last is the state; the output is computed from it and the law's newest
-    command, without delay. Before the first command the output is the measured position.
+    command, without delay. Before the first command, and while the robot does not run, the output is the
+    measured position; when it runs again it is led smoothly from there to what the law commands then.
     """
 
     def __init__(
@@ -93,14 +101,14 @@ class CommandGuard(LeafSystem):
                 "guard: 0 < hold_after < stop_after is needed, got "
                 f"{config.hold_after} s and {config.stop_after} s"
             )
-        if not (config.stop_time > 0.0 and 0.0 < config.speed_share <= 1.0):
+        if not (config.stop_time > 0.0 and config.resume_time > 0.0 and 0.0 < config.speed_share <= 1.0):
             raise ValueError(
-                "guard: stop_time must be positive and speed_share in (0, 1], got "
-                f"{config.stop_time} s and {config.speed_share}"
+                "guard: stop_time and resume_time must be positive and speed_share in (0, 1], got "
+                f"{config.stop_time} s, {config.resume_time} s and {config.speed_share}"
             )
         self._config, self._period, self._uses_camera = config, period, uses_camera
         self._lower, self._upper = robot.lower, robot.upper
-        speed = config.speed_share * robot.speed
+        self._speed = speed = config.speed_share * robot.speed
         # Of each joint: its range, its largest speed, its largest step in a tick.
         self._limits = list(
             zip(*(a.tolist() for a in (robot.lower, robot.upper, speed, period * speed)), strict=True)
@@ -156,9 +164,14 @@ class CommandGuard(LeafSystem):
         state = context.get_discrete_state(0).value().copy()
         position, velocity, correction, measurement = (port.Eval(context).tolist() for port in self._inputs)
         kinds = []
-        if math.isnan(state[0]):
-            state[_POSITIONS], state[_VELOCITIES] = self._joints.Eval(context).position, 0.0
-        if state[_MODE] == _STOPPING:
+        joints: JointSample = self._joints.Eval(context)
+        if math.isnan(state[0]) or not joints.running:
+            state[_POSITIONS], state[_VELOCITIES] = joints.position, 0.0
+        if not joints.running and state[_LAST_COMMAND] > -math.inf:
+            kinds.append(_STOPPED)
+            state[_BRAKING_FROM] = 0.0
+            state[_MODE] = _IDLE
+        elif state[_MODE] == _STOPPING:
             kinds.append(_STOPPED)
             self._brake(state)
         elif not math.isfinite(sum(position) + sum(velocity)):
@@ -167,6 +180,9 @@ class CommandGuard(LeafSystem):
                 kinds.append(_NO_COMMAND)
             self._brake(state)
         else:
+            if state[_MODE] in (_IDLE, _RESUMING):
+                kinds.append(_RESUMED)
+                position, velocity = self._led_back(state, position, velocity)
             self._follow(state, position, velocity, kinds)
         if state[_MODE] == _HOLDING:
             kinds.append(_HELD)
@@ -210,6 +226,32 @@ class CommandGuard(LeafSystem):
         state[_ISSUED] = [last + step for last, step in zip(start, steps, strict=True)] + rates
         state[_BRAKING_FROM] = rates
 
+    def _led_back(
+        self, state: np.ndarray, position: list[float], velocity: list[float]
+    ) -> tuple[list[float], list[float]]:
+        """The law's command and what is left of the distance to it, a polynomial of fifth degree in time."""
+        law_position, law_velocity = np.array(position), np.array(velocity)
+        if state[_MODE] == _IDLE:
+            # As it was a tick ago, when the robot was where it is.
+            offset = state[_POSITIONS] - (law_position - self._period * law_velocity)
+            state[_OFFSET], state[_OFFSET_RATE] = offset, -law_velocity
+            # The steepest part of the polynomial is 1.875 times its mean slope.
+            longest = float(np.max(1.875 * np.abs(offset) / (_RESUME_SPEED * self._speed)))
+            state[_WAY], state[_DONE], state[_MODE] = max(self._config.resume_time, longest), 0.0, _RESUMING
+        state[_DONE] = min(1.0, state[_DONE] + self._period / state[_WAY])
+        s, T = state[_DONE], state[_WAY]
+        offset, rate = state[_OFFSET], state[_OFFSET_RATE]
+        left = 1.0 - s**3 * (10.0 - s * (15.0 - 6.0 * s))
+        drift = T * s * (1.0 - s**2 * (6.0 - s * (8.0 - 3.0 * s)))
+        left_rate = -30.0 * (s * (1.0 - s)) ** 2 / T
+        drift_rate = 1.0 - s**2 * (18.0 - s * (32.0 - 15.0 * s))
+        if s >= 1.0:
+            state[_MODE] = _GOING
+        return (
+            (law_position + left * offset + drift * rate).tolist(),
+            (law_velocity + left_rate * offset + drift_rate * rate).tolist(),
+        )
+
     def _brake(self, state: np.ndarray) -> None:
         """Slows all joints down evenly, from full motion to rest in ``stop_time``."""
         start, last = state[_BRAKING_FROM], state[_VELOCITIES].copy()
@@ -233,9 +275,13 @@ class CommandGuard(LeafSystem):
         state[_FIRST_TICK] = min(state[_FIRST_TICK], time)
         age = time - max(last_sample, state[_FIRST_TICK]) if self._uses_camera else 0.0
         silence = time - state[_LAST_COMMAND]
-        if state[_MODE] == _STOPPING or max(age, silence) >= self._config.stop_after - 1e-9:
+        is_fresh = max(age, silence) < self._config.hold_after
+        if state[_MODE] == _STOPPING:
+            if self._config.resume and is_fresh and not state[_VELOCITIES].any():
+                state[_MODE] = _IDLE
+        elif max(age, silence) >= self._config.stop_after - 1e-9:
             state[_MODE] = _STOPPING
-        else:
+        elif state[_MODE] not in (_IDLE, _RESUMING):
             state[_MODE] = _HOLDING if age >= self._config.hold_after - 1e-9 else _GOING
         discrete_state.set_value(0, state)
         if kinds:

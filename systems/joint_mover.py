@@ -46,20 +46,46 @@ class JointMover(LeafSystem):
     def go(self, context: Context, goal: np.ndarray) -> float:
         """Begins a motion to joint positions in rad, shape (6,); returns the time in s at which it ends."""
         start, begin = self._along(context, 0), context.get_time()
-        duration = max(self._shortest, _PEAK * float(np.max(np.abs(goal - start) / self._speed)))
+        duration = _duration(start, goal, self._speed, self._shortest)
         context.SetDiscreteState(0, np.concatenate([start, goal, [begin, duration]]))
         return begin + duration
 
     def _along(self, context: Context, order: int) -> np.ndarray:
         state = context.get_discrete_state(0).value()
-        s = min(1.0, max(0.0, (context.get_time() - state[_BEGIN]) / state[_DURATION]))
-        way = state[_GOAL] - state[_START]
-        if order == 0:
-            return state[_START] + s**3 * (10.0 - 15.0 * s + 6.0 * s**2) * way
-        return 30.0 * s**2 * (1.0 - s) ** 2 / state[_DURATION] * way
+        passed = context.get_time() - state[_BEGIN]
+        return _polynomial(state[_START], state[_GOAL], passed, state[_DURATION])[order]
 
     def _calc(self, order: int):
         def calc(context: Context, output: BasicVector) -> None:
             output.set_value(self._along(context, order))
 
         return calc
+
+
+def smooth_motion(
+    start: np.ndarray, goal: np.ndarray, passed: float, speed: np.ndarray, shortest: float = 0.2
+) -> tuple[np.ndarray, np.ndarray, float]:
+    """The same motion as a function: positions in rad, velocities in rad/s, and the time left in s.
+
+    Args:
+        start: where the joints are at rest, in rad, shape (6,).
+        goal: where they shall be.
+        passed: time since the start in s.
+        speed: largest joint speeds in rad/s, shape (6,).
+        shortest: least duration in s.
+    """
+    duration = _duration(start, goal, speed, shortest)
+    return *_polynomial(start, goal, passed, duration), duration - passed
+
+
+def _duration(start: np.ndarray, goal: np.ndarray, speed: np.ndarray, shortest: float) -> float:
+    return max(shortest, _PEAK * float(np.max(np.abs(goal - start) / speed)))
+
+
+def _polynomial(
+    start: np.ndarray, goal: np.ndarray, passed: float, duration: float
+) -> tuple[np.ndarray, np.ndarray]:
+    s = min(1.0, max(0.0, passed / duration))
+    way = goal - start
+    position = start + s**3 * (10.0 - 15.0 * s + 6.0 * s**2) * way
+    return position, 30.0 * s**2 * (1.0 - s) ** 2 / duration * way

@@ -1,6 +1,6 @@
 """What all feedforwards share: ports, the joint reference with its derivatives, and the load of the links."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from pydrake.common.value import Value
@@ -15,6 +15,8 @@ from robots.kinematics import Kinematics, robust_solve
 from robots.model import NUM_JOINTS, RobotModel
 from robots.newton_inverse import inverse_kinematics
 from robots.plant import add_robot
+from systems.feedforward.arm_correction import CorrectionConfig
+from systems.feedforward.prefilter import Prefilter, PrefilterConfig
 from systems.samples import JointSample
 
 _SMALL_TURN = 1e-5  # s times the joint velocity: over which the change of the Jacobian is measured
@@ -25,11 +27,12 @@ _NOTHING = np.zeros(NUM_JOINTS)
 class FeedforwardConfig:
     """Which inverse model runs beside the law; read from a scenario file."""
 
-    kind: str = "none"  # none, rigid or flexible_joint
-    stiffness_error: float = (
-        0.0  # by which share the model's stiffness and damping are larger than the robot's
-    )
-    inertia_error: float = 0.0  # the same for the masses and inertias
+    kind: str = "none"  # none, rigid, flexible_joint or elastic_structure
+    # By which shares stiffness and damping, and masses and inertias, of the model are above the robot's.
+    stiffness_error: float = 0.0
+    inertia_error: float = 0.0
+    correction: CorrectionConfig = field(default_factory=CorrectionConfig)
+    prefilter: PrefilterConfig = field(default_factory=PrefilterConfig)
 
 
 @dataclass(frozen=True)
@@ -45,9 +48,19 @@ class JointReference:
 class Drive:
     """What motors shall do so that the links follow, shape (6,) each."""
 
-    deflection: np.ndarray  # rad, of the links against the motors
+    deflection: np.ndarray  # rad, by which the motors are behind the reference
     deflection_rate: np.ndarray  # rad/s
     torque: np.ndarray  # N m, joint side, all that the motors give
+    memory: np.ndarray
+
+
+@dataclass(frozen=True)
+class Offsets:
+    """What the commands of a law lack to be those of the motors, shape (6,) each."""
+
+    position: np.ndarray  # rad
+    velocity: np.ndarray  # rad/s
+    torque: np.ndarray  # N m, joint side, beyond the drives' gravity compensation
     memory: np.ndarray
 
 
@@ -66,9 +79,14 @@ class Feedforward(LeafSystem):
     The offsets are added to the commands of any law: the law leads the links along the path and corrects what
     the model leaves. Where a calibrated robot knows its compliances, the law's commands contain the
     deflection under gravity already, and the offsets only the rest. Out of reach the outputs are zero.
+
+    With a prefilter the derivatives of the path come from it, and the links follow the path as late as the
+    filter is; the offsets contain the difference, so that this too goes with any law. ``delay`` says how much
+    more preview makes up for it.
     """
 
     memory_size = 0  # how many numbers a model remembers beside the positions
+    derivatives = 2  # the highest derivative of the joint positions on which the outputs depend
 
     def __init__(
         self, robot: RobotModel, config: FeedforwardConfig, period: float, payload: float = 0.0
@@ -77,12 +95,12 @@ class Feedforward(LeafSystem):
 
         Args:
             robot: the robot as the controller knows it.
-            config: how wrong the model is.
+            config: how wrong the model is, and how its reference becomes differentiable.
             period: tick in s.
             payload: mass at the flange in kg.
 
         Raises:
-            ValueError: if an error makes a stiffness or a mass vanish.
+            ValueError: if an error makes a stiffness or a mass vanish, or the prefilter's order is too low.
         """
         super().__init__()
         for label in ("stiffness_error", "inertia_error"):
@@ -94,12 +112,16 @@ class Feedforward(LeafSystem):
         self._rotor, self._viscous = robot.reflected_inertia, robot.joint_viscous_friction
         self._coulomb, self._coulomb_velocity = robot.joint_coulomb_friction, robot.coulomb_velocity
         self._kinematics = Kinematics(robot)
+        self._filter = None
+        if config.prefilter.kind != "none":
+            self._filter = Prefilter(config.prefilter, period, self.derivatives, f"feedforward {config.kind}")
+        self.delay = self._filter.delay if self._filter else 0.0  # s
         # Where the links have to be: the law alone cares for their sag under gravity, if it knows of it.
         self._inverse = inverse_kinematics(robot, payload)
         self._sag = CompliantKinematics(robot, payload) if robot.compliance.any() else None
         self._compliance = robot.compliance
         self._plant = MultibodyPlant(0.0)
-        add_robot(self._plant, robot, "rigid", payload)
+        self._parts = add_robot(self._plant, robot, "rigid", payload)
         self._plant.Finalize()
         # Scratch memory only: written before every use.
         self._context, self._forces = self._plant.CreateDefaultContext(), MultibodyForces(self._plant)
@@ -110,9 +132,34 @@ class Feedforward(LeafSystem):
         for name in ("position_offset", "velocity_offset", "torque_feedforward"):
             self.DeclareStateOutputPort(name, self.DeclareDiscreteState(NUM_JOINTS))
         self._last = self.DeclareDiscreteState(np.full(NUM_JOINTS, np.nan))
-        self._last_torque = self.DeclareDiscreteState(np.full(NUM_JOINTS, np.nan))
-        self._memory = self.DeclareDiscreteState(np.full(max(1, self.memory_size), np.nan))
+        self._memory = self.DeclareDiscreteState(self.fresh_memory())
+        order = self._filter.order if self._filter else 0
+        self._filtered = self.DeclareDiscreteState(np.full(max(1, order * NUM_JOINTS), np.nan))
         self.DeclarePeriodicDiscreteUpdateEvent(period, 0.0, self._tick)
+
+    def fresh_memory(self) -> np.ndarray:
+        """The memory before the first tick."""
+        return np.full(NUM_JOINTS + self.memory_size, np.nan)
+
+    def offsets(self, reference: JointReference, memory: np.ndarray) -> Offsets:
+        """One tick of the inverse model.
+
+        Args:
+            reference: of the links.
+            memory: of the last tick, `fresh_memory` at the first one.
+        """
+        last_torque, memory = memory[:NUM_JOINTS], memory[NUM_JOINTS:]
+        drive = self.drive(reference, memory)
+        sag, sag_rate = self._known_sag(reference)
+        torque = drive.torque - self._gravity_compensation(reference.position - drive.deflection)
+        # The drives hold a torque for a period: on the average it is half a period late.
+        ahead = torque if np.isnan(last_torque[0]) else 1.5 * torque - 0.5 * last_torque
+        memory = np.concatenate([torque, drive.memory])
+        return Offsets(sag - drive.deflection, sag_rate - drive.deflection_rate, ahead, memory)
+
+    def drive(self, reference: JointReference, memory: np.ndarray) -> Drive:
+        """What the motors shall do; the memory is the model's, of the last tick, NaN at the first one."""
+        return self._drive(reference, self._load(reference), memory)
 
     def _drive(self, reference: JointReference, load: np.ndarray, memory: np.ndarray) -> Drive:
         """What the motors shall do.
@@ -126,39 +173,52 @@ class Feedforward(LeafSystem):
 
     def _tick(self, context: Context, discrete_state: DiscreteValues) -> None:
         last = context.get_discrete_state(self._last).value()
-        if np.isnan(last[0]):
+        is_first = np.isnan(last[0])
+        if is_first:
             last = self._joints.Eval(context).position
         try:
-            reference = self._reference(context, last)
+            q = self._link_positions(self._X_WD.Eval(context), last)
         except (UnreachableError, JointLimitError):
             for index in range(3):
                 discrete_state.set_value(index, _NOTHING)
             return
-        load = self._load(reference)
-        drive = self._drive(reference, load, context.get_discrete_state(self._memory).value())
-        motors = reference.position - drive.deflection
-        sag, sag_rate = self._known_sag(reference)
-        torque = drive.torque - self._gravity_compensation(motors)
-        # The drives hold a torque for a period: on the average it is half a period late.
-        before = context.get_discrete_state(self._last_torque).value()
-        ahead = torque if np.isnan(before[0]) else 1.5 * torque - 0.5 * before
-        discrete_state.set_value(0, sag - drive.deflection)
-        discrete_state.set_value(1, sag_rate - drive.deflection_rate)
-        discrete_state.set_value(2, ahead)
-        discrete_state.set_value(int(self._last), reference.position)
-        discrete_state.set_value(int(self._last_torque), torque)
-        discrete_state.set_value(int(self._memory), drive.memory)
+        if self._filter is None:
+            reference = self._exact_reference(context, q)
+        else:
+            state = context.get_discrete_state(self._filtered).value().reshape(-1, NUM_JOINTS)
+            state = self._filter.at_rest(q) if is_first else self._filter.step(state, last, q)
+            reference = self._filtered_reference(state, q)
+            discrete_state.set_value(int(self._filtered), state.ravel())
+        offsets = self.offsets(reference, context.get_discrete_state(self._memory).value())
+        position, velocity = offsets.position, offsets.velocity
+        if self._filter is not None:
+            position = position + reference.position - q
+            velocity = velocity + reference.velocity - self._velocity(q, self._V_WD.Eval(context))
+        discrete_state.set_value(0, position)
+        discrete_state.set_value(1, velocity)
+        discrete_state.set_value(2, offsets.torque)
+        discrete_state.set_value(int(self._last), q)
+        discrete_state.set_value(int(self._memory), offsets.memory)
 
-    def _reference(self, context: Context, last: np.ndarray) -> JointReference:
-        """The path in joint positions with two derivatives, from its pose, twist and acceleration."""
-        q = self._inverse.nearest(self._X_WD.Eval(context).GetAsMatrix34(), last)
-        if self._sag is not None:
-            q = self._sag.link_positions(q)
+    def _link_positions(self, X_WD: RigidTransform, last: np.ndarray) -> np.ndarray:
+        q = self._inverse.nearest(X_WD.GetAsMatrix34(), last)
+        return q if self._sag is None else self._sag.link_positions(q)
+
+    def _velocity(self, q: np.ndarray, V_WD: np.ndarray) -> np.ndarray:
+        return robust_solve(self._kinematics.jacobian(q), V_WD)
+
+    def _exact_reference(self, context: Context, q: np.ndarray) -> JointReference:
+        """Two derivatives of the path in joint positions, from its twist and acceleration."""
         J = self._kinematics.jacobian(q)
         velocity = robust_solve(J, self._V_WD.Eval(context))
         change = (self._kinematics.jacobian(q + _SMALL_TURN * velocity) - J) @ velocity / _SMALL_TURN
         acceleration = robust_solve(J, self._A_WD.Eval(context) - change)
         return JointReference(q, velocity, acceleration)
+
+    def _filtered_reference(self, state: np.ndarray, q: np.ndarray) -> JointReference:
+        assert self._filter is not None
+        acceleration = state[2] if len(state) > 2 else self._filter.highest_derivative(state, q)
+        return JointReference(state[0], state[1], acceleration)
 
     def _known_sag(self, reference: JointReference) -> tuple[np.ndarray, np.ndarray]:
         """The deflection under gravity and its rate that are in the law's commands already, (6,) each."""
@@ -181,7 +241,7 @@ class Feedforward(LeafSystem):
     def _gravity_compensation(self, motors: np.ndarray) -> np.ndarray:
         """What the drives add by themselves at these motor positions."""
         self._plant.SetPositions(self._context, motors)
-        return -self._plant.CalcGravityGeneralizedForces(self._context)
+        return -self._parts.load(self._context)
 
     def _motor_torque(self, velocity: np.ndarray, acceleration: np.ndarray, load: np.ndarray) -> np.ndarray:
         """Torque of motors that carry a load: rotor inertia, viscous and Coulomb friction (2.63), (2.64)."""

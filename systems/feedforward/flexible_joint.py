@@ -2,35 +2,42 @@
 
 import numpy as np
 
-from systems.feedforward.feedforward import Drive, Feedforward, JointReference
+from robots.model import NUM_JOINTS, RobotModel
+from systems.feedforward.backward_differences import HISTORY, BackwardDifferences, at_rest, with_newest
+from systems.feedforward.feedforward import Drive, Feedforward, FeedforwardConfig, JointReference
+from systems.feedforward.sprung_deflection import SprungDeflection
 
 
 class FlexibleJointFeedforward(Feedforward):
     """Deflections from the load of the links, then torques of motors that turn ahead by them.
 
     The load tau bends spring and damper of a joint by K delta + D d(delta)/dt = -tau, Reiner (2010) eqs.
-    (3.78), (3.93) for linear springs. The pole at -K/D, hundreds of 1/s here and thousands in the source, is
-    integrated exactly for a load that changes linearly in a tick, so that the inverse is stable and bounded
-    at any tick. The motors move by theta = q - delta and carry J theta'' + friction + tau.
+    (3.78), (3.93) for linear springs: a relative degree of three, so the motors' acceleration depends on the
+    third derivative of the reference. They move by theta = q - delta and carry J theta'' + friction + tau.
 
-    The memory holds deflections, their rates and the load of the last tick.
+    The memory holds the load of the last tick and the deflections of the last three.
     """
 
-    memory_size = 18
+    memory_size = (1 + HISTORY) * NUM_JOINTS
+    derivatives = 3
+
+    def __init__(
+        self, robot: RobotModel, config: FeedforwardConfig, period: float, payload: float = 0.0
+    ) -> None:
+        """Builds the model; raises what `Feedforward` raises."""
+        super().__init__(robot, config, period, payload)
+        self._gears = SprungDeflection(self._stiffness, self._damping, period)
+        self._differences = BackwardDifferences(period)
 
     def _drive(self, reference: JointReference, load: np.ndarray, memory: np.ndarray) -> Drive:
-        K, D, T = self._stiffness, self._damping, self._period
         if np.isnan(memory[0]):
-            deflection, rate, acceleration = -load / K, np.zeros_like(load), np.zeros_like(load)
+            deflection = self._gears.at_rest(load)
+            history = at_rest(deflection)
         else:
-            before, last_rate, last_load = memory[:6], memory[6:12], memory[12:]
-            # x' = -(K x + tau) / D with tau linear: the particular solution is linear, the rest decays.
-            slope = (load - last_load) / T
-            decay = np.exp(-K * T / D)
-            steady = -load / K + D * slope / K**2
-            deflection = steady + decay * (before - (steady + slope * T / K))
-            rate = -(K * deflection + load) / D
-            acceleration = (rate - last_rate) / T
+            history = memory[NUM_JOINTS:].reshape(HISTORY, NUM_JOINTS)
+            deflection = self._gears.step(history[0], memory[:NUM_JOINTS], load)
+        rate, acceleration = self._differences.derivatives(deflection, history)
         velocity = reference.velocity - rate
         torque = self._motor_torque(velocity, reference.acceleration - acceleration, load)
-        return Drive(deflection, rate, torque, np.concatenate([deflection, rate, load]))
+        history = with_newest(deflection, history)
+        return Drive(deflection, rate, torque, np.concatenate([load, history.ravel()]))

@@ -23,7 +23,7 @@ def written(folder: Path, text: str, name: str = "mine.yaml") -> str:
 
 
 def test_the_shipped_scenarios_load_by_name_and_say_what_they_are():
-    assert shipped_scenarios() == ["dead-time", "misaligned", "nominal"]
+    assert shipped_scenarios() == ["cell", "dead-time", "misaligned", "nominal"]
     for name in shipped_scenarios():
         assert len(load_scenario(name).description) > 40
 
@@ -49,7 +49,7 @@ def test_dead_time_is_misaligned_with_140_ms_from_command_to_motion():
     assert scenario_text(late) == scenario_text(base)
 
 
-@pytest.mark.parametrize("name", ["dead-time", "misaligned", "nominal"])
+@pytest.mark.parametrize("name", ["cell", "dead-time", "misaligned", "nominal"])
 def test_the_text_of_a_scenario_reads_back_as_the_same_scenario(tmp_path: Path, name: str):
     text = scenario_text(load_scenario(name))
     assert scenario_text(load_scenario(written(tmp_path, text))) == text

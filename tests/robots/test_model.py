@@ -49,10 +49,13 @@ def put(*path: Any) -> Callable[[dict], None]:
 
 @pytest.mark.parametrize("name", shipped_robots())
 def test_every_part_of_a_shipped_robot_names_its_source(name: str):
-    found = sources(load_robot(name), name)
+    robot = load_robot(name)
+    found = sources(robot, name)
     assert found.pop(f"{name}.calibration.source") == ""  # a robot as drawn
+    elastic = [joint.tilting for joint in robot.joints] + [link.beam for link in robot.links]
+    optional = [part for part in (*elastic, robot.counterbalance) if part is not None]
     # 6 joints with placement, limits, drive train; base, tool; 7 links with 3 each; payload with 2.
-    assert len(found) == 6 * 3 + 2 + 7 * 3 + 2
+    assert len(found) == 6 * 3 + 2 + 7 * 3 + 2 + len(optional)
     assert not [where for where, source in found.items() if not source.strip()]
 
 
@@ -151,7 +154,8 @@ def test_a_file_that_is_no_mapping_in_yaml_is_refused_in_one_line(tmp_path: Path
 
 @pytest.mark.parametrize("name", ["irb9999", "nowhere/robot.yaml"])
 def test_a_missing_robot_is_refused_with_the_names_of_those_there_are(name: str):
+    names = ", ".join(shipped_robots())
     with pytest.raises(
-        RobotFileError, match=f"^robot '{name}': no file .*; give the path .* one of irb1200$"
+        RobotFileError, match=f"^robot '{name}': no file .*; give the path .* one of {names}$"
     ):
         load_robot(name)

@@ -231,5 +231,5 @@ def test_refuses_a_payload_that_the_robot_may_not_carry(payload: float):
 
 
 def test_refuses_an_unknown_elasticity():
-    with pytest.raises(ValueError, match="elasticity must be one of rigid, joints, got 'rubber'"):
+    with pytest.raises(ValueError, match="elasticity must be one of rigid, joints, structure, got 'rubber'"):
         add_robot(MultibodyPlant(0.0), ROBOT, "rubber")

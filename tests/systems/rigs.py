@@ -57,7 +57,7 @@ class GuardRig:
         self.guard = CommandGuard(robot, config or GuardConfig(), PERIOD, **(limits | options))
         self.context = self.guard.CreateDefaultContext()
         self.start = np.zeros(6) if start is None else start
-        self.ticks = 0
+        self.ticks, self.running = 0, True
 
     @property
     def time(self) -> float:
@@ -79,7 +79,7 @@ class GuardRig:
         }
         for name, value in values.items():
             self.guard.GetInputPort(name).FixValue(self.context, value)
-        sample = JointSample(self.time, self.start, np.zeros(6), np.zeros(6), True)
+        sample = JointSample(self.time, self.start, np.zeros(6), np.zeros(6), self.running)
         self.guard.GetInputPort("joint_sample").FixValue(self.context, Value(sample))
         ports = ("position_command", "velocity_command")
         issued, speed = (self.guard.GetOutputPort(name).Eval(self.context).copy() for name in ports)
@@ -115,7 +115,7 @@ class LawRig:
         self.path, self.preview, self.delay = path, preview, delay
         self.q = q
         self.tips: list[np.ndarray] = []  # X_WE at the ticks so far
-        self.ticks = 0
+        self.ticks, self.running = 0, True
 
     def output(self, name: str) -> np.ndarray:
         """What an output port of the law says now."""

@@ -204,6 +204,53 @@ def test_a_law_that_does_without_the_camera_is_not_stopped_by_its_silence():
     assert not any(counts.values())
 
 
+def is_smooth(positions: np.ndarray, velocities: np.ndarray) -> bool:
+    """Whether velocities are the derivative of positions and never jump by more than 2 % of the top speed."""
+    steps = np.diff(positions, axis=0) / PERIOD
+    means = 0.5 * (velocities[1:] + velocities[:-1])
+    jumps = np.abs(np.diff(velocities, axis=0)) / ROBOT.speed
+    return bool(np.abs(steps - means).max() < 1e-2 and jumps.max() < 0.02)
+
+
+def test_when_the_camera_is_back_the_robot_may_be_led_back_onto_its_way():
+    """It stops within 0.25 s, stands, and joins the moving command again without a jump."""
+    rig = GuardRig(ROBOT, GuardConfig(resume=True, resume_time=0.8))
+    cruise(rig, 50)
+    lost = rig.time
+    blind = cruise(rig, 200, seen=lost)
+    back = cruise(rig, 260)
+    assert blind[2]["stopped"] > 50
+    assert back[2]["resumed"] == 200  # 0.8 s
+    np.testing.assert_array_equal(blind[1][-1], 0.0)
+    assert is_smooth(*(np.concatenate([blind[k], back[k]]) for k in (0, 1)))
+    wanted = 0.1 * ROBOT.speed * (rig.time - PERIOD)
+    np.testing.assert_allclose(back[0][-1], wanted, atol=1e-12)
+
+
+def test_a_stop_lasts_unless_resuming_is_wanted():
+    rig = GuardRig(ROBOT)
+    cruise(rig, 50)
+    cruise(rig, 250, seen=rig.time)
+    positions, _, counts = cruise(rig, 100)
+    np.testing.assert_array_equal(positions[0], positions[-1])
+    assert counts["resumed"] == 0
+
+
+def test_a_robot_that_does_not_run_is_followed_and_then_led_back():
+    """Somebody moved it meanwhile: the command starts from where it is, not from where it was."""
+    rig = GuardRig(ROBOT)
+    before = cruise(rig, 50)[0][-1]
+    elsewhere = before + 0.05
+    rig.start, rig.running = elsewhere, False
+    idle, _, _ = cruise(rig, 20)
+    np.testing.assert_array_equal(idle, np.broadcast_to(elsewhere, idle.shape))
+    rig.running = True
+    positions, velocities, counts = cruise(rig, 400)
+    assert counts["stopped"] == 20
+    assert is_smooth(np.vstack([idle[-1], positions]), np.vstack([np.zeros(6), velocities]))
+    np.testing.assert_allclose(positions[-1], 0.1 * ROBOT.speed * (rig.time - PERIOD), atol=1e-12)
+
+
 def test_ticks_with_refused_samples_or_a_correction_at_its_limit_are_counted():
     rig = GuardRig(ROBOT, correction_limit=0.1, correction_limit_deg=20.0)
     for refused, correction in (
@@ -222,8 +269,9 @@ def test_ticks_with_refused_samples_or_a_correction_at_its_limit_are_counted():
     [
         ({"hold_after": 0.0}, "0 < hold_after < stop_after is needed, got 0.0 s and 0.5 s"),
         ({"stop_after": 0.04}, "0 < hold_after < stop_after is needed, got 0.05 s and 0.04 s"),
-        ({"stop_time": 0.0}, "stop_time must be positive .* got 0.0 s"),
-        ({"speed_share": 1.5}, r"speed_share in \(0, 1\], got 0.25 s and 1.5"),
+        ({"stop_time": 0.0}, "stop_time and resume_time must be positive .* got 0.0 s"),
+        ({"resume_time": 0.0}, "stop_time and resume_time must be positive .* got 0.25 s, 0.0 s"),
+        ({"speed_share": 1.5}, r"speed_share in \(0, 1\], got 0.25 s, 1.0 s and 1.5"),
     ],
 )
 def test_refuses_a_guard_that_does_not_guard(change: dict, message: str):

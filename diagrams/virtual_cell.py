@@ -1,0 +1,130 @@
+"""A robot cell that exists only in this process: the elastic robot behind a controller with EGM."""
+
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+from pydrake.systems.analysis import Simulator
+
+from diagrams.integration import Integration
+from diagrams.run import start_position
+from diagrams.scenario import Scenario
+from diagrams.station import SimulatedStation
+from robots.model import RobotModel
+from systems.egm.controller import VirtualController
+from systems.paths import make_path
+from systems.samples import JointSample, PoseSample
+
+CLOCK_START = 1000.0  # s, what the controller's clock shows at the start: nobody may take it for zero
+
+
+class Exposure(NamedTuple):
+    """What the camera saw, and when it becomes known."""
+
+    published: float  # s
+    sample: PoseSample
+
+
+@dataclass(frozen=True)
+class CellRecord:
+    """The truth of a cell, n cycles. Only reports may see it."""
+
+    time: np.ndarray  # (n,) s, the controller's clock
+    X_WE: np.ndarray  # (n, 4, 4)
+    link_position: np.ndarray  # (n, 6) rad
+
+    def at(self, times: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Poses (m, 4, 4) and link positions (m, 6) at times (m,) of its clock; NaN where none is near."""
+        nearest = np.clip(np.searchsorted(self.time, times - 5e-4), 0, len(self.time) - 1)
+        is_known = np.abs(self.time[nearest] - times) < 5e-4
+        X_WE, links = self.X_WE[nearest].copy(), self.link_position[nearest].copy()
+        X_WE[~is_known], links[~is_known] = np.nan, np.nan
+        return X_WE, links
+
+    def save(self, file: str | Path) -> None:
+        """Writes it for `load`."""
+        np.savez_compressed(file, time=self.time, X_WE=self.X_WE, link_position=self.link_position)
+
+    @classmethod
+    def load(cls, file: str | Path) -> "CellRecord":
+        """Reads what `save` wrote. Raises OSError or ValueError if it cannot be read."""
+        with np.load(file) as data:
+            return cls(data["time"], data["X_WE"], data["link_position"])
+
+
+class VirtualCell:
+    """Plant, drives and camera of a scenario, moved on by the controller's cycle.
+
+    The controller hears a command at the beginning of a cycle; what the robot does until its end is then
+    settled. So the cell is computed a cycle ahead, and a real-time loop only has to hand out the results.
+    """
+
+    def __init__(self, scenario: Scenario, robot: RobotModel, with_log: bool = True) -> None:
+        """Puts the robot at the start of the scenario's path.
+
+        Args:
+            scenario: whose station this is; its controller plans under EGM, whatever it says.
+            robot: as it is drawn.
+            with_log: whether `record` will be asked for the truth.
+
+        Raises:
+            ValueError: if a part refuses its configuration or the start is out of reach.
+        """
+        config = replace(scenario.station, interface="egm")
+        self.period = config.period
+        self._camera = config.camera
+        self._station = SimulatedStation(robot, config, "cascade", with_log)
+        self._simulator = Simulator(self._station)
+        self._context = self._simulator.get_mutable_context()
+        start = start_position(robot, scenario, make_path(scenario.reference))
+        self._station.set_at_rest(self._context, start, scenario.seed)
+        standing = np.full(len(start), np.nan)
+        self._inputs = [
+            self._station.GetInputPort(name).FixValue(self._context, standing)
+            for name in ("position_command", "velocity_command")
+        ]
+        self._integration = Integration(
+            scenario.integrator, config.period, self._station.fastest_rate(self._context)
+        )
+        self._integration.initialize(self._simulator)
+        self._joints = self._station.GetOutputPort("joint_sample")
+        self._poses = self._station.GetOutputPort("pose_sample")
+        self._cycle = 0
+        self._exposure = 0
+        self.planned = start
+
+    @property
+    def time(self) -> float:
+        """How far the cell has been computed, in s."""
+        return self._cycle * self.period
+
+    @property
+    def stamp(self) -> float:
+        """What the controller's clock shows at `time`, in s."""
+        return CLOCK_START + self.time
+
+    @property
+    def joints(self) -> JointSample:
+        """What the joints say at `time`."""
+        return self._joints.Eval(self._context)
+
+    def advance(self, controller: VirtualController) -> list[Exposure]:
+        """Computes the next cycle with the controller's references; returns what the camera saw in it."""
+        for value, reference in zip(self._inputs, controller.references, strict=True):
+            value.GetMutableData().set_value(reference)
+        self._cycle += 1
+        end, exposures = self.time, []
+        while (published := self._exposure * self._camera.period + self._camera.delay) <= end:
+            if published > self._context.get_time():
+                self._integration.advance(self._simulator, published)
+            exposures.append(Exposure(published, self._poses.Eval(self._context)))
+            self._exposure += 1
+        self._integration.advance(self._simulator, end)
+        self.planned = self._station.planned_position(self._context)
+        return exposures
+
+    def record(self) -> CellRecord:
+        """The truth since the start. Raises RuntimeError if the cell was built without a log."""
+        record = self._station.record(self._context)
+        return CellRecord(CLOCK_START + record.time, record.X_WE_true, record.link_position)

@@ -1,0 +1,1 @@
+"""From markers in camera images to the pose of the tool."""

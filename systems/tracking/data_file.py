@@ -1,0 +1,44 @@
+"""Cells and bodies as YAML files: where the shipped ones are, and one-line errors for the others."""
+
+from importlib.resources import files
+from pathlib import Path
+from typing import TypeVar
+
+from pydrake.common.yaml import yaml_load_typed
+
+_Schema = TypeVar("_Schema")
+
+
+def data_file(name: str, kind: str) -> Path:
+    """The file of a shipped cell or body by name (``"probst"``), or the path that is given.
+
+    Args:
+        name: a name, or a path that ends in .yaml or .yml.
+        kind: ``"cell"`` or ``"body"``.
+
+    Raises:
+        ValueError: if there is no such file.
+    """
+    folder = files("systems.tracking") / "data"
+    path = Path(name) if name.endswith((".yaml", ".yml")) else Path(str(folder / f"{name}_{kind}.yaml"))
+    if not path.is_file():
+        ending = f"_{kind}.yaml"
+        shipped = sorted(
+            entry.name.removesuffix(ending) for entry in folder.iterdir() if entry.name.endswith(ending)
+        )
+        raise ValueError(
+            f"{kind} '{name}': no file {path}; give the path of a YAML file or one of {', '.join(shipped)}"
+        )
+    return path
+
+
+def read_data_file(path: Path, schema: type[_Schema]) -> _Schema:
+    """Reads a dataclass tree from a YAML file.
+
+    Raises:
+        ValueError: if the file is not YAML or does not fit the schema; one line that names the file.
+    """
+    try:
+        return yaml_load_typed(schema=schema, filename=str(path))
+    except Exception as error:  # the parser raises a dozen types, all of them about this file
+        raise ValueError(f"file {path}: {' '.join(str(error).split())}") from error

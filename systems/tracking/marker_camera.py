@@ -1,0 +1,128 @@
+"""A pose camera whose pose comes from markers: blobs in the images of many cameras, tracked, and late."""
+
+from dataclasses import dataclass, field
+
+import numpy as np
+from pydrake.common import RandomDistribution
+from pydrake.common.value import Value
+from pydrake.math import RigidTransform
+from pydrake.systems.framework import Context, DiscreteValues, LeafSystem
+from scipy.stats import norm
+
+from robots.model import NUM_JOINTS, RobotModel
+from systems.camera import BLOCK, CameraConfig, PoseCamera
+from systems.samples import PoseSample
+from systems.tracking.arm_capsules import ArmCapsules
+from systems.tracking.detection_body import load_body
+from systems.tracking.features import FeatureConfig, FeatureSource
+from systems.tracking.measuring_cell import load_cell
+from systems.tracking.tracker import Tracker, TrackerConfig, TrackerState
+
+_WIDTH = 15  # time, valid, the rows of the 3 x 4 pose matrix, residual
+_EPSILON = 1e-9  # s, a sample that is due at a tick arrives at it in spite of rounding
+
+
+@dataclass
+class MarkerCameraConfig:
+    """Which cameras look at which body, and how well; read from a scenario file."""
+
+    cell: str = "probst"  # a shipped cell or the path of a cell file
+    body: str = "probst"  # a shipped detection body or the path of a body file
+    features: FeatureConfig = field(default_factory=FeatureConfig)
+    tracker: TrackerConfig = field(default_factory=TrackerConfig)
+
+
+class MarkerCamera(LeafSystem):
+    """Measures the pose of the tool at t = 0, period, 2 period, ... by the markers of a body at it.
+
+    Ports, those of `systems.camera.PoseCamera`:
+        in  ``X_WE``         RigidTransform, the true tool in the world
+        in  ``noise``        vector, standard normal, drawn anew every `BLOCK` periods
+        out ``pose_sample``  PoseSample, the newest one that has arrived; a lost exposure arrives as invalid
+        out ``exposure``     vector 14, the last exposure before it arrives: time, validity, rows of X_WE
+    and one more, which may stay unconnected:
+        in  ``motor_state``  vector 12, of which the positions (rad) place the arm that hides markers
+
+    Gears are too stiff for their deflection to matter for what the arm hides. The ``residual`` of a sample is
+    the standard deviation of its position that follows from the scatter of the pixels. A frame without a pose
+    repeats the last one as invalid.
+    """
+
+    def __init__(
+        self,
+        config: CameraConfig,
+        markers: MarkerCameraConfig | None = None,
+        robot: RobotModel | None = None,
+    ) -> None:
+        """Reads cell and body.
+
+        Args:
+            config: when exposures are made, arrive, and are lost altogether; its sigmas are not used.
+            markers: what the pose is measured with.
+            robot: whose base the cell stands about, and whose arm hides markers; None for a base at the
+                origin of the world.
+
+        Raises:
+            ValueError: if something is out of its range, or a file is missing or wrong.
+        """
+        super().__init__()
+        PoseCamera(config)  # refuses what no camera can be
+        markers = markers or MarkerCameraConfig()
+        cell, body = load_cell(markers.cell), load_body(markers.body)
+        cameras = cell.camera_model(robot.base.pose() if robot else None)
+        self._config = config
+        self._features = FeatureSource(cameras, cell.windows, body, markers.features)
+        self._tracker = Tracker(cameras, body, markers.tracker)
+        self._arm = ArmCapsules(robot) if robot else None
+        self._lost_below = norm.ppf(config.dropout_probability)
+        self._per_exposure = self._features.noise_size + 1  # the last one for a lost exposure
+        self._X_WE = self.DeclareAbstractInputPort("X_WE", Value(RigidTransform()))
+        self._noise = self.DeclareVectorInputPort(
+            "noise", BLOCK * self._per_exposure, RandomDistribution.kGaussian
+        )
+        self._motor_state = self.DeclareVectorInputPort("motor_state", 2 * NUM_JOINTS)
+        in_flight = int(np.floor(config.delay / config.period + _EPSILON)) + 2
+        empty = np.concatenate([[-np.inf, 0.0], np.eye(4)[:3].ravel(), [0.0]])
+        newest = self.DeclareDiscreteState(empty[:-1])
+        self._in_flight = self.DeclareDiscreteState(np.tile(empty, in_flight))
+        self._memory = self.DeclareDiscreteState(TrackerState().to_vector())
+        self.DeclareStateOutputPort("exposure", newest)
+        self.DeclareAbstractOutputPort(
+            "pose_sample",
+            lambda: Value(PoseSample()),
+            self._calc_sample,
+            {self.time_ticket(), self.xd_ticket()},
+        )
+        self.DeclarePeriodicDiscreteUpdateEvent(config.period, 0.0, self._expose)
+
+    def _expose(self, context: Context, discrete_state: DiscreteValues) -> None:
+        time = context.get_time()
+        first = round(time / self._config.period) % BLOCK * self._per_exposure
+        noise = self._noise.Eval(context)[first : first + self._per_exposure]
+        lost = noise[-1] < self._lost_below
+        for start, end in self._config.dropouts:
+            lost = lost or start <= time < end
+        state = TrackerState.from_vector(context.get_discrete_state(self._memory).value())
+        X_WE, valid, residual = state.X_WE, False, 0.0
+        if not lost:
+            arm = None
+            if self._arm is not None and self._motor_state.HasValue(context):
+                arm = self._arm.at(self._motor_state.Eval(context)[:NUM_JOINTS])
+            blobs = self._features.blobs(self._X_WE.Eval(context).GetAsMatrix4(), noise[:-1], arm)
+            state, found = self._tracker.track(state, time, blobs)
+            valid, residual = found.valid, found.position_sigma
+            X_WE = state.X_WE
+        exposure = np.concatenate([[time, valid], X_WE[:3].ravel(), [residual]])
+        in_flight = discrete_state.get_mutable_value(self._in_flight)
+        in_flight[_WIDTH:] = in_flight[:-_WIDTH].copy()
+        in_flight[:_WIDTH] = exposure
+        discrete_state.set_value(0, exposure[:-1])
+        discrete_state.set_value(self._memory, state.to_vector())
+
+    def _calc_sample(self, context: Context, output) -> None:
+        due = context.get_time() - self._config.delay + _EPSILON
+        in_flight = context.get_discrete_state(self._in_flight).value().reshape(-1, _WIDTH)
+        entry = next(candidate for candidate in in_flight if candidate[0] <= due)
+        # Orthonormal by construction; checking it again would cost more than the rest.
+        X_WE = RigidTransform.MakeUnchecked(entry[2:14].reshape(3, 4))
+        output.set_value(PoseSample(float(entry[0]), X_WE, bool(entry[1]), float(entry[14])))

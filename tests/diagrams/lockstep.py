@@ -1,0 +1,123 @@
+"""A virtual cell and its client in one process, message by message instead of second by second.
+
+The bytes are those of the wire and the cell is the one of ``truetip cell``; only the clock is not a real one,
+so that a run is the same every time and takes as long as it has to.
+"""
+
+import heapq
+import itertools
+from types import SimpleNamespace
+
+from diagrams.scenario import Scenario
+from diagrams.virtual_cell import VirtualCell
+from robots.model import load_robot
+from systems.egm.controller import VirtualController
+from systems.egm.messages import Command, Mode, RobotReport
+from systems.egm.session import EgmSession
+from systems.faulty_link import FaultyLink
+from systems.mocap.clock import ClockQuality
+from systems.samples import PoseSample
+
+TURN_AROUND = 4e-4  # s, of the client: its reply is heard at the next cycle
+CELL, STRANGER = ("127.0.0.1", 40000), ("127.0.0.1", 40001)
+
+
+class Lockstep:
+    """The client's and the camera's end of a wire, with the cell behind it."""
+
+    def __init__(self, scenario: Scenario) -> None:
+        robot, config = load_robot(scenario.robot), scenario.station
+        self.cell = VirtualCell(scenario, robot)
+        self.controller = VirtualController(robot, config.egm.run)
+        self.session = EgmSession(robot.speed, config.link.break_after, period=config.period)
+        self.channel = SimpleNamespace(address=("127.0.0.1", 6510))
+        self.time = self.arrived = 0.0
+        self.faults = config.faults
+        self.to_client = FaultyLink(config.faults, config.period, 1)
+        self.from_client = FaultyLink(config.faults, config.period, 2)
+        self._order = itertools.count()
+        self._on_the_way: list = []  # (time, order, data, sender) to the client
+        self._replies: list = []  # (time, order, data) to the controller
+        self._frames: list[tuple[float, PoseSample]] = []
+        self._is_stopped = False
+        self._report()
+
+    def now(self) -> float:
+        """The one clock of client and cell in s."""
+        return self.time
+
+    def poll(self, timeout: float = 0.0) -> RobotReport | None:
+        """As `systems.egm.client.EgmClient.poll`; time passes only here."""
+        end = self.time + timeout
+        while not self._on_the_way or self._on_the_way[0][0] > end:
+            if self.cell.time > end:
+                self.time = end
+                self.session.check(end)
+                return None
+            self._cycle()
+        newest = None
+        self.time = max(self.time, self._on_the_way[0][0])
+        while self._on_the_way and self._on_the_way[0][0] <= self.time:
+            _, _, data, sender = heapq.heappop(self._on_the_way)
+            report = self.session.receive(data, sender, self.time)
+            if report is not None:
+                newest, self.arrived = report, self.time
+        return newest
+
+    def reply(self, mode: Mode, command: Command) -> bool:
+        """As `systems.egm.client.EgmClient.reply`."""
+        data = self.session.reply(mode, command, self.time)
+        if data is None:
+            return False
+        for delivery in self.from_client.pass_on(self.time + TURN_AROUND, data):
+            if not delivery.is_foreign:
+                heapq.heappush(self._replies, (delivery.time, next(self._order), delivery.data))
+        return True
+
+    def camera(self) -> "LockstepCamera":
+        """The camera's end of the wire."""
+        return LockstepCamera(self)
+
+    def frames_until(self, time: float) -> list[tuple[float, PoseSample]]:
+        """What the camera has published; each once."""
+        known = [frame for frame in self._frames if frame[0] <= time]
+        self._frames = self._frames[len(known) :]
+        return known
+
+    def _cycle(self) -> None:
+        now = self.cell.time
+        while self._replies and self._replies[0][0] <= now:
+            data = heapq.heappop(self._replies)[2]
+            self.controller.receive(data, self.cell.stamp, self.cell.planned)
+        if 0.0 <= self.faults.stop_at <= now and not self._is_stopped:
+            self._is_stopped = True
+            self.controller.stop(self.cell.stamp)
+        self.controller.cycle(self.cell.stamp, self.cell.planned)
+        self._frames += [
+            (exposure.published, exposure.sample) for exposure in self.cell.advance(self.controller)
+        ]
+        self._report()
+
+    def _report(self) -> None:
+        joints = self.cell.joints
+        data = self.controller.report(self.cell.stamp, joints.position, self.cell.planned, joints.effort)
+        for delivery in self.to_client.pass_on(self.cell.time, data):
+            sender = STRANGER if delivery.is_foreign else CELL
+            heapq.heappush(self._on_the_way, (delivery.time, next(self._order), delivery.data, sender))
+
+
+class LockstepCamera:
+    """As `systems.mocap.receiver.MocapReceiver`, with a clock that is known."""
+
+    def __init__(self, wire: Lockstep) -> None:
+        self._wire = wire
+
+    def poll(self, now: float) -> PoseSample | None:
+        """The newest sample, if there is a new one."""
+        frames = self._wire.frames_until(now)
+        return frames[-1][1] if frames else None
+
+    def report(self) -> SimpleNamespace:
+        """What the run asks for at its end."""
+        clock = ClockQuality(0, 0.0, 0.0, 0.0, 0.0, {}, 1)
+        return SimpleNamespace(wire=SimpleNamespace(), samples=SimpleNamespace(), clock=clock, last_error="")

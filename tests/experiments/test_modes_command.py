@@ -1,0 +1,87 @@
+"""truetip modes: its numbers are those of the analysis, its pages open, wrong input is one line."""
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+import typer
+from typer.testing import CliRunner, Result
+
+from experiments.modes_command import SHOWN_MODES, modes_command
+from robots.model import load_robot
+from robots.modes import ModalAnalysis, stretched
+from tests.experiments.browser import open_page
+
+APP = typer.Typer()
+APP.command("modes")(modes_command)
+
+
+def run(folder: Path, *arguments: str) -> Result:
+    outputs = [f"--out={folder / 'modes.html'}", f"--animation={folder / 'motion.html'}"]
+    return CliRunner().invoke(APP, [*outputs, "--grid=3", *arguments])
+
+
+def test_the_numbers_are_those_of_the_analysis(tmp_path: Path):
+    result = run(tmp_path, "--robot=kr210", "--payload=100", "--json", "-")
+    assert result.exit_code == 0, result.output
+    numbers, robot = json.loads(result.stdout), load_robot("kr210")
+    analysis = ModalAnalysis(robot, "structure", 100.0)
+    expected = analysis.at(stretched(robot))
+    found = numbers["stretched"]
+    assert found["frequency_hz"] == pytest.approx(expected.frequency_hz[:SHOWN_MODES], rel=1e-6)
+    assert found["damping_ratio"] == pytest.approx(expected.damping_ratio[:SHOWN_MODES], rel=1e-6)
+    assert np.deg2rad(found["position_deg"]) == pytest.approx(stretched(robot))
+    for share in found["energy_share"]:
+        assert sum(share.values()) == pytest.approx(1.0)
+    space = numbers["workspace"]
+    assert space["axis_2_deg"] == pytest.approx([-140.0, -72.5, -5.0])
+    middle = analysis.at(np.deg2rad([0.0, -72.5, space["axis_3_deg"][1], 0.0, 0.0, 0.0]))
+    assert space["lowest_frequency_hz"][1][1] == pytest.approx(middle.frequency_hz[0], rel=1e-6)
+    lowest = np.array(space["lowest_frequency_hz"])
+    spread = {"min": lowest.min(), "median": np.median(lowest), "max": lowest.max()}
+    assert space["frequency_hz"][0] == pytest.approx(spread)
+
+
+def test_the_table_names_frequencies_and_what_yields(tmp_path: Path):
+    result = run(tmp_path, "--robot=irb1200", "--elasticity=joints")
+    assert result.exit_code == 0, result.output
+    frequency = ModalAnalysis(load_robot("irb1200"), "joints", 7.0).at(stretched(load_robot("irb1200")))
+    assert f"{frequency.frequency_hz[0]:.2f}" in result.stdout
+    assert "gear 1 100%" in result.stdout
+    assert "tilt" not in result.stdout
+
+
+def test_a_mode_can_be_watched_live(tmp_path: Path):
+    result = run(tmp_path, "--robot=kr16", "--mode=2", "--meshcat")
+    assert result.exit_code == 0, result.output
+    assert "Mode 2 swings at http://localhost:" in result.stdout
+
+
+def test_the_pages_open(tmp_path: Path):
+    assert run(tmp_path, "--robot=kr16").exit_code == 0
+    opened = open_page(tmp_path / "modes.html")
+    assert opened.console == []
+    assert "js-plotly-plot" in opened.dom
+    moving = open_page(tmp_path / "motion.html")
+    assert "mode 1 of KUKA KR 16-2" in moving.dom
+    assert not [line for line in moving.console if "rror" in line]
+
+
+REFUSED = {
+    "robot": ("--robot=kr211", "robot 'kr211': no file"),
+    "payload": ("--payload=300", "payload of KUKA KR 210 R2700 extra must be between 0 and 210.0 kg"),
+    "rigid": ("--elasticity=rigid", "elasticity must be joints or structure"),
+    "elasticity": ("--elasticity=foam", "elasticity must be one of rigid, joints, structure, got 'foam'"),
+    "grid": ("--grid=1", "--grid must be at least 2, got 1"),
+    "mode": ("--mode=0", "--mode must be between 1 and 6, got 0"),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize(("option", "message"), REFUSED.values(), ids=REFUSED)
+def test_wrong_input_is_refused_in_one_line_and_leaves_nothing(tmp_path: Path, option: str, message: str):
+    result = run(tmp_path, option)
+    assert result.exit_code == 2
+    assert message in result.stderr
+    assert len(result.stderr.strip().splitlines()) == 1
+    assert not list(tmp_path.iterdir())

@@ -1,0 +1,168 @@
+"""The marker camera in a diagram: ports, stamps and delays of the pose camera, and errors of its own."""
+
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+from pydrake.common import RandomDistribution, RandomGenerator
+from pydrake.systems.analysis import Simulator
+from pydrake.systems.framework import Context, Diagram, DiagramBuilder
+from pydrake.systems.primitives import RandomSource
+
+from robots.kinematics import Kinematics
+from robots.model import load_robot
+from robots.pose import pose_error
+from systems.camera import BLOCK, CameraConfig, PoseCamera
+from systems.samples import PoseSample
+from systems.tracking.features import FeatureConfig
+from systems.tracking.marker_camera import MarkerCamera, MarkerCameraConfig
+from systems.tracking.tracker import TrackerConfig
+from tests.systems.rigs import ValueSignal, VectorSignal, pose
+
+ROBOT = load_robot("irb1200")
+Q = np.array([0.3, 0.4, 0.2, 0.1, 0.5, -0.2])
+STILL = Kinematics(ROBOT).forward(Q)
+EXACT = MarkerCameraConfig(features=FeatureConfig(pixel_sigma=0.0))
+
+
+def samples(
+    camera: MarkerCamera | PoseCamera,
+    config: CameraConfig,
+    times: np.ndarray,
+    tip: Callable[[float], object] = lambda time: pose(STILL),
+    q: np.ndarray | None = None,
+    seed: int = 0,
+) -> list[PoseSample]:
+    """What the camera reports at the given times, wired as in a station."""
+    builder = DiagramBuilder()
+    builder.AddSystem(camera)
+    builder.Connect(builder.AddSystem(ValueSignal(tip)).get_output_port(), camera.GetInputPort("X_WE"))
+    noise = camera.GetInputPort("noise")
+    source = RandomSource(RandomDistribution.kGaussian, noise.size(), BLOCK * config.period)
+    builder.Connect(builder.AddSystem(source).get_output_port(), noise)
+    if q is not None:
+        state = builder.AddSystem(VectorSignal(lambda time: np.concatenate([q, np.zeros(6)])))
+        builder.Connect(state.get_output_port(), camera.GetInputPort("motor_state"))
+    builder.ExportOutput(camera.GetOutputPort("pose_sample"), "pose_sample")
+    diagram: Diagram = builder.Build()
+    simulator = Simulator(diagram)
+    context: Context = simulator.get_mutable_context()
+    diagram.SetRandomContext(context, RandomGenerator(seed))
+    found = []
+    for time in times:
+        simulator.AdvanceTo(time)
+        found.append(diagram.GetOutputPort("pose_sample").Eval(context))
+    return found
+
+
+def each_exposure(
+    config: CameraConfig, markers: MarkerCameraConfig, count: int, **kwargs
+) -> list[PoseSample]:
+    times = config.delay + config.period * (np.arange(count) + 0.5)
+    return samples(MarkerCamera(config, markers, ROBOT), config, times, **kwargs)
+
+
+def errors(found: list[PoseSample]) -> np.ndarray:
+    return np.array([pose_error(sample.X_WE.GetAsMatrix4(), STILL) for sample in found])
+
+
+def test_it_has_the_ports_of_the_pose_camera_and_one_that_may_stay_free():
+    ours, theirs = MarkerCamera(CameraConfig()), PoseCamera(CameraConfig())
+
+    def inputs(system):
+        return [system.get_input_port(i).get_name() for i in range(system.num_input_ports())]
+
+    def outputs(system):
+        ports = [system.get_output_port(i) for i in range(system.num_output_ports())]
+        return [(port.get_name(), port.get_data_type(), port.size()) for port in ports]
+
+    assert inputs(ours) == [*inputs(theirs), "motor_state"]
+    assert outputs(ours) == outputs(theirs)
+
+
+@pytest.mark.parametrize("delay", [0.0, 0.004, 0.0075, 0.02])
+def test_samples_come_when_those_of_the_pose_camera_come(delay: float):
+    """The tip starts to rise at 10 ms; stamps and validity are equal, poses up to rounding."""
+    config = CameraConfig(delay=delay, dropouts=[[0.02, 0.03]])
+    times = np.arange(1, 100) * 5e-4 + 1e-6
+
+    def tip(time: float):
+        X = STILL.copy()
+        X[2, 3] += 0.1 * max(time - 0.01, 0.0)
+        return pose(X)
+
+    ours = samples(MarkerCamera(config, EXACT), config, times, tip)
+    theirs = samples(PoseCamera(config), config, times, tip)
+    assert [sample.time for sample in ours] == [sample.time for sample in theirs]
+    assert [sample.valid for sample in ours] == [sample.valid for sample in theirs]
+    for mine, other in zip(ours, theirs, strict=True):
+        if mine.valid:
+            np.testing.assert_allclose(mine.X_WE.GetAsMatrix4(), other.X_WE.GetAsMatrix4(), atol=1e-9)
+
+
+def test_the_residual_is_the_spread_of_the_position():
+    """Fifteen hundred numbers know a standard deviation to 1.8 %; four times that is allowed."""
+    found = each_exposure(CameraConfig(), MarkerCameraConfig(), 500)
+    assert all(sample.valid for sample in found)
+    residual = np.mean([sample.residual for sample in found])
+    assert errors(found)[:, 3:].std() == pytest.approx(residual, rel=0.08)
+    assert 1e-6 < residual < 1e-4
+    assert each_exposure(CameraConfig(), EXACT, 3)[-1].residual < 1e-12
+
+
+def test_noise_is_new_in_every_exposure_and_block():
+    found = errors(each_exposure(CameraConfig(), MarkerCameraConfig(), 2 * BLOCK + 10))
+    distance = np.abs(found[:, None] - found).max(-1) + np.eye(len(found))
+    assert distance.min() > 1e-9
+
+
+def test_the_seed_decides_the_noise():
+    markers = MarkerCameraConfig(features=FeatureConfig(missing=0.2, false=0.1))
+    once, again, other = (errors(each_exposure(CameraConfig(), markers, 20, seed=seed)) for seed in (7, 7, 8))
+    np.testing.assert_array_equal(once, again)
+    assert not np.isclose(once, other, rtol=0.0, atol=1e-9).any()
+
+
+def test_the_arm_hides_markers_when_its_joints_are_known():
+    """Without occlusion every camera sees the body; with it some do not, and the pose is less certain."""
+    free = each_exposure(CameraConfig(), MarkerCameraConfig(), 100)
+    hidden = each_exposure(CameraConfig(), MarkerCameraConfig(), 100, q=Q)
+    assert all(sample.valid for sample in hidden)
+    free_residual, hidden_residual = (np.mean([s.residual for s in found]) for found in (free, hidden))
+    assert hidden_residual > 1.01 * free_residual
+
+
+def test_a_body_out_of_sight_is_invalid_and_found_again_when_it_returns():
+    away = STILL.copy()
+    away[2, 3] += 50.0
+    config = CameraConfig(delay=0.0)
+
+    def tip(time: float):
+        return pose(away if 0.02 <= time < 0.1 else STILL)
+
+    found = samples(MarkerCamera(config, EXACT), config, 4e-3 * np.arange(40) + 2e-3, tip)
+    assert [i for i, sample in enumerate(found) if not sample.valid] == list(range(5, 25))
+    np.testing.assert_allclose(found[10].X_WE.GetAsMatrix4(), STILL, atol=1e-9)  # the last one, repeated
+    assert [sample.time for sample in found] == pytest.approx(4e-3 * np.arange(40))
+
+
+def test_samples_are_lost_with_the_declared_probability():
+    n = 400
+    found = each_exposure(CameraConfig(dropout_probability=0.3), EXACT, n)
+    lost = sum(not sample.valid for sample in found)
+    assert abs(lost - 0.3 * n) < 4.0 * np.sqrt(0.21 * n)
+
+
+@pytest.mark.parametrize(
+    ("config", "markers", "message"),
+    [
+        (CameraConfig(period=0.0), MarkerCameraConfig(), "camera: period must be positive"),
+        (CameraConfig(), MarkerCameraConfig(cell="nowhere"), "cell 'nowhere': no file"),
+        (CameraConfig(), MarkerCameraConfig(body="nothing"), "body 'nothing': no file"),
+        (CameraConfig(), MarkerCameraConfig(features=FeatureConfig(missing=2.0)), "features: missing"),
+        (CameraConfig(), MarkerCameraConfig(tracker=TrackerConfig(gate=-1.0)), "tracker: gate"),
+    ],
+)
+def test_refuses_what_no_camera_can_be(config: CameraConfig, markers: MarkerCameraConfig, message: str):
+    with pytest.raises(ValueError, match=message):
+        MarkerCamera(config, markers)
