@@ -118,6 +118,7 @@ class GuidedRun:
         gc.freeze()
         gc.disable()
         sys.setswitchinterval(_SWITCH)
+        before = client.session.counters.as_dict()
         try:
             wire = StationWire(client, camera, self.scenario, self.robot, self._is_speed_only, now)
             wire.connect(self._uses_camera)
@@ -128,7 +129,8 @@ class GuidedRun:
             gc.unfreeze()
             if collecting:
                 gc.enable()
-        return self._record(client, camera, wire, ended)
+        counters = {name: number - before[name] for name, number in client.session.counters.as_dict().items()}
+        return self._record(counters, camera, wire, ended)
 
     def _follow(self, wire: StationWire, progress: Callable[[float], None], now: Callable[[], float]) -> str:
         """Runs the path to its end; returns why it ended."""
@@ -209,7 +211,7 @@ class GuidedRun:
         self.station.command(scratch)
 
     def _record(
-        self, client: EgmClient, camera: MocapReceiver | None, wire: StationWire, ended: str
+        self, counters: dict[str, int], camera: MocapReceiver | None, wire: StationWire, ended: str
     ) -> GuidedRecord:
         times, data = self._log.read(self._context)
         n = len(times)
@@ -252,7 +254,7 @@ class GuidedRun:
             log=log,
             stamps=stamps,
             ended=ended,
-            counters=client.session.counters.as_dict(),
+            counters=counters,
             camera={**vars(report.wire), **vars(report.samples)} if report else {},
             turn_around=np.array(wire.turn_around),
             camera_clock=report.clock if report else None,

@@ -14,7 +14,7 @@ from diagrams.scenario_file import ScenarioError, conformed, one_line, read_tree
 from robots.geometric_errors import GeometricErrors
 from robots.model import NUM_JOINTS, Placement
 from robots.plant import ELASTICITIES
-from systems.camera import CameraConfig
+from systems.camera import CAMERAS, CameraConfig
 from systems.drive import KINDS, DriveConfig
 from systems.egm.controller import EgmRunConfig
 from systems.egm.motion import EgmMotionConfig
@@ -25,6 +25,7 @@ from systems.guard import GuardConfig
 from systems.mocap.receiver import MocapReceiverConfig
 from systems.paths import ReferenceConfig
 from systems.servo import LAWS, LawConfig
+from systems.tracking.marker_camera import MarkerCameraConfig
 
 __all__ = ["Scenario", "ScenarioError", "load_scenario", "scenario_text", "shipped_scenarios"]
 
@@ -67,6 +68,7 @@ class StationConfig:
     errors: GeometricErrors = field(default_factory=GeometricErrors)
     drive: DriveConfig = field(default_factory=DriveConfig)
     camera: CameraConfig = field(default_factory=CameraConfig)
+    markers: MarkerCameraConfig = field(default_factory=MarkerCameraConfig)  # of a camera that is not a pose
     interface: str = "direct"  # from command to drives: direct, or egm as a controller under EGM plans
     egm: EgmConfig = field(default_factory=EgmConfig)
     link: LinkConfig = field(default_factory=LinkConfig)
@@ -200,6 +202,7 @@ def _check(scenario: Scenario) -> None:
     _one_of("law", scenario.law, LAWS)
     _one_of("servo.feedforward.kind", scenario.servo.feedforward.kind, ("none", *FEEDFORWARDS))
     _one_of("station.kind", scenario.station.kind, STATIONS)
+    _one_of("station.camera.kind", scenario.station.camera.kind, CAMERAS)
     _one_of("station.interface", scenario.station.interface, ("direct", "egm"))
     _one_of("station.link.on_break", scenario.station.link.on_break, ("end", "resume"))
     SignalCodec(scenario.station.link.signals)

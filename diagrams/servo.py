@@ -64,12 +64,14 @@ class Servo(Diagram):
                 config.correction_limit_deg,
                 uses_camera=law not in BLIND_LAWS,
                 passes_torque=has_torque,
+                is_speed_only=config.drive == "velocity",
             ),
         )
         builder.Connect(self.reference.GetOutputPort("X_WE_preview"), servo.GetInputPort("X_WE_desired"))
         builder.Connect(self.reference.GetOutputPort("V_WE_preview"), servo.GetInputPort("V_WE_desired"))
         for name in ("correction", "measurement"):
             builder.Connect(servo.GetOutputPort(name), guard.GetInputPort(name))
+        builder.Connect(guard.GetOutputPort("deviation"), servo.GetInputPort("deviation"))
         joints = builder.ExportInput(servo.GetInputPort("joint_sample"), "joint_sample")
         commands = {name: servo.GetOutputPort(name) for name in ("position_command", "velocity_command")}
         if has_torque:

@@ -23,6 +23,7 @@ from systems.drive import Drive
 from systems.egm.motion import EgmMotion
 from systems.joint_sensor import JointSensor
 from systems.tip_pose import TipPose
+from systems.tracking.marker_camera import MarkerCamera
 
 _RUNAWAY = 10.0  # times the largest joint speed: no drive of a working simulation gets there
 
@@ -96,7 +97,7 @@ class SimulatedStation(Diagram):
         motor_state = builder.AddNamedSystem("motor_state", motor_state_selector(self.robot))
         sensor = builder.AddNamedSystem("joint_sensor", JointSensor(_RUNAWAY * float(robot.speed.max())))
         tip = builder.AddNamedSystem("tip", TipPose(self.robot))
-        camera = builder.AddNamedSystem("camera", PoseCamera(config.camera))
+        camera = builder.AddNamedSystem("camera", _camera(robot, config))
         noise = camera.GetInputPort("noise")
         self._noise = builder.AddNamedSystem(
             "noise", RandomSource(RandomDistribution.kGaussian, noise.size(), BLOCK * config.camera.period)
@@ -121,6 +122,8 @@ class SimulatedStation(Diagram):
         builder.Connect(torque, sensor.GetInputPort("motor_torque"))
         builder.Connect(state, tip.GetInputPort("state"))
         builder.Connect(tip.GetOutputPort("X_WE"), camera.GetInputPort("X_WE"))
+        if camera.HasInputPort("motor_state"):  # of the arm, which hides markers
+            builder.Connect(motor_state.get_output_port(), camera.GetInputPort("motor_state"))
         builder.Connect(self._noise.get_output_port(), noise)
 
         for name in ("position_command", "velocity_command"):
@@ -194,6 +197,13 @@ class SimulatedStation(Diagram):
             X_WE_true=self.robot.tool_poses(state),
             link_position=self.robot.link_positions(state),
         )
+
+
+def _camera(robot: RobotModel, config: StationConfig) -> PoseCamera | MarkerCamera:
+    """Whichever the scenario asks for. Raises ValueError if it refuses its configuration."""
+    if config.camera.kind == "pose":
+        return PoseCamera(config.camera)
+    return MarkerCamera(config.camera, config.markers, robot, config.camera.kind)
 
 
 def _exposures(logged: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

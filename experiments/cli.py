@@ -25,9 +25,21 @@ from experiments.design_command import design_command
 from experiments.diagram_view import write_diagram
 from experiments.drivetrain_command import drivetrain_command
 from experiments.frame_commands import align_command, chain_command, frame_command, tool_command
+from experiments.guided_command import ask_before_moving, guide, on_station
 from experiments.live import LiveView, advance_live
 from experiments.modes_command import modes_command
-from experiments.options import FeedforwardOption, OutOption, RobotOption, ScenarioOption, SetOption
+from experiments.options import (
+    AnyScenarioOption,
+    CameraOption,
+    FeedforwardOption,
+    OutOption,
+    RobotOption,
+    ScenarioOption,
+    SetOption,
+    StationOption,
+    WithCellOption,
+    YesOption,
+)
 from experiments.prepare import Prepared, check, prepare
 from experiments.report import verdict
 from experiments.results import RESULTS, write_results
@@ -77,10 +89,14 @@ def _options(
 
 @app.command("compare")
 def compare_command(
-    scenario: ScenarioOption = "misaligned",
+    scenario: AnyScenarioOption = None,
     settings: SetOption = None,
     robot: RobotOption = None,
     feedforward: FeedforwardOption = None,
+    camera: CameraOption = None,
+    station: StationOption = None,
+    with_cell: WithCellOption = False,
+    yes: YesOption = False,
     out: OutOption = Path("out"),
     json_file: Annotated[
         str | None,
@@ -103,17 +119,25 @@ def compare_command(
             name, number = ("--cycles", cycles) if cycles < 1 else ("--jobs", jobs)
             raise ValueError(f"{name} must be at least 1, got {number}")
         cycles = 1 if is_quick else cycles
-        prepared = prepare(scenario, _settings(settings, None, feedforward), robot, is_quick)
+        changes = _settings(settings, None, feedforward, camera)
+        name, changes = on_station(scenario, changes, station, with_cell)
+        prepared = prepare(name, changes, robot, is_quick)
         check(prepared, list(COMPARED_LAWS))
+        is_guided = prepared.scenario.station.kind == "egm"
+        if is_guided:
+            ask_before_moving(human, prepared, with_cell or yes)
     with refusing(OSError), ExitStack() as stack:
         stage = stack.enter_context(staged_folder(out))
         copy = stack.enter_context(staged_file(json_file)) if json_file not in (None, "-") else None
-        processes = min(jobs or usable_cores(), cycles * len(COMPARED_LAWS))
-        label = f"{count(cycles * len(COMPARED_LAWS), 'run')} in {count(processes, 'process', 'processes')}"
-        with progress_bar(label) as progress:
-            logs = compare(
-                prepared.scenario, prepared.robot, list(COMPARED_LAWS), cycles, processes, progress
-            )
+        if is_guided:
+            logs = guide(human, stage, prepared, list(COMPARED_LAWS), cycles, with_cell)
+        else:
+            processes = min(jobs or usable_cores(), cycles * len(COMPARED_LAWS))
+            runs = count(cycles * len(COMPARED_LAWS), "run")
+            with progress_bar(f"{runs} in {count(processes, 'process', 'processes')}") as progress:
+                logs = compare(
+                    prepared.scenario, prepared.robot, list(COMPARED_LAWS), cycles, processes, progress
+                )
         result = _write(human, stage, prepared, logs)
         if copy:
             shutil.copyfile(stage / "summary.json", copy)
@@ -126,10 +150,14 @@ def compare_command(
 @app.command("run")
 def run_command(
     law: LawOption = None,
-    scenario: ScenarioOption = "misaligned",
+    scenario: AnyScenarioOption = None,
     settings: SetOption = None,
     robot: RobotOption = None,
     feedforward: FeedforwardOption = None,
+    camera: CameraOption = None,
+    station: StationOption = None,
+    with_cell: WithCellOption = False,
+    yes: YesOption = False,
     out: OutOption = Path("out"),
     meshcat: Annotated[bool, typer.Option("--meshcat", help="Show it live in a browser.")] = False,
     realtime: Annotated[
@@ -142,11 +170,22 @@ def run_command(
     with refusing(ValueError, OSError):
         if realtime is not None and not 0.0 < realtime < math.inf:
             raise ValueError(f"--realtime must be positive, got {realtime:g}")
-        prepared = prepare(scenario, _settings(settings, law, feedforward), robot)
+        changes = _settings(settings, law, feedforward, camera)
+        name, changes = on_station(scenario, changes, station, with_cell)
+        prepared = prepare(name, changes, robot)
         law = prepared.scenario.law
         check(prepared, [law])
+        is_guided = prepared.scenario.station.kind == "egm"
+        if is_guided:
+            if meshcat or realtime is not None:
+                raise ValueError("--meshcat and --realtime belong to a simulated station")
+            ask_before_moving(console, prepared, with_cell or yes)
     with refusing(OSError), ExitStack() as stack:
         stage = stack.enter_context(staged_folder(out))
+        if is_guided:
+            logs = guide(console, stage, prepared, [law], 1, with_cell)
+            _conclude(console, _write(console, stage, prepared, logs), out)
+            return
         experiment = Experiment(prepared.scenario, law, prepared.robot)
         view = LiveView(experiment, prepared.drawn_robot) if meshcat else None
         if view:
@@ -208,9 +247,11 @@ def robots_command() -> None:
     print_list((name, load_robot(name).name) for name in shipped_robots())
 
 
-def _settings(settings: list[str] | None, law: str | None, feedforward: str | None) -> list[str]:
+def _settings(
+    settings: list[str] | None, law: str | None, feedforward: str | None, camera: str | None = None
+) -> list[str]:
     """The changes of a scenario that options of their own make, behind those of --set."""
-    own = {"law": law, "servo.feedforward.kind": feedforward}
+    own = {"law": law, "servo.feedforward.kind": feedforward, "station.camera.kind": camera}
     return [*(settings or []), *(f"{key}={value}" for key, value in own.items() if value)]
 
 

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from diagrams.log import RunLog
-from experiments.metrics import pose_errors
+from experiments.metrics import known_poses
 from experiments.report_files import write_text
 from experiments.report_style import law_colors, law_title
 
@@ -57,11 +57,11 @@ def write_figure(path: str | Path, title: str, logs: Mapping[str, RunLog]) -> No
 
 
 def _distance_mm(log: RunLog) -> tuple[np.ndarray, np.ndarray]:
-    """Times in s and true distances in mm, both (n,), thinned out evenly."""
+    """Times in s and distances of the tip in mm, both (n,), thinned out evenly."""
     keep = np.flatnonzero(log.time <= log.path_end + 1e-9)
     if len(keep) > SAMPLES:
         keep = keep[np.round(np.linspace(0, len(keep) - 1, SAMPLES)).astype(int)]
-    distance = 1e3 * np.linalg.norm(pose_errors(log, "true")[keep, 3:], axis=1)
+    distance = 1e3 * np.linalg.norm(log.X_WE_desired[keep, :3, 3] - known_poses(log)[keep, :3, 3], axis=1)
     return log.time[keep], np.maximum(distance, FLOOR)
 
 

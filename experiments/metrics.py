@@ -39,6 +39,21 @@ def pose_errors(log: RunLog, source: str) -> np.ndarray:
     return pose_error(log.X_WE_desired, X_WE)
 
 
+def judged_source(log: RunLog) -> str:
+    """By what a run is judged: "true", or "measured" on a real station, where nobody knows the truth."""
+    return "true" if np.isfinite(log.X_WE_true).any() else "measured"
+
+
+def known_poses(log: RunLog) -> np.ndarray:
+    """Poses of the tool by which a run is judged, for pictures; gaps hold the last one known, (n, 4, 4)."""
+    X_WE = log.X_WE_true if judged_source(log) == "true" else log.X_WE_measured
+    known = np.asarray(np.isfinite(X_WE).all(axis=(1, 2)))
+    if not known.any():
+        return log.X_WE_desired
+    newest = np.maximum.accumulate(np.where(known, np.arange(len(known)), -1))
+    return X_WE[np.where(newest < 0, int(np.argmax(known)), newest)]
+
+
 def window(log: RunLog, start: float, end: float) -> np.ndarray:
     """Which samples lie in [start, end], with a quarter of a sample to spare; shape (n,)."""
     slack = 0.25 * (log.time[1] - log.time[0]) if len(log.time) > 1 else 0.0
@@ -158,15 +173,21 @@ def timing(logs: Comparison) -> dict[str, Any]:
 
 
 def best_law(result: Mapping[str, Any]) -> str:
-    """The law of a `summary` whose largest true distance is smallest; the open loop only if it is alone.
+    """The law of a `summary` whose largest distance is smallest; the open loop only if it is alone.
 
     Where the laws start from the same error and it stays the largest, the root mean square decides.
     """
-    runs = result["runs"]
+    runs, source = result["runs"], judged_by(result)
     laws = [law for law in runs if law != "open_loop"] or list(runs)
-    smallest = min(_sortable(runs[law]["true"]["max_norm_mm"]) for law in laws)
-    alike = [law for law in laws if _sortable(runs[law]["true"]["max_norm_mm"]) <= 1.001 * smallest]
-    return min(alike, key=lambda law: _sortable(runs[law]["true"]["rms_norm_mm"]))
+    smallest = min(_sortable(runs[law][source]["max_norm_mm"]) for law in laws)
+    alike = [law for law in laws if _sortable(runs[law][source]["max_norm_mm"]) <= 1.001 * smallest]
+    return min(alike, key=lambda law: _sortable(runs[law][source]["rms_norm_mm"]))
+
+
+def judged_by(result: Mapping[str, Any]) -> str:
+    """By what the runs of a `summary` are judged, as `judged_source`."""
+    is_known = any(run["true"]["max_norm_mm"] is not None for run in result["runs"].values())
+    return "true" if is_known else "measured"
 
 
 def write_json(path: str | Path, data: Any) -> None:

@@ -5,11 +5,32 @@ from typing import Annotated
 
 import typer
 
+from systems.camera import CAMERAS
 from systems.feedforward import FEEDFORWARDS
 
 ScenarioOption = Annotated[
     str, typer.Option("--scenario", metavar="NAME|FILE", help="A shipped scenario or a YAML file.")
 ]
+# Without a name the command chooses one that fits.
+AnyScenarioOption = Annotated[
+    str | None,
+    typer.Option(
+        "--scenario",
+        metavar="NAME|FILE",
+        help="A shipped scenario or a YAML file.",
+        show_default="misaligned; on a station cell",
+    ),
+]
+StationOption = Annotated[
+    str | None,
+    typer.Option(
+        "--station", metavar="NAME", help="simulated, or egm for a controller and a camera on the wire."
+    ),
+]
+WithCellOption = Annotated[
+    bool, typer.Option("--with-cell", help="Start a virtual cell for it, over loopback, in real time.")
+]
+YesOption = Annotated[bool, typer.Option("--yes", help="Do not ask before a real robot moves.")]
 SetOption = Annotated[
     list[str] | None,
     typer.Option("--set", metavar="KEY=VALUE", help="Change a value, as station.payload=0; repeatable."),
@@ -28,6 +49,15 @@ FeedforwardOption = Annotated[
         "--feedforward",
         metavar="NAME",
         help=f"An inverse model beside the law: none, {', '.join(FEEDFORWARDS)}.",
+        show_default="the scenario's",
+    ),
+]
+CameraOption = Annotated[
+    str | None,
+    typer.Option(
+        "--camera",
+        metavar="NAME",
+        help=f"Where poses come from: {', '.join(CAMERAS)} of markers.",
         show_default="the scenario's",
     ),
 ]

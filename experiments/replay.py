@@ -13,12 +13,13 @@ from pydrake.geometry import MeshcatAnimation, Sphere
 from pydrake.math import RigidTransform, RotationMatrix
 
 from diagrams.log import RunLog
-from experiments.metrics import path_window, pose_errors
+from experiments.metrics import known_poses, path_window
 from experiments.report_files import write_text
 from experiments.report_style import WANTED_COLOR, law_colors, law_title
 from experiments.scene import FRAME_RATE, RobotPicture, draw_frame, draw_path, open_meshcat, rgba
 from robots.geometric_errors import GeometricErrors
 from robots.model import RobotModel
+from robots.pose import pose_error
 
 TIP_RADIUS = 0.006  # m
 WANTED_RADIUS = 0.003  # m; the wanted path is a translucent tube, which a true path 3 mm off leaves
@@ -62,13 +63,14 @@ def write_replay(
     draw_frame(meshcat, "wanted/frame", length=0.14, radius=0.0018, alpha=0.45)
     _animate(animation, "wanted/frame", shown.time, shown.X_WE_desired, times)
     for law, log in logs.items():
-        p_WE = log.X_WE_true[path_window(log), :3, 3]
+        X_WE = known_poses(log)
+        p_WE = X_WE[path_window(log), :3, 3]
         draw_path(meshcat, f"{law}/path", p_WE, PATH_RADIUS, rgba(colors[law]))
         if law == shown_law:
             draw_frame(meshcat, f"{law}/tip", length=0.1, radius=0.003, alpha=1.0)
         else:
             meshcat.SetObject(f"{law}/tip", Sphere(TIP_RADIUS), rgba(colors[law]))
-        _animate(animation, f"{law}/tip", log.time, log.X_WE_true, times)
+        _animate(animation, f"{law}/tip", log.time, X_WE, times)
     animation.set_loop_mode(MeshcatAnimation.LoopMode.kLoopRepeat)
     meshcat.PublishRecording()
     write_text(path, _with_legend(meshcat.StaticHtml(), colors, shown_law))
@@ -78,7 +80,7 @@ def _best(logs: Mapping[str, RunLog]) -> str:
     laws = [law for law in logs if law != "open_loop"] or list(logs)
 
     def largest(law: str) -> float:
-        e = pose_errors(logs[law], "true")[path_window(logs[law])]
+        e = pose_error(logs[law].X_WE_desired, known_poses(logs[law]))[path_window(logs[law])]
         return float(np.linalg.norm(e[:, 3:], axis=1).max(initial=0.0))
 
     return min(laws, key=largest)

@@ -8,7 +8,7 @@ from typing import Any
 
 from plotly.offline import get_plotlyjs
 
-from experiments.metrics import Comparison, best_law
+from experiments.metrics import Comparison, best_law, judged_by
 from experiments.report_data import norm, plot_data
 from experiments.report_files import write_text
 from experiments.report_page import page
@@ -58,18 +58,22 @@ def write_report(
     write_text(path, page(escape(title), "\n".join(filter(None, sections)), get_plotlyjs(), safe, SCRIPT))
 
 
+_TIPS = {"true": "the true tip", "measured": "the tip, as the camera sees it,"}
+
+
 def verdict(summary: Mapping[str, Any]) -> str:
     """The result in one or two sentences of plain text."""
     best, runs = best_law(summary), summary["runs"]
-    numbers = runs[best]["true"]
+    source = judged_by(summary)
+    numbers, tip = runs[best][source], _TIPS[source]
     if numbers["settling_s"] is None:
         course = (
-            f"keeps the true tip within {_text(numbers['max_norm_mm'])} mm and "
+            f"keeps {tip} within {_text(numbers['max_norm_mm'])} mm and "
             f"{_text(numbers['max_angle_deg'])}° of the wanted path"
         )
     else:
         course = (
-            f"brings the true tip, up to {_text(numbers['max_norm_mm'])} mm off at the start, "
+            f"brings {tip}, up to {_text(numbers['max_norm_mm'])} mm off at the start, "
             f"within 5 % of that in {_text(numbers['settling_s'])} s"
         )
     text = (
@@ -77,7 +81,7 @@ def verdict(summary: Mapping[str, Any]) -> str:
         f"{_text(norm(numbers['static_mm']))} mm and {_text(norm(numbers['static_deg']))}° from it."
     )
     if "open_loop" in runs and best != "open_loop":
-        baseline = runs["open_loop"]["true"]
+        baseline = runs["open_loop"][source]
         text += (
             f" Without the camera the tip is off by up to {_text(baseline['max_norm_mm'])} mm and "
             f"{_text(baseline['max_angle_deg'])}°, and by {_text(norm(baseline['static_mm']))} mm at rest."
@@ -86,12 +90,12 @@ def verdict(summary: Mapping[str, Any]) -> str:
 
 
 def _header(summary: Mapping[str, Any], logs: Comparison) -> str:
-    colors = law_colors(logs)
+    colors, source = law_colors(logs), judged_by(summary)
     facts = "".join(
         f'<div class="fact" style="--law:{colors[law]}"><span class="name">{escape(law_title(law))}</span>'
-        f"<b>{_text(run['true']['max_norm_mm'])} <small>mm largest</small></b>"
-        f"<span>{_text(norm(run['true']['static_mm']))} mm at rest · "
-        f"{_text(run['true']['max_angle_deg'])}° largest</span></div>"
+        f"<b>{_text(run[source]['max_norm_mm'])} <small>mm largest</small></b>"
+        f"<span>{_text(norm(run[source]['static_mm']))} mm at rest · "
+        f"{_text(run[source]['max_angle_deg'])}° largest</span></div>"
         for law, run in summary["runs"].items()
     )
     return (
@@ -221,7 +225,7 @@ def _transient(summary: Mapping[str, Any]) -> str:
     runs, colors = summary["runs"], law_colors(summary["runs"])
     rows = ""
     for law, run in runs.items():
-        numbers = run["true"]
+        numbers = run[judged_by(summary)]
         if numbers["settling_s"] is not None:
             overshoot = [*numbers["overshoot_mm"], *numbers["overshoot_deg"]]
             cells = "".join(f"<td>{format_cell(value)}</td>" for value in overshoot)
@@ -231,7 +235,7 @@ def _transient(summary: Mapping[str, Any]) -> str:
     return _card(
         "Initial error",
         "Settling time to 5 % of the initial distance, and how far each axis went past zero. Runs that never "
-        "settle are left out. True errors.",
+        f"settle are left out. {judged_by(summary).capitalize()} errors.",
         _table(["", "settling s", *AXES], rows),
     )
 
@@ -249,7 +253,7 @@ def _iso(summary: Mapping[str, Any]) -> str:
         )
         return _table(["", *keys.values()], body)
 
-    cycles = max(run["true"]["iso_9283"]["cycles"] for run in runs.values())
+    cycles = max(run[judged_by(summary)]["iso_9283"]["cycles"] for run in runs.values())
     note = (
         "Accuracy and repeatability of the end pose (AP, RP) and of the path (AT, RT). Paths are compared as "
         f"curves, so that lag along the path does not count. {cycles} "

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from diagrams.log import RunLog
-from experiments.metrics import Comparison, path_window, pose_errors
+from experiments.metrics import Comparison, judged_by, known_poses, path_window, pose_errors
 from experiments.report_style import law_colors, law_title
 
 TRUE_SAMPLES = 2500  # per law and axis at most
@@ -33,7 +33,7 @@ def plot_data(result: Mapping[str, Any], logs: Comparison) -> dict[str, Any]:
                 "true": _error_traces(cycles[0], "true", TRUE_SAMPLES),
                 "measured": _error_traces(cycles[0], "measured", MEASURED_SAMPLES),
                 "path": _path(cycles[0]),
-                "bars": _bars(result["runs"][law]["true"]),
+                "bars": _bars(result["runs"][law][judged_by(result)]),
                 "events": _events(cycles[0]),
             }
             for law, cycles in logs.items()
@@ -60,10 +60,10 @@ def _error_traces(log: RunLog, source: str, samples: int) -> dict[str, Any]:
 def _path(log: RunLog) -> dict[str, Any]:
     """Wanted positions and the deviations from them, both in mm."""
     keep = _thinned(np.flatnonzero(path_window(log)), PATH_SAMPLES)
-    wanted, true = log.X_WE_desired[keep, :3, 3], log.X_WE_true[keep, :3, 3]
+    wanted, found = log.X_WE_desired[keep, :3, 3], known_poses(log)[keep, :3, 3]
     return {
         "wanted": [_short(1e3 * wanted[:, axis]) for axis in range(3)],
-        "deviation": [_short(1e3 * (true - wanted)[:, axis]) for axis in range(3)],
+        "deviation": [_short(1e3 * (found - wanted)[:, axis]) for axis in range(3)],
     }
 
 

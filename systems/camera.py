@@ -11,6 +11,8 @@ from scipy.stats import norm
 
 from systems.samples import PoseSample
 
+CAMERAS = ("pose", "features", "images")
+
 _WIDTH = 14  # time, valid, then the rows of the 3 x 4 pose matrix
 BLOCK = 64  # exposures whose noise is drawn at once: drawing is what Drake is slow at
 _PER_EXPOSURE = 7  # standard normal numbers: orientation, position, drop-out
@@ -21,6 +23,8 @@ _EPSILON = 1e-9  # s, a sample that is due at a tick arrives at it in spite of r
 class CameraConfig:
     """What a pose camera needs to know; read from a scenario file."""
 
+    # Where poses come from: the true one with noise, or markers by their features or images.
+    kind: str = "pose"
     period: float = 4e-3  # s, between exposures
     delay: float = 4e-3  # s, transport delay: from exposure to arrival
     position_sigma: float = 0.0  # m, standard deviation of one sample along each axis

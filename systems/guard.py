@@ -24,12 +24,12 @@ _VELOCITY, _POSITION, _CORRECTION, _NO_COMMAND, _REFUSED, _HELD, _STOPPED, _RESU
 
 # The state beside the counts: what was issued last (NaN before the first command), the velocity from which
 # a braking began, the mode, the times of the first tick and of the last command, the refused samples seen,
-# and the way back after a stop: how long it is in s, how much of it is done, and where it began as seen from
-# the law's command, position and velocity.
+# and the way back after a stop: how long it is in s, how much of it is done, where it began as seen from the
+# law's command, position and velocity, and where it is now; and where the joints were at the last tick.
 _POSITIONS, _VELOCITIES, _ISSUED, _BRAKING_FROM = slice(0, 6), slice(6, 12), slice(0, 12), slice(12, 18)
 _MODE, _FIRST_TICK, _LAST_COMMAND, _REFUSED_SEEN, _WAY, _DONE = range(18, 24)
-_OFFSET, _OFFSET_RATE = slice(24, 30), slice(30, 36)
-_WIDTH = 36
+_OFFSET, _OFFSET_RATE, _ASIDE, _WERE_AT = slice(24, 30), slice(30, 36), slice(36, 42), slice(42, 48)
+_WIDTH = 48
 _GOING, _HOLDING, _STOPPING, _RESUMING, _IDLE = 0.0, 1.0, 2.0, 3.0, 4.0
 _RESUME_SPEED = 0.25  # share of the largest joint speed that the way back may add
 
@@ -65,6 +65,7 @@ class CommandGuard(LeafSystem):
         out ``torque_feedforward``  vector 6 in N m, zero while the law's command is not followed
     in any case:
         out ``guard_status``      vector: how many ticks each of `KINDS` has happened, in that order
+        out ``deviation``         vector 6 in rad: where the joints are led less where the law would have them
 
     The command that was issued last is the state; the output is computed from it and the law's newest
     command, without delay. Before the first command, and while the robot does not run, the output is the
@@ -80,6 +81,7 @@ class CommandGuard(LeafSystem):
         correction_limit_deg: float,
         uses_camera: bool = True,
         passes_torque: bool = False,
+        is_speed_only: bool = False,
     ) -> None:
         """Checks the configuration.
 
@@ -91,6 +93,7 @@ class CommandGuard(LeafSystem):
             correction_limit_deg: the same for the orientation.
             uses_camera: False for a law that does without samples, so that a blind camera does not stop it.
             passes_torque: whether there are ports for a torque feedforward.
+            is_speed_only: whether the robot follows velocities alone, and the law commands from where it is.
 
         Raises:
             ValueError: if a time is not positive, or the stop would come before the hold.
@@ -107,6 +110,7 @@ class CommandGuard(LeafSystem):
                 f"{config.stop_time} s, {config.resume_time} s and {config.speed_share}"
             )
         self._config, self._period, self._uses_camera = config, period, uses_camera
+        self._is_speed_only = is_speed_only
         self._lower, self._upper = robot.lower, robot.upper
         self._speed = speed = config.speed_share * robot.speed
         # Of each joint: its range, its largest speed, its largest step in a tick.
@@ -140,6 +144,8 @@ class CommandGuard(LeafSystem):
         )
         for name, part in (("position_command", _POSITIONS), ("velocity_command", _VELOCITIES)):
             self.DeclareVectorOutputPort(name, NUM_JOINTS, self._slice(part), {self._next.ticket()})
+        compared = {self._next.ticket(), self._inputs[0].ticket()}
+        self.DeclareVectorOutputPort("deviation", NUM_JOINTS, self._calc_deviation, compared)
         if passes_torque:
             torque = self.DeclareVectorInputPort("torque_feedforward", NUM_JOINTS)
             self._torque = torque
@@ -152,6 +158,11 @@ class CommandGuard(LeafSystem):
             output.set_value(self._next.Eval(context)[0][part])
 
         return calc
+
+    def _calc_deviation(self, context: Context, output: BasicVector) -> None:
+        state = self._next.Eval(context)[0]
+        aside = state[_ASIDE] if self._is_speed_only else state[_POSITIONS] - self._inputs[0].Eval(context)
+        output.set_value(aside if math.isfinite(aside.sum()) else np.zeros(NUM_JOINTS))
 
     def _calc_torque(self, context: Context, output: BasicVector) -> None:
         kinds, torque = self._next.Eval(context)[1], self._torque.Eval(context)
@@ -166,7 +177,12 @@ class CommandGuard(LeafSystem):
         kinds = []
         joints: JointSample = self._joints.Eval(context)
         if math.isnan(state[0]) or not joints.running:
+            if state[_MODE] in (_GOING, _HOLDING):
+                state[_ASIDE] = 0.0
+            if not math.isnan(state[0]):
+                state[_ASIDE] += joints.position - state[_WERE_AT]
             state[_POSITIONS], state[_VELOCITIES] = joints.position, 0.0
+        state[_WERE_AT] = joints.position
         if not joints.running and state[_LAST_COMMAND] > -math.inf:
             kinds.append(_STOPPED)
             state[_BRAKING_FROM] = 0.0
@@ -174,6 +190,8 @@ class CommandGuard(LeafSystem):
         elif state[_MODE] == _STOPPING:
             kinds.append(_STOPPED)
             self._brake(state)
+            if math.isfinite(sum(velocity)):
+                state[_ASIDE] += self._period * (state[_VELOCITIES] - velocity)
         elif not math.isfinite(sum(position) + sum(velocity)):
             # Before the first command a law is silent by right.
             if state[_LAST_COMMAND] > -math.inf:
@@ -234,6 +252,8 @@ class CommandGuard(LeafSystem):
         if state[_MODE] == _IDLE:
             # As it was a tick ago, when the robot was where it is.
             offset = state[_POSITIONS] - (law_position - self._period * law_velocity)
+            if self._is_speed_only:
+                offset = state[_ASIDE].copy()
             state[_OFFSET], state[_OFFSET_RATE] = offset, -law_velocity
             # The steepest part of the polynomial is 1.875 times its mean slope.
             longest = float(np.max(1.875 * np.abs(offset) / (_RESUME_SPEED * self._speed)))
@@ -247,10 +267,9 @@ class CommandGuard(LeafSystem):
         drift_rate = 1.0 - s**2 * (18.0 - s * (32.0 - 15.0 * s))
         if s >= 1.0:
             state[_MODE] = _GOING
-        return (
-            (law_position + left * offset + drift * rate).tolist(),
-            (law_velocity + left_rate * offset + drift_rate * rate).tolist(),
-        )
+        state[_ASIDE] = left * offset + drift * rate
+        velocity = (law_velocity + left_rate * offset + drift_rate * rate).tolist()
+        return position if self._is_speed_only else (law_position + state[_ASIDE]).tolist(), velocity
 
     def _brake(self, state: np.ndarray) -> None:
         """Slows all joints down evenly, from full motion to rest in ``stop_time``."""

@@ -259,16 +259,20 @@ def decode_command(data: bytes) -> tuple[int, Command]:
     joints, speeds = message.planned.joints.joints, message.speedRef.joints.joints
     pose_speed = message.speedRef.cartesians.value
     pose = _pose(message.planned.cartesian) if message.planned.HasField("cartesian") else None
-    scale = np.full(len(pose_speed), math.pi / 180.0 if len(pose_speed) == 6 else 1.0)
-    scale[:3] = 1e-3
     return message.header.seqno, Command(
         position=np.deg2rad(_checked("joints", np.array(joints), (NUM_JOINTS,))) if joints else None,
         velocity=np.deg2rad(_checked("joint speeds", np.array(speeds), (NUM_JOINTS,))) if speeds else None,
         pose=pose,
-        pose_velocity=scale * _checked("speed of the pose", np.array(pose_speed), (6, 7))
-        if pose_speed
-        else None,
+        pose_velocity=_si_speed(list(pose_speed)) if pose_speed else None,
     )
+
+
+def _si_speed(wire: list[float]) -> np.ndarray:
+    """The speed of a pose from the wire: of the position alone, with Euler angles or with a quaternion."""
+    speed = _checked("pose speed", np.array(wire), (3, 6, 7))
+    if len(speed) == 3:
+        speed = np.concatenate([speed, np.zeros(3)])
+    return np.concatenate([1e-3 * speed[:3], speed[3:] if len(speed) == 7 else np.deg2rad(speed[3:])])
 
 
 def _fill_header(header: Any, seqno: int, time: float, mtype: int) -> None:

@@ -1,15 +1,151 @@
-"""Which turns of the joints bring the tip of a deformed arm back to where that of a rigid one would be."""
+"""Which turns of the joints bring the tip of a deformed arm back to where that of a rigid one would be.
 
-from dataclasses import dataclass
+Both methods take one step a tick and need no iteration: Reiner (2010), sections 3.6.2 and 3.6.3. Where a pose
+is out of the deformed arm's reach, or singular, they leave an error and stay small.
+"""
+
+import math
 
 import numpy as np
 
-METHODS = ("least_squares", "geometric")
+from robots.model import NUM_JOINTS, RobotModel
+from robots.pose import pose_error
+from systems.feedforward.deformed_arm import DeformedArm
+
+# Errors count in units of the reach, a radian as much as this share of it. It is small, so that the tip keeps
+# to its path where the wrist is singular.
+_ROTATION_WEIGHT = 0.12
+_LIMITER_SHARPNESS = 1e5  # 1/rad, s of (3.71): far from its limit an angle loses a ten thousandth
+_SHORT_LEVER = 0.1  # of the reach, 1 / sqrt(s_phi) of (3.59)
 
 
-@dataclass
-class CorrectionConfig:
-    """How the joints make up for a structure that yields; read from a scenario file."""
+class SigmoidDamping:
+    """Damping that falls from ``largest`` to ``smallest`` as a singular value grows, Reiner (2010) eq. (3.66)."""
 
-    method: str = "least_squares"  # or geometric, with axes 1 to 3 and for the position of the tip alone
-    limit_deg: float = 3.0  # of each joint's correction
+    def __init__(
+        self,
+        largest: float,
+        smallest: float,
+        bounds: tuple[float, float],
+        factors: tuple[float, float] = (0.9, 1.1),
+    ) -> None:
+        """Solves (3.67) for the steepness and the middle of the sigmoid.
+
+        Args:
+            largest: upper limit of the damping.
+            smallest: its lower limit.
+            bounds: singular values between which the damping falls.
+            factors: what it is there, of the upper and of the lower limit.
+
+        Raises:
+            ValueError: if these numbers are not in the order of (3.67c).
+        """
+        high, low = factors[0] * largest, factors[1] * smallest
+        if not (0.0 < smallest < low < high < largest and 0.0 < bounds[0] < bounds[1]):
+            raise ValueError(
+                f"damping: must fall from largest to smallest between two bounds in their order, got {largest}, "
+                f"{smallest} and {bounds}, with {high} and {low} at the bounds"
+            )
+        span = largest - smallest
+        # exp(-s (sigma - middle)) at the two bounds.
+        first, second = (math.log(span / (largest - value) - 1.0) for value in (high, low))
+        self._steepness = (first - second) / (bounds[1] - bounds[0])
+        self._middle = bounds[0] + first / self._steepness
+        self._largest, self._span = largest, span
+
+    def at(self, singular_value: np.ndarray | float) -> np.ndarray:
+        """Damping at singular values of any shape."""
+        excess = np.minimum(-self._steepness * (singular_value - self._middle), 700.0)
+        return self._largest - self._span / (1.0 + np.exp(excess))
+
+
+class LeastSquaresCorrection:
+    """Damped least squares for the whole pose, Reiner (2010) eqs. (3.85), (3.86).
+
+    Linearised about the last correction, it is exact as far as corrections change little in a tick; damped is
+    the whole correction and not its change, so that nothing drifts where the arm is singular. The damping
+    (3.66) belongs to each singular value by itself, so that only the lost direction stays uncorrected.
+
+    Axis 1 has a damping of its own, by how far the wrist is from it. Robots often move their wrist past
+    axis 1; the correction that a lever so short asks for would turn about within a few ticks.
+    """
+
+    def __init__(self, robot: RobotModel, arm: DeformedArm) -> None:
+        """Sets the weights by the size of the robot."""
+        self._arm, self._reach = arm, reach(robot)
+        self._damping = SigmoidDamping(0.03, 1e-5, (0.005, 0.02))
+        self._shoulder_damping = SigmoidDamping(0.15, 1e-5, (0.14, 0.5))
+        self._weights = np.repeat([_ROTATION_WEIGHT, 1.0 / self._reach], 3)
+
+    def correction(
+        self, q: np.ndarray, deflection: np.ndarray, X_WE: np.ndarray, last: np.ndarray
+    ) -> np.ndarray:
+        """Turns of the joints in rad, shape (6,).
+
+        Args:
+            q: positions of the rigid arm in rad, shape (6,).
+            deflection: of the structure in rad.
+            X_WE: where the tip shall be, shape (3, 4).
+            last: correction at the last tick.
+        """
+        X, J = self._arm.pose_and_jacobian(q + last, deflection)
+        turns = np.empty((NUM_JOINTS + 1, NUM_JOINTS))
+        turns[:NUM_JOINTS] = self._weights[:, None] * J
+        turns[NUM_JOINTS] = 0.0
+        turns[NUM_JOINTS, 0] = self._shoulder_damping.at(self._arm.wrist_lever() / self._reach)
+        wanted = np.append(self._weights * (pose_error(X_WE, X) + J @ last), 0.0)
+        U, s, Vt = np.linalg.svd(turns, full_matrices=False)
+        gain = s / (s * s + self._damping.at(s) ** 2)
+        return (gain * (wanted @ U)) @ Vt
+
+
+class GeometricCorrection:
+    """Axis 2 puts axis 3 in its place, axes 3 and 1 the tip, Reiner (2010) section 3.6.2.
+
+    Each turn takes a lever of the deformed arm to where the lever of the rigid arm points. Three forward
+    kinematics, no Jacobian; the orientation is left as it is. Short levers are left alone (3.59).
+    """
+
+    def __init__(self, robot: RobotModel, arm: DeformedArm) -> None:
+        """Sets what lever is short by the size of the robot."""
+        self._arm, self._short = arm, _SHORT_LEVER * reach(robot)
+
+    def correction(
+        self, q: np.ndarray, deflection: np.ndarray, X_WE: np.ndarray, last: np.ndarray
+    ) -> np.ndarray:
+        """Turns of the joints in rad; see `LeastSquaresCorrection.correction`, but ``last`` is not used."""
+        elbow = self._arm.rigid_elbow(q)
+        turns = np.zeros(NUM_JOINTS)
+        for joint, target in ((1, elbow), (2, X_WE[:, 3]), (0, X_WE[:, 3])):
+            axis, pivot, reached_elbow, tip = self._arm.lever(joint, q + turns, deflection)
+            turns[joint] = self._turn(axis, (reached_elbow if joint == 1 else tip) - pivot, target - pivot)
+        return turns
+
+    def _turn(self, axis: np.ndarray, lever: np.ndarray, target: np.ndarray) -> float:
+        """The angle about an axis from one lever to another, both seen along the axis."""
+        lever = lever - (lever @ axis) * axis
+        target = target - (target @ axis) * axis
+        angle = math.atan2(float(axis @ np.cross(lever, target)), float(lever @ target))
+        return angle * -math.expm1(-float(lever @ lever) / self._short**2)
+
+
+CORRECTIONS = {"least_squares": LeastSquaresCorrection, "geometric": GeometricCorrection}
+
+
+def smoothly_limited(angle: np.ndarray, limit: float, sharpness: float = _LIMITER_SHARPNESS) -> np.ndarray:
+    """Angles that never go far beyond +-limit, Reiner (2010) eq. (3.71), corrected.
+
+    Args:
+        angle: in rad, any shape.
+        limit: in rad.
+        sharpness: in 1/rad; the limit is passed by less than twice its inverse.
+    """
+    above = np.arctan((angle - limit) * sharpness) / np.pi + 0.5
+    below = 0.5 - np.arctan((angle + limit) * sharpness) / np.pi
+    return angle - angle * (above + below) + limit * (above - below)
+
+
+def reach(robot: RobotModel) -> float:
+    """The length in m of the arm from axis 2 to the tip, stretched."""
+    offsets = [joint.placement.translation for joint in robot.joints[2:]]
+    return float(sum(np.linalg.norm(offset) for offset in [*offsets, robot.tool.translation]))

@@ -1,7 +1,5 @@
 """What all feedforwards share: ports, the joint reference with its derivatives, and the load of the links."""
 
-from dataclasses import dataclass, field
-
 import numpy as np
 from pydrake.common.value import Value
 from pydrake.math import RigidTransform
@@ -15,53 +13,13 @@ from robots.kinematics import Kinematics, robust_solve
 from robots.model import NUM_JOINTS, RobotModel
 from robots.newton_inverse import inverse_kinematics
 from robots.plant import add_robot
-from systems.feedforward.arm_correction import CorrectionConfig
-from systems.feedforward.prefilter import Prefilter, PrefilterConfig
+from systems.feedforward.config import FeedforwardConfig
+from systems.feedforward.joint_motion import Drive, JointReference, Offsets
+from systems.feedforward.prefilter import Prefilter
 from systems.samples import JointSample
 
 _SMALL_TURN = 1e-5  # s times the joint velocity: over which the change of the Jacobian is measured
 _NOTHING = np.zeros(NUM_JOINTS)
-
-
-@dataclass
-class FeedforwardConfig:
-    """Which inverse model runs beside the law; read from a scenario file."""
-
-    kind: str = "none"  # none, rigid, flexible_joint or elastic_structure
-    # By which shares stiffness and damping, and masses and inertias, of the model are above the robot's.
-    stiffness_error: float = 0.0
-    inertia_error: float = 0.0
-    correction: CorrectionConfig = field(default_factory=CorrectionConfig)
-    prefilter: PrefilterConfig = field(default_factory=PrefilterConfig)
-
-
-@dataclass(frozen=True)
-class JointReference:
-    """Where the links are to be, all in rad and s, shape (6,) each."""
-
-    position: np.ndarray
-    velocity: np.ndarray
-    acceleration: np.ndarray
-
-
-@dataclass(frozen=True)
-class Drive:
-    """What motors shall do so that the links follow, shape (6,) each."""
-
-    deflection: np.ndarray  # rad, by which the motors are behind the reference
-    deflection_rate: np.ndarray  # rad/s
-    torque: np.ndarray  # N m, joint side, all that the motors give
-    memory: np.ndarray
-
-
-@dataclass(frozen=True)
-class Offsets:
-    """What the commands of a law lack to be those of the motors, shape (6,) each."""
-
-    position: np.ndarray  # rad
-    velocity: np.ndarray  # rad/s
-    torque: np.ndarray  # N m, joint side, beyond the drives' gravity compensation
-    memory: np.ndarray
 
 
 class Feedforward(LeafSystem):
@@ -85,11 +43,16 @@ class Feedforward(LeafSystem):
     more preview makes up for it.
     """
 
-    memory_size = 0  # how many numbers a model remembers beside the positions
+    memory_size = 0  # how many numbers a model remembers
     derivatives = 2  # the highest derivative of the joint positions on which the outputs depend
 
     def __init__(
-        self, robot: RobotModel, config: FeedforwardConfig, period: float, payload: float = 0.0
+        self,
+        robot: RobotModel,
+        config: FeedforwardConfig,
+        period: float,
+        payload: float = 0.0,
+        extra_memory: int = 0,
     ) -> None:
         """Builds the rigid model.
 
@@ -98,11 +61,13 @@ class Feedforward(LeafSystem):
             config: how wrong the model is, and how its reference becomes differentiable.
             period: tick in s.
             payload: mass at the flange in kg.
+            extra_memory: numbers that the model remembers beside its class's ``memory_size``.
 
         Raises:
             ValueError: if an error makes a stiffness or a mass vanish, or the prefilter's order is too low.
         """
         super().__init__()
+        self._memory_size = NUM_JOINTS + self.memory_size + extra_memory
         for label in ("stiffness_error", "inertia_error"):
             if not getattr(config, label) > -1.0:
                 raise ValueError(f"feedforward: {label} must be above -1, got {getattr(config, label)}")
@@ -139,7 +104,7 @@ class Feedforward(LeafSystem):
 
     def fresh_memory(self) -> np.ndarray:
         """The memory before the first tick."""
-        return np.full(NUM_JOINTS + self.memory_size, np.nan)
+        return np.full(self._memory_size, np.nan)
 
     def offsets(self, reference: JointReference, memory: np.ndarray) -> Offsets:
         """One tick of the inverse model.
@@ -181,6 +146,7 @@ class Feedforward(LeafSystem):
         except (UnreachableError, JointLimitError):
             for index in range(3):
                 discrete_state.set_value(index, _NOTHING)
+            discrete_state.set_value(int(self._memory), self.fresh_memory())
             return
         if self._filter is None:
             reference = self._exact_reference(context, q)

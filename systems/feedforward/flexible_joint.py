@@ -4,7 +4,9 @@ import numpy as np
 
 from robots.model import NUM_JOINTS, RobotModel
 from systems.feedforward.backward_differences import HISTORY, BackwardDifferences, at_rest, with_newest
-from systems.feedforward.feedforward import Drive, Feedforward, FeedforwardConfig, JointReference
+from systems.feedforward.config import FeedforwardConfig
+from systems.feedforward.feedforward import Feedforward
+from systems.feedforward.joint_motion import Drive, JointReference
 from systems.feedforward.sprung_deflection import SprungDeflection
 
 
@@ -22,10 +24,15 @@ class FlexibleJointFeedforward(Feedforward):
     derivatives = 3
 
     def __init__(
-        self, robot: RobotModel, config: FeedforwardConfig, period: float, payload: float = 0.0
+        self,
+        robot: RobotModel,
+        config: FeedforwardConfig,
+        period: float,
+        payload: float = 0.0,
+        extra_memory: int = 0,
     ) -> None:
-        """Builds the model; raises what `Feedforward` raises."""
-        super().__init__(robot, config, period, payload)
+        """Builds the model; arguments and errors as of `Feedforward`."""
+        super().__init__(robot, config, period, payload, extra_memory)
         self._gears = SprungDeflection(self._stiffness, self._damping, period)
         self._differences = BackwardDifferences(period)
 

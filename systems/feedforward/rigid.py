@@ -2,13 +2,12 @@
 
 import numpy as np
 
-from systems.feedforward.feedforward import Drive, Feedforward, JointReference
+from systems.feedforward.feedforward import Feedforward
+from systems.feedforward.joint_motion import Drive, JointReference
 
 
 class RigidFeedforward(Feedforward):
     """Motors and links move alike; the torque is that of inverse dynamics with friction."""
-
-    memory_size = 0
 
     def _drive(self, reference: JointReference, load: np.ndarray, memory: np.ndarray) -> Drive:
         zero = np.zeros_like(load)

@@ -21,6 +21,7 @@ _ENTRY = 19  # a moment of the path: time, the rows of the 3 x 4 pose matrix, th
 # rad in one tick: ten times what the fastest joint can do, far less than from branch to branch
 _LARGEST_STEP = 0.4
 _ROTATION, _TRANSLATION = slice(0, 3), slice(3, 6)
+_NO_DEVIATION = 1e-16  # rad^2
 _NO_COMMAND = np.full(NUM_JOINTS, np.nan)
 
 
@@ -62,6 +63,8 @@ class ServoLaw(LeafSystem):
         in  ``V_WE_desired``      vector 6, the wanted twist at t + preview
         in  ``joint_sample``      JointSample
         in  ``pose_sample``       PoseSample
+        in  ``deviation``         vector 6 in rad, may be left open: what the guard issues less what the law
+                                  commands; what the camera sees of it is not the law's to correct
         out ``position_command``  vector 6 in rad, NaN before the first tick and where the law has no answer
         out ``velocity_command``  vector 6 in rad/s, likewise
         out ``correction``        vector 6 in rad and m, rotation first: what the law has added to the path
@@ -111,6 +114,7 @@ class ServoLaw(LeafSystem):
         self._V_WD = self.DeclareVectorInputPort("V_WE_desired", 6)
         self._joints = self.DeclareAbstractInputPort("joint_sample", Value(JointSample()))
         self._camera = self.DeclareAbstractInputPort("pose_sample", Value(PoseSample()))
+        self._deviation = self.DeclareVectorInputPort("deviation", NUM_JOINTS)
         self._outputs = [
             self.DeclareDiscreteState(_NO_COMMAND),
             self.DeclareDiscreteState(_NO_COMMAND),
@@ -154,7 +158,7 @@ class ServoLaw(LeafSystem):
         arrived = sample.valid and sample.time > newest
         # A sample serves until the next one arrives, but not for ever. How late it came does not matter.
         if arrived or (sample.valid and time - last_used <= self._guard.hold_after + 1e-9):
-            measured = self._compared(path, tick, sample)
+            measured = self._compared(path, tick, sample, self._led_aside(context))
             if arrived:
                 newest = sample.time
                 if measured is None:
@@ -185,8 +189,25 @@ class ServoLaw(LeafSystem):
                 twist[part] = 0.0
         return twist
 
+    def _led_aside(self, context: Context) -> tuple[np.ndarray, np.ndarray] | None:
+        """Where the tool is led and where the law would have it, poses (3, 4); None if that is the same."""
+        if not self._deviation.HasValue(context):
+            return None
+        deviation = self._deviation.Eval(context)
+        commanded = context.get_discrete_state(self._outputs[0]).value()
+        if deviation @ deviation < _NO_DEVIATION or math.isnan(commanded[0]):
+            return None
+        # A law that commands speeds does so from where the joints are, any other from where they shall be.
+        led = commanded if self.config.drive == "velocity" else commanded + deviation
+        forward = self._kinematics.forward
+        return forward(led)[:3], forward(led - deviation)[:3]
+
     def _compared(
-        self, path: np.ndarray, tick: int, sample: PoseSample
+        self,
+        path: np.ndarray,
+        tick: int,
+        sample: PoseSample,
+        led_aside: tuple[np.ndarray, np.ndarray] | None,
     ) -> tuple[np.ndarray, np.ndarray] | None:
         """The pose that was wanted when a sample was exposed, and the pose that was seen.
 
@@ -194,6 +215,7 @@ class ServoLaw(LeafSystem):
             path: the remembered moments, a ring of rows.
             tick: the number of the newest one.
             sample: a valid sample.
+            led_aside: what `_led_aside` says of the robot; it is taken to be so at the exposure already.
 
         Returns:
             None if the sample is too old to compare or too far from the path to be true.
@@ -209,6 +231,8 @@ class ServoLaw(LeafSystem):
         passed = sample.time - float(entry[0])
         if abs(passed) > 1e-6:
             wanted = moved_pose(wanted, passed * entry[13:])
+        if led_aside is not None:
+            wanted = _as_led(wanted, *led_aside)
         seen = sample.X_WE.GetAsMatrix34()
         (a0, a1, a2, ax), (b0, b1, b2, bx), (c0, c1, c2, cx) = wanted.tolist()
         (d0, d1, d2, dx), (e0, e1, e2, ex), (f0, f1, f2, fx) = seen.tolist()
@@ -218,6 +242,14 @@ class ServoLaw(LeafSystem):
         if gap_squared > self._guard.largest_deviation**2 or trace < self._smallest_trace:
             return None
         return wanted, seen
+
+
+def _as_led(X: np.ndarray, led: np.ndarray, wished: np.ndarray) -> np.ndarray:
+    """A pose (3, 4), displaced as the tool is that is led to one pose and not to the wished one."""
+    displaced = np.empty((3, 4))
+    displaced[:, :3] = led[:, :3] @ wished[:, :3].T @ X[:, :3]
+    displaced[:, 3] = X[:, 3] + led[:, 3] - wished[:, 3]
+    return displaced
 
 
 def moved_pose(X: np.ndarray, step: np.ndarray) -> np.ndarray:

@@ -84,6 +84,10 @@ class Cameras:
         z = self.R_CW[:, 2] @ p_W.reshape(-1, 3).T + self.p_CW[:, 2:]
         return z.reshape(len(self), *p_W.shape[:-1])
 
+    def in_camera_frames(self, p_W: np.ndarray) -> np.ndarray:
+        """Points (k, 3) of the world in the camera frames in m, (n, k, 3)."""
+        return p_W @ self.R_WC + self.p_CW[:, None]
+
     def project(self, p_W: np.ndarray) -> np.ndarray:
         """Pixels of points in the world.
 
@@ -110,6 +114,13 @@ class Cameras:
         J_C[..., 1, 0], J_C[..., 1, 1], J_C[..., 1, 2] = v * xy, v * yy, -v * (xy * x + yy * y)
         J = (J_C.reshape(len(self), -1, 3) @ self.R_CW).reshape(*batch, 2, 3)
         return pixels.reshape(*batch, 2), J
+
+    def through_lens(self, xy: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """From normalised coordinates (n, k, 2) to pixels (n, k, 2) and their derivatives, (n, k, 2, 2)."""
+        x, y = xy[..., 0], xy[..., 1]
+        xx, both, yy = _distortion_jacobian(x, y, *self._lens)
+        J = np.stack([xx, both, both, yy], -1).reshape(*x.shape, 2, 2) * self.focal[:, None, :, None]
+        return self._pixels(*_distort(x, y, *self._lens)), J
 
     def normalized(self, pixels: np.ndarray) -> np.ndarray:
         """Normalised coordinates (x, y) behind the lens, the inverse of the distortion by Newton's method.

@@ -1,4 +1,8 @@
-"""A pose camera whose pose comes from markers: blobs in the images of many cameras, tracked, and late."""
+"""A pose camera whose pose comes from markers: blobs in the images of many cameras, tracked, and late.
+
+On the level of *features* the blobs are projected centres with noise; on the level of *images* they are found
+in simulated pictures of windows about where the tracker expects the body. From there on both are the same.
+"""
 
 from dataclasses import dataclass, field
 
@@ -10,13 +14,19 @@ from pydrake.systems.framework import Context, DiscreteValues, LeafSystem
 from scipy.stats import norm
 
 from robots.model import NUM_JOINTS, RobotModel
+from robots.pose import pose_error
 from systems.camera import BLOCK, CameraConfig, PoseCamera
 from systems.samples import PoseSample
 from systems.tracking.arm_capsules import ArmCapsules
+from systems.tracking.centroids import CentroidConfig
 from systems.tracking.detection_body import load_body
 from systems.tracking.features import FeatureConfig, FeatureSource
+from systems.tracking.image_blobs import ImageBlobs
+from systems.tracking.images import ImageConfig
 from systems.tracking.measuring_cell import load_cell
 from systems.tracking.tracker import Tracker, TrackerConfig, TrackerState
+
+LEVELS = ("features", "images")
 
 _WIDTH = 15  # time, valid, the rows of the 3 x 4 pose matrix, residual
 _EPSILON = 1e-9  # s, a sample that is due at a tick arrives at it in spite of rounding
@@ -29,6 +39,8 @@ class MarkerCameraConfig:
     cell: str = "probst"  # a shipped cell or the path of a cell file
     body: str = "probst"  # a shipped detection body or the path of a body file
     features: FeatureConfig = field(default_factory=FeatureConfig)
+    images: ImageConfig = field(default_factory=ImageConfig)
+    centroids: CentroidConfig = field(default_factory=CentroidConfig)
     tracker: TrackerConfig = field(default_factory=TrackerConfig)
 
 
@@ -43,9 +55,10 @@ class MarkerCamera(LeafSystem):
     and one more, which may stay unconnected:
         in  ``motor_state``  vector 12, of which the positions (rad) place the arm that hides markers
 
-    Gears are too stiff for their deflection to matter for what the arm hides. The ``residual`` of a sample is
-    the standard deviation of its position that follows from the scatter of the pixels. A frame without a pose
-    repeats the last one as invalid.
+    Gears are too stiff for their deflection to matter for what the arm hides. How far an image is blurred by
+    motion follows from where the tool was an exposure before. The ``residual`` of a sample is the standard
+    deviation of its position that follows from the scatter of the pixels. A frame without a pose repeats the
+    last one as invalid.
     """
 
     def __init__(
@@ -53,6 +66,7 @@ class MarkerCamera(LeafSystem):
         config: CameraConfig,
         markers: MarkerCameraConfig | None = None,
         robot: RobotModel | None = None,
+        level: str = "features",
     ) -> None:
         """Reads cell and body.
 
@@ -61,21 +75,27 @@ class MarkerCamera(LeafSystem):
             markers: what the pose is measured with.
             robot: whose base the cell stands about, and whose arm hides markers; None for a base at the
                 origin of the world.
+            level: where blobs come from, ``"features"`` or ``"images"``.
 
         Raises:
             ValueError: if something is out of its range, or a file is missing or wrong.
         """
         super().__init__()
+        if level not in LEVELS:
+            raise ValueError(f"marker camera: level must be one of {', '.join(LEVELS)}, got '{level}'")
         PoseCamera(config)  # refuses what no camera can be
         markers = markers or MarkerCameraConfig()
         cell, body = load_cell(markers.cell), load_body(markers.body)
         cameras = cell.camera_model(robot.base.pose() if robot else None)
-        self._config = config
+        self._config, self._level = config, level
+        # Both are made, so that a wrong number is refused on either level.
         self._features = FeatureSource(cameras, cell.windows, body, markers.features)
+        self._images = ImageBlobs(cameras, cell.windows, body, markers.images, markers.centroids)
         self._tracker = Tracker(cameras, body, markers.tracker)
         self._arm = ArmCapsules(robot) if robot else None
         self._lost_below = norm.ppf(config.dropout_probability)
-        self._per_exposure = self._features.noise_size + 1  # the last one for a lost exposure
+        source = self._features if level == "features" else self._images
+        self._per_exposure = source.noise_size + 1  # the last one for a lost exposure
         self._X_WE = self.DeclareAbstractInputPort("X_WE", Value(RigidTransform()))
         self._noise = self.DeclareVectorInputPort(
             "noise", BLOCK * self._per_exposure, RandomDistribution.kGaussian
@@ -86,6 +106,7 @@ class MarkerCamera(LeafSystem):
         newest = self.DeclareDiscreteState(empty[:-1])
         self._in_flight = self.DeclareDiscreteState(np.tile(empty, in_flight))
         self._memory = self.DeclareDiscreteState(TrackerState().to_vector())
+        self._before = self.DeclareDiscreteState(empty[:-1])  # time and true pose of the last exposure
         self.DeclareStateOutputPort("exposure", newest)
         self.DeclareAbstractOutputPort(
             "pose_sample",
@@ -103,12 +124,10 @@ class MarkerCamera(LeafSystem):
         for start, end in self._config.dropouts:
             lost = lost or start <= time < end
         state = TrackerState.from_vector(context.get_discrete_state(self._memory).value())
+        true = self._X_WE.Eval(context).GetAsMatrix4()
         X_WE, valid, residual = state.X_WE, False, 0.0
         if not lost:
-            arm = None
-            if self._arm is not None and self._motor_state.HasValue(context):
-                arm = self._arm.at(self._motor_state.Eval(context)[:NUM_JOINTS])
-            blobs = self._features.blobs(self._X_WE.Eval(context).GetAsMatrix4(), noise[:-1], arm)
+            blobs = self._blobs(context, state, true, noise[:-1])
             state, found = self._tracker.track(state, time, blobs)
             valid, residual = found.valid, found.position_sigma
             X_WE = state.X_WE
@@ -118,6 +137,23 @@ class MarkerCamera(LeafSystem):
         in_flight[:_WIDTH] = exposure
         discrete_state.set_value(0, exposure[:-1])
         discrete_state.set_value(self._memory, state.to_vector())
+        discrete_state.set_value(self._before, np.concatenate([[time, 1.0], true[:3].ravel()]))
+
+    def _blobs(
+        self, context: Context, state: TrackerState, X_WE: np.ndarray, noise: np.ndarray
+    ) -> np.ndarray:
+        """What the cameras see of the body at its true pose."""
+        arm = None
+        if self._arm is not None and self._motor_state.HasValue(context):
+            arm = self._arm.at(self._motor_state.Eval(context)[:NUM_JOINTS])
+        if self._level == "features":
+            return self._features.blobs(X_WE, noise, arm)
+        time, V_WE = context.get_time(), np.zeros(6)
+        before = context.get_discrete_state(self._before).value()
+        if before[1]:
+            X_before = np.vstack([before[2:].reshape(3, 4), [0.0, 0.0, 0.0, 1.0]])
+            V_WE = pose_error(X_WE, X_before) / (time - before[0])
+        return self._images.blobs(X_WE, V_WE, self._tracker.predict(state, time), noise, arm)
 
     def _calc_sample(self, context: Context, output) -> None:
         due = context.get_time() - self._config.delay + _EPSILON

@@ -99,6 +99,11 @@ class Tracker:
         self._scene = SceneMatcher(cameras, 1.5 * self._fit_gate, self._config.min_cameras)
         self._names = MarkerNames(body, self._config.distance_tolerance)
 
+    def predict(self, state: TrackerState, time: float) -> np.ndarray | None:
+        """Where the body is expected at a time in s, (4, 4); None if it has not been seen for too long."""
+        dt = time - state.time
+        return moved(state.X_WE, dt * state.V_WE) if 0.0 < dt <= self._config.coast else None
+
     def track(self, state: TrackerState, time: float, blobs: np.ndarray) -> tuple[TrackerState, TrackedPose]:
         """One frame.
 
@@ -107,11 +112,10 @@ class Tracker:
             time: of this frame in s.
             blobs: pixels, shape (n, b, 2), b at least one, NaN where there is none.
         """
-        dt = time - state.time
-        predictable = 0.0 < dt <= self._config.coast
+        expected = self.predict(state, time)
         found = None
-        if predictable:
-            found = self._lock(moved(state.X_WE, dt * state.V_WE), blobs)
+        if expected is not None:
+            found = self._lock(expected, blobs)
         if found is None or not found.valid:
             guess = self.find(blobs)
             if guess is not None:
@@ -120,7 +124,9 @@ class Tracker:
                 found = self._lost(state.X_WE, "no arrangement of points is that of the markers")
         if not found.valid:
             return state, found
-        V_WE = pose_error(found.X_WE, state.X_WE) / dt if predictable else np.zeros(6)
+        V_WE = np.zeros(6)
+        if expected is not None:
+            V_WE = pose_error(found.X_WE, state.X_WE) / (time - state.time)
         return TrackerState(time, found.X_WE, V_WE), found
 
     def find(self, blobs: np.ndarray) -> np.ndarray | None:

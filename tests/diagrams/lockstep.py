@@ -74,6 +74,17 @@ class Lockstep:
                 heapq.heappush(self._replies, (delivery.time, next(self._order), delivery.data))
         return True
 
+    def switch_motors_off(self) -> None:
+        """Somebody presses the button before the first message is out."""
+        self.controller.motors_on = False
+        self._on_the_way.clear()
+        self._report()
+
+    def run_dry(self, cycles: int) -> None:
+        """Goes on without a client."""
+        for _ in range(cycles):
+            self._cycle()
+
     def camera(self) -> "LockstepCamera":
         """The camera's end of the wire."""
         return LockstepCamera(self)

@@ -1,3 +1,6 @@
+# A None where there should be something fails a test as it should.
+# pyright: reportOptionalMemberAccess=false, reportArgumentType=false, reportCallIssue=false
+# pyright: reportAttributeAccessIssue=false
 """The virtual controller: which commands it follows, when it ends, when it begins again."""
 
 import numpy as np

@@ -1,3 +1,6 @@
+# A None where there should be something fails a test as it should.
+# pyright: reportOptionalMemberAccess=false, reportArgumentType=false, reportCallIssue=false
+# pyright: reportAttributeAccessIssue=false
 """EGM on the wire: what we write others read, what others write we read, and nothing else gets through."""
 
 import struct

@@ -1,3 +1,6 @@
+# A None where there should be something fails a test as it should.
+# pyright: reportOptionalMemberAccess=false, reportArgumentType=false, reportCallIssue=false
+# pyright: reportAttributeAccessIssue=false
 """The client's defence: what counts as a message, what is answered, and what never moves a robot."""
 
 import numpy as np

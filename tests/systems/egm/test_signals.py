@@ -1,3 +1,6 @@
+# A None where there should be something fails a test as it should.
+# pyright: reportOptionalMemberAccess=false, reportArgumentType=false, reportCallIssue=false
+# pyright: reportAttributeAccessIssue=false
 """Test signals: any layout comes out as it went in, anything else is refused."""
 
 import struct

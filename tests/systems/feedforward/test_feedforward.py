@@ -8,8 +8,13 @@ from scipy.integrate import solve_ivp
 
 from robots.model import load_robot
 from robots.plant import add_robot
-from systems.feedforward import FEEDFORWARDS, FeedforwardConfig, FlexibleJointFeedforward, RigidFeedforward
-from systems.feedforward.feedforward import JointReference
+from systems.feedforward import (
+    FEEDFORWARDS,
+    FeedforwardConfig,
+    FlexibleJointFeedforward,
+    JointReference,
+    RigidFeedforward,
+)
 
 ROBOT = load_robot("irb1200")
 PERIOD = 4e-3
@@ -32,20 +37,21 @@ def model(stiffness_error: float = 0.0, payload: float = 7.0) -> FlexibleJointFe
 def played(period: float, end: float = 1.0):
     """The inverse model along the swing: its last answer, and the one before."""
     inverse = FlexibleJointFeedforward(ROBOT, FeedforwardConfig(), period, 7.0)
-    memory, drives = np.full(18, np.nan), []
+    memory, drives = np.full(inverse.memory_size, np.nan), []
     for time in np.arange(0.0, end + 0.5 * period, period):
         reference = swinging(time)
-        drives.append(inverse._drive(reference, inverse._load(reference), memory))
+        drives.append(inverse.drive(reference, memory))
         memory = drives[-1].memory
     return drives[-1], drives[-2]
 
 
 def test_at_rest_the_springs_carry_the_weight():
     load = np.array([0.0, 40.0, 15.0, 1.0, 2.0, 0.0])
-    drive = model()._drive(STILL, load, np.full(18, np.nan))
+    fresh = np.full(FlexibleJointFeedforward.memory_size, np.nan)
+    drive = model()._drive(STILL, load, fresh)
     np.testing.assert_allclose(drive.deflection, -load / ROBOT.joint_stiffness)
     np.testing.assert_allclose(drive.torque, load)
-    stiffer = model(stiffness_error=0.25)._drive(STILL, load, np.full(18, np.nan))
+    stiffer = model(stiffness_error=0.25)._drive(STILL, load, fresh)
     np.testing.assert_allclose(stiffer.deflection, drive.deflection / 1.25)
 
 
@@ -94,7 +100,7 @@ def test_the_elastic_plant_needs_exactly_these_torques():
 def test_the_inverse_is_bounded_at_any_tick():
     """The pole at K/D lies beyond the tick's rate for a tick of 50 ms; a step of the load does not ring."""
     inverse = FlexibleJointFeedforward(ROBOT, FeedforwardConfig(), 0.05, 7.0)
-    memory, load = np.concatenate([np.zeros(12), np.zeros(6)]), np.full(6, 10.0)
+    memory, load = np.zeros(inverse.memory_size), np.full(6, 10.0)
     for _ in range(20):
         drive = inverse._drive(STILL, load, memory)
         memory = drive.memory

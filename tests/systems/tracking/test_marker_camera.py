@@ -14,7 +14,9 @@ from robots.model import load_robot
 from robots.pose import pose_error
 from systems.camera import BLOCK, CameraConfig, PoseCamera
 from systems.samples import PoseSample
+from systems.tracking.centroids import CentroidConfig
 from systems.tracking.features import FeatureConfig
+from systems.tracking.images import ImageConfig
 from systems.tracking.marker_camera import MarkerCamera, MarkerCameraConfig
 from systems.tracking.tracker import TrackerConfig
 from tests.systems.rigs import ValueSignal, VectorSignal, pose
@@ -56,10 +58,10 @@ def samples(
 
 
 def each_exposure(
-    config: CameraConfig, markers: MarkerCameraConfig, count: int, **kwargs
+    config: CameraConfig, markers: MarkerCameraConfig, count: int, level: str = "features", **kwargs
 ) -> list[PoseSample]:
     times = config.delay + config.period * (np.arange(count) + 0.5)
-    return samples(MarkerCamera(config, markers, ROBOT), config, times, **kwargs)
+    return samples(MarkerCamera(config, markers, ROBOT, level), config, times, **kwargs)
 
 
 def errors(found: list[PoseSample]) -> np.ndarray:
@@ -153,6 +155,54 @@ def test_samples_are_lost_with_the_declared_probability():
     assert abs(lost - 0.3 * n) < 4.0 * np.sqrt(0.21 * n)
 
 
+def test_by_images_the_pose_is_as_good_as_its_residual_says():
+    """Fifty poses with errors of hundredths of a pixel; also what images and pixels know is shared."""
+    found = each_exposure(CameraConfig(), MarkerCameraConfig(), 50, "images", q=Q)
+    assert all(sample.valid for sample in found)
+    residual = np.mean([sample.residual for sample in found])
+    assert 1e-6 < residual < 1e-5
+    assert np.abs(errors(found)[:, 3:]).max() < 10.0 * residual
+
+
+def test_by_images_a_body_is_followed_in_motion_among_reflections():
+    """1 m/s upwards; two reflections in every window, some of them round and as large as a marker."""
+    markers = MarkerCameraConfig(images=ImageConfig(reflections=2.0))
+    config = CameraConfig(delay=0.0)
+    times = config.period * (np.arange(60) + 0.5)
+
+    def rising(time: float):
+        X = STILL.copy()
+        X[2, 3] += time
+        return pose(X)
+
+    found = samples(MarkerCamera(config, markers, ROBOT, "images"), config, times, rising)
+    height = np.array([sample.X_WE.translation()[2] - sample.time for sample in found])
+    assert all(sample.valid for sample in found)
+    np.testing.assert_allclose(height, STILL[2, 3], atol=5e-5)
+
+
+def test_by_images_a_body_is_found_again_after_a_break():
+    """It is longer than a prediction lasts, so that the whole windows are searched."""
+    config = CameraConfig(delay=0.0, period=0.02, dropouts=[[0.09, 0.29]])
+    found = each_exposure(config, MarkerCameraConfig(), 20, "images")
+    assert [i for i, sample in enumerate(found) if not sample.valid] == list(range(5, 15))
+    assert np.abs(errors(found)[:, 3:]).max() < 1e-4
+
+
+def test_by_images_the_seed_decides_the_noise():
+    once, again, other = (
+        errors(each_exposure(CameraConfig(), MarkerCameraConfig(), 5, "images", seed=seed))
+        for seed in (7, 7, 8)
+    )
+    np.testing.assert_array_equal(once, again)
+    assert not np.isclose(once, other, rtol=0.0, atol=1e-9).any()
+
+
+def test_refuses_a_level_that_does_not_exist():
+    with pytest.raises(ValueError, match="level must be one of features, images, got 'pixels'"):
+        MarkerCamera(CameraConfig(), level="pixels")
+
+
 @pytest.mark.parametrize(
     ("config", "markers", "message"),
     [
@@ -160,6 +210,8 @@ def test_samples_are_lost_with_the_declared_probability():
         (CameraConfig(), MarkerCameraConfig(cell="nowhere"), "cell 'nowhere': no file"),
         (CameraConfig(), MarkerCameraConfig(body="nothing"), "body 'nothing': no file"),
         (CameraConfig(), MarkerCameraConfig(features=FeatureConfig(missing=2.0)), "features: missing"),
+        (CameraConfig(), MarkerCameraConfig(images=ImageConfig(exposure=0.0)), "images: exposure"),
+        (CameraConfig(), MarkerCameraConfig(centroids=CentroidConfig(longest=0.5)), "centroids: longest"),
         (CameraConfig(), MarkerCameraConfig(tracker=TrackerConfig(gate=-1.0)), "tracker: gate"),
     ],
 )

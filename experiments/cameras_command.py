@@ -1,0 +1,127 @@
+"""``truetip cameras``: calibrate the cameras of a cell, and study what limits accuracy."""
+
+import sys
+import time
+from contextlib import ExitStack
+from dataclasses import replace
+from pathlib import Path
+from typing import Annotated
+
+import numpy as np
+import typer
+from rich.console import Console
+from rich.markup import escape
+
+from experiments.cameras_calibration import (
+    CamerasFound,
+    calibration_json,
+    print_calibration,
+    write_calibration_page,
+)
+from experiments.console import refusing
+from experiments.metrics import json_text
+from experiments.report_files import write_text
+from experiments.staging import staged_file
+from systems.tracking.calibration.observation_file import observation_text, read_observations
+from systems.tracking.calibration.wand import CalibrationKit, SimulatedWandRun, WandRun, simulate_wand_run
+from systems.tracking.calibration.wand_calibration import calibrate_with_wand
+from systems.tracking.camera_model import Cameras
+from systems.tracking.cell_file import cell_text, with_cameras
+from systems.tracking.measuring_cell import MeasuringCell, load_cell
+
+SIMULATED = "simulated"
+
+cameras_app = typer.Typer(
+    help="Calibrate the cameras of a cell, and study what limits the accuracy of a pose.",
+    no_args_is_help=True,
+)
+
+CellOption = Annotated[
+    str, typer.Option("--cell", metavar="NAME|FILE", help="A shipped measuring cell or a YAML file.")
+]
+JsonOption = Annotated[
+    str | None,
+    typer.Option("--json", metavar="FILE", help="The numbers; - prints them, and nothing else."),
+]
+
+
+@cameras_app.command("calibrate")
+def calibrate_cameras_command(
+    images: Annotated[
+        str,
+        typer.Option(
+            metavar="FILE.csv",
+            help="What the cameras saw of wand and frame, or simulated.",
+        ),
+    ] = SIMULATED,
+    cell: CellOption = "probst",
+    wand_length: Annotated[
+        float, typer.Option("--wand-length", metavar="MM", help="Between the two ends of the wand.")
+    ] = CalibrationKit.wand_length_mm,
+    places: Annotated[
+        int, typer.Option(metavar="N", help="Of the wand that are simulated.")
+    ] = SimulatedWandRun.places,
+    pixel_sigma: Annotated[
+        float, typer.Option("--pixel-sigma", metavar="PX", help="Standard deviation of a pixel, expected.")
+    ] = SimulatedWandRun.pixel_sigma,
+    seed: Annotated[int, typer.Option(metavar="N", help="Of the simulated noise and motion.")] = 0,
+    observations: Annotated[
+        str | None, typer.Option(metavar="FILE.csv", help="Write down what was seen, for --images.")
+    ] = None,
+    write: Annotated[
+        str | None, typer.Option(metavar="FILE.yaml", help="The cell with the calibrated cameras.")
+    ] = None,
+    out: Annotated[Path, typer.Option(metavar="FILE.html", help="The report.")] = Path("out/cameras.html"),
+    json_file: JsonOption = None,
+) -> None:
+    """Find where the cameras stand and how their lenses bend, from a wand and an L-frame."""
+    human = Console(stderr=json_file == "-")
+    with refusing(ValueError, OSError), ExitStack() as stack:
+        _positive("--wand-length", wand_length)
+        _positive("--pixel-sigma", pixel_sigma)
+        nominal, kit = load_cell(cell), CalibrationKit(wand_length_mm=wand_length)
+        names = [camera.name for camera in nominal.cameras]
+        page = stack.enter_context(staged_file(out))
+        files = {
+            name: stack.enter_context(staged_file(name))
+            for name in (observations, write, json_file)
+            if name and name != "-"
+        }
+        # The camera system's own frame is that of the L-frame.
+        start, truth = nominal.camera_model(nominal.base.pose()), None
+        if images == SIMULATED:
+            truth = start
+            run = _simulated(nominal, kit, truth, SimulatedWandRun(places, pixel_sigma=pixel_sigma), seed)
+            start = replace(start, radial=0.0 * start.radial, tangential=0.0 * start.tangential)
+        else:
+            run = read_observations(images, names, len(kit.p_Q))
+        started = time.perf_counter()
+        calibration = calibrate_with_wand(run, kit, start, names, pixel_sigma)
+        found = CamerasFound(calibration, names, kit, time.perf_counter() - started, truth)
+        title = f"{nominal.name}, {'simulated' if truth else Path(images).name}"
+        write_calibration_page(page, title, found)
+        if write:
+            source = f"truetip cameras calibrate, {len(calibration.wand_lengths)} places of the wand"
+            write_text(files[write], cell_text(with_cameras(nominal, calibration.cameras, source)))
+        if observations:
+            write_text(files[observations], observation_text(run, names))
+        result = calibration_json(found)
+        if json_file and json_file != "-":
+            write_text(files[json_file], json_text(result))
+    if json_file == "-":
+        sys.stdout.write(json_text(result))
+    print_calibration(human, found)
+    for name in (str(out), write, observations):
+        if name:
+            human.print(escape(name), soft_wrap=True)
+
+
+def _simulated(
+    cell: MeasuringCell, kit: CalibrationKit, truth: Cameras, run: SimulatedWandRun, seed: int
+) -> WandRun:
+    return simulate_wand_run(truth, cell.sensor_px, kit, run, np.random.default_rng(seed))[0]
+
+
+def _positive(name: str, value: float) -> None:
+    if not 0.0 < value < np.inf:
+        raise ValueError(f"{name} must be positive, got {value:g}")

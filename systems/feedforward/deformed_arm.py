@@ -1,0 +1,124 @@
+"""The arm behind the gears: what loads its bearings and beams, and where its tip is when they yield."""
+
+import math
+
+import numpy as np
+from pydrake.multibody.plant import MultibodyPlant
+from pydrake.multibody.tree import JacobianWrtVariable, MultibodyForces
+
+from robots.model import RobotModel
+from robots.plant import add_robot
+from systems.feedforward.joint_motion import JointReference
+
+
+class DeformedArm:
+    """A robot with elastic structure, moved as prescribed: joints q as seen behind the gears, structure e."""
+
+    def __init__(self, robot: RobotModel, payload: float = 0.0) -> None:
+        """Builds the plant, which is the controller's own.
+
+        Args:
+            robot: the robot as the controller knows it.
+            payload: mass at the flange in kg.
+
+        Raises:
+            ValueError: if the robot may not carry the payload, or has neither bearings nor beams that yield.
+        """
+        plant = self._plant = MultibodyPlant(0.0)
+        parts = self._parts = add_robot(plant, robot, "structure", payload)
+        plant.Finalize()
+        if not parts.structure:
+            raise ValueError(f"feedforward elastic_structure: no bearing or beam of {robot.name} yields")
+        self.size = len(parts.structure)
+        self.stiffness = np.array([spring.default_stiffness() for spring in parts.structure_springs])
+        self.damping = np.array([joint.default_damping() for joint in parts.structure])
+        # All motion of the gears' far side is given to the motors; the gears stay at zero.
+        self._joints = np.array([joint.position_start() for joint in parts.motors])
+        self._gears = np.array([joint.velocity_start() for joint in parts.deflections])
+        self._structure = np.array([joint.position_start() for joint in parts.structure])
+        # Scratch memory only: written before every use.
+        self._context, self._forces = plant.CreateDefaultContext(), MultibodyForces(plant)
+        n = plant.num_positions()
+        self._state, self._acceleration = np.zeros(2 * n), np.zeros(n)
+        self._links = [plant.GetBodyByName(f"link_{number}").body_frame() for number in range(1, 4)]
+        self._wrist = plant.GetBodyByName("link_5").body_frame()
+        first = parts.motors[0].frame_on_parent().CalcPoseInWorld(self._context)
+        self._axis_1, self._shoulder = first.rotation().multiply(robot.axes[0]), first.translation()
+        self._axes = robot.axes
+
+    def section_torques(self, reference: JointReference) -> np.ndarray:
+        """What loads bearings and beams of an arm that does not yield, in N m, shape (size,).
+
+        They are the rows M_ea q'' + h_e* of its inverse dynamics, Reiner (2010) eq. (3.76).
+        """
+        still = np.zeros(self.size)
+        return self._inverse_dynamics(reference, (still, still, still))[self._structure]
+
+    def gear_load(
+        self, reference: JointReference, structure: tuple[np.ndarray, np.ndarray, np.ndarray]
+    ) -> np.ndarray:
+        """What the gears carry when the arm moves and yields so, in N m, (6,); (3.91), corrected.
+
+        Args:
+            reference: of the joints behind the gears.
+            structure: deflections in rad and their two derivatives, shape (size,) each.
+        """
+        return self._inverse_dynamics(reference, structure)[self._gears]
+
+    def pose(self, q: np.ndarray, deflection: np.ndarray) -> np.ndarray:
+        """The pose of the tool in the world, shape (3, 4)."""
+        self._set(q, deflection)
+        return self._parts.tool.CalcPoseInWorld(self._context).GetAsMatrix34()
+
+    def pose_and_jacobian(self, q: np.ndarray, deflection: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """The pose of the tool, shape (3, 4), and its geometric Jacobian by the joints, shape (6, 6)."""
+        X_WE, world = self.pose(q, deflection), self._plant.world_frame()
+        J = self._plant.CalcJacobianSpatialVelocity(
+            self._context, JacobianWrtVariable.kV, self._parts.tool, np.zeros(3), world, world
+        )
+        return X_WE, J[:, self._joints]
+
+    def wrist_lever(self) -> float:
+        """How far in m the wrist is from axis 1, in the positions that were asked for last."""
+        arm = self._wrist.CalcPoseInWorld(self._context).translation() - self._shoulder
+        along = float(self._axis_1 @ arm)
+        return math.sqrt(max(0.0, float(arm @ arm) - along * along))
+
+    def rigid_elbow(self, q: np.ndarray) -> np.ndarray:
+        """Where axis 3 of an arm that does not yield is, in m in the world, shape (3,)."""
+        self._set(q, np.zeros(self.size))
+        return self._links[2].CalcPoseInWorld(self._context).translation()
+
+    def lever(
+        self, joint: int, q: np.ndarray, deflection: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+        """The axis of joint 0, 1 or 2 as a unit vector, a point on it, axis 3 and the tip; (3,) each."""
+        self._set(q, deflection)
+        motor = self._parts.motors[joint].frame_on_parent().CalcPoseInWorld(self._context)
+        axis = motor.rotation().multiply(self._axes[joint])
+        elbow = self._parts.motors[2].frame_on_parent().CalcPoseInWorld(self._context).translation()
+        return (
+            axis,
+            motor.translation(),
+            elbow,
+            self._parts.tool.CalcPoseInWorld(self._context).translation(),
+        )
+
+    def _set(self, q: np.ndarray, deflection: np.ndarray) -> None:
+        positions = self._state[: len(self._acceleration)]
+        positions[self._joints], positions[self._structure] = q, deflection
+        self._plant.SetPositions(self._context, positions)
+
+    def _inverse_dynamics(
+        self, reference: JointReference, structure: tuple[np.ndarray, np.ndarray, np.ndarray]
+    ) -> np.ndarray:
+        n = len(self._acceleration)
+        for place, of_joints, of_structure in (
+            (self._state[:n], reference.position, structure[0]),
+            (self._state[n:], reference.velocity, structure[1]),
+            (self._acceleration, reference.acceleration, structure[2]),
+        ):
+            place[self._joints], place[self._structure] = of_joints, of_structure
+        self._plant.SetPositionsAndVelocities(self._context, self._state)
+        self._plant.CalcForceElementsContribution(self._context, self._forces)
+        return self._plant.CalcInverseDynamics(self._context, self._acceleration, self._forces)

@@ -1,0 +1,34 @@
+"""What goes into an inverse model and what comes out, in joint coordinates; shape (6,) each."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+
+@dataclass(frozen=True)
+class JointReference:
+    """Where the links are to be."""
+
+    position: np.ndarray  # rad
+    velocity: np.ndarray  # rad/s
+    acceleration: np.ndarray  # rad/s^2
+
+
+@dataclass(frozen=True)
+class Drive:
+    """What motors shall do so that the links follow, and what the model remembers of it."""
+
+    deflection: np.ndarray  # rad, by which the motors are behind the reference
+    deflection_rate: np.ndarray  # rad/s
+    torque: np.ndarray  # N m, joint side, all that the motors give
+    memory: np.ndarray
+
+
+@dataclass(frozen=True)
+class Offsets:
+    """What the commands of a law lack to be those of the motors, and what the feedforward remembers."""
+
+    position: np.ndarray  # rad
+    velocity: np.ndarray  # rad/s
+    torque: np.ndarray  # N m, joint side, beyond the drives' gravity compensation
+    memory: np.ndarray
