@@ -124,6 +124,10 @@ class CellLoop:
         self._post_report()
         while not until(cell.time):
             now = cell.time
+            self._hand_out(start, now - 1e-6)
+            _wait_until(start + now)
+            # A controller hears before it speaks: a reply to this cycle's message belongs to the next one.
+            self._hear(now)
             self._hand_out(start, now)
             lateness = steady_time() - start - now
             if lateness > _LOST_TRACK:
@@ -132,7 +136,6 @@ class CellLoop:
             statistics.cycles += 1
             statistics.late += lateness > _LATE
             statistics.worst_lateness = max(statistics.worst_lateness, lateness)
-            self._hear(now)
             if 0.0 <= self._faults.stop_at <= now and not self._is_stopped:
                 self._is_stopped = True
                 self.controller.stop(cell.stamp)
@@ -148,7 +151,6 @@ class CellLoop:
             due, _, send = heapq.heappop(self._outbox)
             _wait_until(start + due)
             send()
-        _wait_until(start + until)
 
     def _hear(self, now: float) -> None:
         for data, _ in self._channel.receive():

@@ -22,6 +22,7 @@ from robots.model import NUM_JOINTS, RobotModel, load_robot
 from systems.egm.channel import steady_time
 from systems.egm.client import EgmClient
 from systems.egm.messages import RobotReport
+from systems.egm.signal_client import SignalClient
 from systems.guard import KINDS
 from systems.mocap.clock import ClockQuality
 from systems.mocap.receiver import MocapReceiver
@@ -100,6 +101,7 @@ class GuidedRun:
         camera: MocapReceiver | None,
         progress: Callable[[float], None] | None = None,
         now: Callable[[], float] = steady_time,
+        signals: SignalClient | None = None,
     ) -> GuidedRecord:
         """Runs the law on the station at the other end.
 
@@ -108,6 +110,7 @@ class GuidedRun:
             camera: of the camera server; None for laws that do without.
             progress: is called now and then with the share that is done, 0 to 1.
             now: the clock of the client's arrivals, in s.
+            signals: of the controller's test signals, None where it sends none.
 
         Raises:
             StationError: if there is no controller or camera, or its cycle is not the scenario's.
@@ -120,7 +123,7 @@ class GuidedRun:
         sys.setswitchinterval(_SWITCH)
         before = client.session.counters.as_dict()
         try:
-            wire = StationWire(client, camera, self.scenario, self.robot, self._is_speed_only, now)
+            wire = StationWire(client, camera, self.scenario, self.robot, self._is_speed_only, now, signals)
             wire.connect(self._uses_camera)
             wire.approach(self.start)
             ended = self._follow(wire, progress or (lambda share: None), now)

@@ -12,6 +12,7 @@ from systems.egm.channel import steady_time
 from systems.egm.client import EgmClient
 from systems.egm.messages import Command, Mode, RobotReport
 from systems.egm.session import Link
+from systems.egm.signal_client import SignalClient
 from systems.joint_mover import smooth_motion
 from systems.mocap.clock import CameraClock, ClockConfig
 from systems.mocap.receiver import MocapReceiver
@@ -24,8 +25,11 @@ _PATIENCE, _NEARLY = 3.0, math.radians(0.5)  # s after which it is enough to com
 _LONGEST_APPROACH = 60.0  # s
 _APPROACH_GAIN = 2.0  # 1/s, where only speeds are sent
 _PHASE_SHARE = 0.02  # of the distance between a stamp and its tick, by which the phase follows
+_SIGNAL_AGE = 0.1  # s, beyond which signals and earlier messages say nothing of the present motion
 _SLICE = 8e-4  # s between two looks at the camera
-_REHEARSAL = 1.5e-3  # s before the next report is due
+_REHEARSAL = 1.2e-3  # s before the next report is due
+_CLOSE = 3e-4  # s about the time at which it is due: a frame of the camera would delay the reply
+_WATCH = 1e-3  # s after it was due, until which one looks all the time: who sleeps wakes late and cold
 _CYCLE_TOLERANCE = 5e-3  # relative
 
 
@@ -44,6 +48,7 @@ class StationWire:
         robot: RobotModel,
         is_speed_only: bool,
         now: Callable[[], float] = steady_time,
+        signals: SignalClient | None = None,
     ) -> None:
         """Takes over sockets that are open.
 
@@ -54,8 +59,9 @@ class StationWire:
             robot: whose speeds count on the way to the start.
             is_speed_only: whether the controller is sent speeds without positions.
             now: the clock of the client's arrivals, in s.
+            signals: of the controller's test signals, None where it sends none.
         """
-        self._client, self._camera, self._now = client, camera, now
+        self._client, self._camera, self._now, self._signals = client, camera, now, signals
         self._link, self._speed, self._period = scenario.station.link, robot.speed, scenario.station.period
         self._mode = Mode.JOINT_SPEED_ONLY if is_speed_only else Mode.JOINT_SPEED
         self.robot_clock = CameraClock(ClockConfig())
@@ -71,6 +77,11 @@ class StationWire:
     def epoch(self) -> int:
         """Grows whenever commands must start anew."""
         return self._client.session.epoch
+
+    @property
+    def sample(self) -> PoseSample:
+        """The newest sample of the camera; its time is of the steady clock."""
+        return self._sample
 
     @property
     def arrived(self) -> float:
@@ -132,25 +143,23 @@ class StationWire:
         """
         now = self._now()
         deadline = now + (self._link.break_after if wait is None else wait)
-        expected = self._client.arrived + self._period - _REHEARSAL
+        expected = self._client.arrived + self._period
+        is_prepared = False
         self._learn_clock()
         self._hear_camera()
-        while (report := self._client.poll(min(_SLICE, max(0.0, deadline - now)))) is None:
+        while (report := self._client.poll(_pause(now, expected, deadline, is_prepared))) is None:
             now = self._now()
             if now >= deadline:
                 return None
-            self._hear_camera()
-            if rehearse is not None and now >= expected:
+            if not -_CLOSE < now - expected < _CLOSE:
+                self._hear_camera()
+            if rehearse is not None and now >= expected - _REHEARSAL:
                 rehearse()
-                rehearse = None
+                self._client.rehearse()
+                rehearse, is_prepared = None, True
         last, self.last = self.last, report
+        self._note_motion(last, report)
         self._unlearned = (report.time, self._client.arrived)
-        if last is not None and 0.0 < report.time - last.time < 0.1:
-            self.velocity = (report.position - last.position) / (report.time - last.time)
-        else:
-            self.velocity = np.zeros(NUM_JOINTS)
-        torques = report.message.torqueRef.joints
-        self.effort = np.array(torques) if len(torques) == NUM_JOINTS else np.zeros(NUM_JOINTS)
         return report
 
     def ticks_since(self, last: RobotReport) -> int:
@@ -209,6 +218,22 @@ class StationWire:
         off = np.rad2deg(np.abs(self.last.position - goal).max()) if self.last else math.nan
         raise StationError(f"the robot did not reach the start of the path: a joint is {off:.2f} deg away")
 
+    def _note_motion(self, last: RobotReport | None, report: RobotReport) -> None:
+        """Speeds and torques: from test signals if there are new ones, else from the messages themselves."""
+        newest = self._signals.newest if self._signals else None
+        is_new = newest is not None and not newest.time < report.time - _SIGNAL_AGE
+        if newest is not None and is_new and newest.velocity is not None:
+            self.velocity = newest.velocity
+        elif last is not None and 0.0 < report.time - last.time < _SIGNAL_AGE:
+            self.velocity = (report.position - last.position) / (report.time - last.time)
+        else:
+            self.velocity = np.zeros(NUM_JOINTS)
+        torques = report.message.torqueRef.joints
+        if newest is not None and is_new and newest.torque is not None:
+            self.effort = newest.torque
+        else:
+            self.effort = np.array(torques) if len(torques) == NUM_JOINTS else np.zeros(NUM_JOINTS)
+
     def _learn_clock(self) -> None:
         """Tells the clock of the last report; after the reply, because it may take a while."""
         if self._unlearned is not None:
@@ -217,7 +242,18 @@ class StationWire:
             self._unlearned = None
 
     def _hear_camera(self) -> None:
+        if self._signals is not None:
+            self._signals.poll()
         if self._camera is not None:
             sample = self._camera.poll(self._now())
             if sample is not None:
                 self._sample = sample
+
+
+def _pause(now: float, expected: float, deadline: float, is_prepared: bool) -> float:
+    """How long to sleep for a report at most, in s; not at all once everything is prepared for it."""
+    if is_prepared and now < expected + _WATCH:
+        return 0.0
+    until_rehearsal = expected - _REHEARSAL - now
+    longest = until_rehearsal if 0.0 < until_rehearsal < _SLICE else _SLICE
+    return min(longest, max(0.0, deadline - now))

@@ -116,8 +116,8 @@ def verdict(found: CamerasFound) -> str:
 def write_calibration_page(path: Path, title: str, found: CamerasFound) -> None:
     """The page of a calibration; opens offline."""
     note = (
-        "Positions in the frame of the L-frame with their standard deviations along an axis; points that were "
-        "used and left out; root mean square residuals in px, and average distances between points and rays "
+        "Positions in the frame of the L-frame with their standard deviations along an axis; points used "
+        "and left out; root mean square residuals in px, and average distances between points and rays "
         "in mm, as in Probst (2024), figure A.10."
     )
     note_map = "Cameras with their optical axes, and where the wand was."

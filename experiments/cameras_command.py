@@ -18,8 +18,14 @@ from experiments.cameras_calibration import (
     print_calibration,
     write_calibration_page,
 )
-from experiments.console import refusing
+from experiments.cameras_laws import study_laws
+from experiments.cameras_report import print_study, write_study_page
+from experiments.cameras_study import CamerasStudy, covariances, study_json, study_setup
+from experiments.cameras_sweeps import study_sweeps
+from experiments.console import progress_bar, refusing
 from experiments.metrics import json_text
+from experiments.options import ScenarioOption, SetOption
+from experiments.prepare import prepare
 from experiments.report_files import write_text
 from experiments.staging import staged_file
 from systems.tracking.calibration.observation_file import observation_text, read_observations
@@ -125,3 +131,46 @@ def _simulated(
 def _positive(name: str, value: float) -> None:
     if not 0.0 < value < np.inf:
         raise ValueError(f"{name} must be positive, got {value:g}")
+
+
+@cameras_app.command("study")
+def study_cameras_command(
+    scenario: ScenarioOption = "misaligned",
+    settings: SetOption = None,
+    is_quick: Annotated[
+        bool, typer.Option("--quick", help="A faster path and less settling for the laws.")
+    ] = False,
+    without_laws: Annotated[
+        bool, typer.Option("--without-laws", help="Geometry and images only; a few seconds.")
+    ] = False,
+    jobs: Annotated[
+        int | None, typer.Option(metavar="N", help="Processes at a time.", show_default="one per core")
+    ] = None,
+    out: Annotated[Path, typer.Option(metavar="FILE.html", help="The report.")] = Path("out/study.html"),
+    json_file: JsonOption = None,
+) -> None:
+    """Find out what limits the accuracy of a pose: cameras, light, markers; and what the laws make of it."""
+    human = Console(stderr=json_file == "-")
+    with refusing(ValueError, OSError), ExitStack() as stack:
+        if jobs is not None and jobs < 1:
+            raise ValueError(f"--jobs must be at least 1, got {jobs}")
+        prepared = prepare(scenario, settings or [])
+        page = stack.enter_context(staged_file(out))
+        copy = stack.enter_context(staged_file(json_file)) if json_file not in (None, "-") else None
+        setup = study_setup(prepared)
+        covariance_on_path, covariance_in_workspace = covariances(setup)
+        with progress_bar("Geometry and images") as progress:
+            sweeps = study_sweeps(setup, jobs, progress)
+        laws = []
+        if not without_laws:
+            with progress_bar("Servo laws") as progress:
+                laws = study_laws(scenario, settings or [], is_quick, jobs, progress)
+        study = CamerasStudy(setup, covariance_on_path, covariance_in_workspace, sweeps, laws)
+        write_study_page(page, prepared.title, study)
+        result = study_json(study)
+        if copy:
+            write_text(copy, json_text(result))
+    if json_file == "-":
+        sys.stdout.write(json_text(result))
+    print_study(human, study)
+    human.print(escape(str(out)), soft_wrap=True)

@@ -36,7 +36,7 @@ def best_subsets(information: np.ndarray) -> list[list[int]]:
 
 
 def ring(cell: MeasuringCell, count: int, radius: float, height: float, arc_deg: float) -> MeasuringCell:
-    """Cameras like the first one of the cell, evenly on an arc about what the cell looks at, with whole images.
+    """Cameras like the first of the cell, evenly on an arc about what it looks at, with whole images.
 
     Args:
         cell: gives sensor, lens, base and target.

@@ -18,6 +18,7 @@ from diagrams.log import RunLog
 from diagrams.run import Experiment
 from diagrams.scenario import load_scenario, shipped_scenarios
 from experiments.calibrate_command import calibrate_command
+from experiments.cameras_command import cameras_app
 from experiments.cell_command import cell_command
 from experiments.compare import compare, simulating
 from experiments.console import count, print_list, progress_bar, refusing
@@ -26,6 +27,7 @@ from experiments.diagram_view import write_diagram
 from experiments.drivetrain_command import drivetrain_command
 from experiments.frame_commands import align_command, chain_command, frame_command, tool_command
 from experiments.guided_command import ask_before_moving, guide, on_station
+from experiments.latency_command import latency_command
 from experiments.live import LiveView, advance_live
 from experiments.modes_command import modes_command
 from experiments.options import (
@@ -225,7 +227,9 @@ def diagram_command(
 
 
 app.command("cell")(cell_command)
+app.command("latency")(latency_command)
 app.command("modes")(modes_command)
+app.add_typer(cameras_app, name="cameras")
 app.command("design")(design_command)
 app.command("calibrate")(calibrate_command)
 app.command("drivetrain")(drivetrain_command)

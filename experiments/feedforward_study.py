@@ -1,19 +1,20 @@
 """Three feedforwards on one robot: a rectangle in space, and motions from a grid of positions."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
-from statistics import median
 from typing import Any
 
 import numpy as np
 
+from diagrams.scenario import StationConfig
 from experiments.feedforward_rectangle import Deviation, RectangleTrial
-from experiments.feedforward_trial import Ringing, Trial
+from experiments.feedforward_tick import tick_time
+from experiments.feedforward_trial import Trial
 from experiments.workers import Progress, SimulationError, in_processes
 from robots.model import RobotModel
-from systems.feedforward import FeedforwardConfig
+from systems.feedforward import FEEDFORWARDS, FeedforwardConfig
 
-KINDS = ("rigid", "flexible_joint", "elastic_structure")
+KINDS: tuple[str, ...] = ("rigid", "flexible_joint", "elastic_structure")
 ANGLES_DEG = (5, 20)  # of the motions
 
 
@@ -26,9 +27,9 @@ class FeedforwardStudy:
     config: FeedforwardConfig  # how wrong the models are
     axis_2: np.ndarray  # (n,) rad, where the motions begin
     axis_3: np.ndarray  # (n,) rad
-    criterion: dict[int, dict[str, np.ndarray]]  # by angle in degrees and feedforward, (n, n) in m/s
-    path: dict[str, Deviation]  # of the rectangle, by feedforward
-    tick: dict[str, float]  # s, the median time of a tick, by feedforward
+    criterion: Mapping[int, Mapping[str, np.ndarray]]  # by angle in degrees and feedforward, (n, n) in m/s
+    path: Mapping[str, Deviation]  # of the rectangle, by feedforward
+    tick: Mapping[str, float]  # s, the median time of a tick with inverse kinematics, by feedforward
 
     def ratio(self, angle_deg: int) -> np.ndarray:
         """The criterion with an elastic structure in the model over the one without, (n, n)."""
@@ -61,6 +62,8 @@ def study_feedforward(
     if grid < 2:
         raise ValueError(f"--grid must be at least 2, got {grid}")
     configs = {kind: replace(config, kind=kind) for kind in KINDS}
+    for each in configs.values():  # what is impossible is refused here and not in a process
+        FEEDFORWARDS[each.kind](robot, each, StationConfig().period, payload)
     # From everywhere there is room for the largest motion.
     axis_2, axis_3 = np.linspace(robot.lower[1:3], robot.upper[1:3] - np.deg2rad(max(ANGLES_DEG)), grid).T
     starts = [np.array([0.0, q2, q3, 0.0, 0.0, 0.0]) for q2 in axis_2 for q3 in axis_3]
@@ -69,20 +72,18 @@ def study_feedforward(
         for kind in KINDS:
             jobs += [Trial(robot, payload, start, np.deg2rad(angle), configs[kind]) for start in starts]
     results = in_processes(_work, jobs, processes, progress)
-    rings = np.array(results[len(KINDS) :], dtype=object).reshape(len(ANGLES_DEG), len(KINDS), grid, grid)
-    criterion = {
-        angle: {
-            kind: np.array([[ringing.criterion for ringing in row] for row in rings[a, k]])
-            for k, kind in enumerate(KINDS)
-        }
-        for a, angle in enumerate(ANGLES_DEG)
-    }
-    ticks = {kind: median(ringing.tick for ringing in rings[:, k].flat) for k, kind in enumerate(KINDS)}
     path: dict[str, Any] = dict(zip(KINDS, results[: len(KINDS)], strict=True))
-    return FeedforwardStudy(robot, payload, config, axis_2, axis_3, criterion, path, ticks)
+    values = np.array(results[len(KINDS) :], dtype=float).reshape(len(ANGLES_DEG), len(KINDS), grid, grid)
+    criterion = {
+        angle: dict(zip(KINDS, of_angle, strict=True))
+        for angle, of_angle in zip(ANGLES_DEG, values, strict=True)
+    }
+    # Alone on a core, after the rest is done.
+    tick = {kind: tick_time(RectangleTrial(robot, payload, configs[kind])) for kind in KINDS}
+    return FeedforwardStudy(robot, payload, config, axis_2, axis_3, criterion, path, tick)
 
 
-def _work(job: RectangleTrial | Trial, progress: Progress) -> Deviation | Ringing:
+def _work(job: RectangleTrial | Trial, progress: Progress) -> Deviation | float:
     try:
         return job.run(progress)
     except RuntimeError as error:

@@ -4,8 +4,6 @@ The criterion of Reiner (2010), section 6.2.1: how much the wrist still accelera
 """
 
 from dataclasses import dataclass
-from statistics import median
-from time import perf_counter
 
 import numpy as np
 from pydrake.systems.analysis import Simulator
@@ -29,14 +27,6 @@ _MAX_STEP = 2e-3  # s; the ringing of the best feedforward is then right to some
 
 
 @dataclass(frozen=True)
-class Ringing:
-    """What came of a trial."""
-
-    criterion: float  # m/s, C of (6.1)
-    tick: float  # s, the median time that the feedforward took
-
-
-@dataclass(frozen=True)
 class Trial:
     """A motion from rest to rest, all three axes by the same angle at the same time."""
 
@@ -46,12 +36,12 @@ class Trial:
     angle: float  # rad, signed
     config: FeedforwardConfig
 
-    def run(self, progress: Progress | None = None) -> Ringing:
-        """Simulates it with the drives of the station and an elastic structure."""
+    def run(self, progress: Progress | None = None) -> float:
+        """Simulates it with the drives of the station and an elastic structure; returns C of (6.1) in m/s."""
         config = StationConfig(elasticity="structure", payload=self.payload)
         period, ahead = config.period, config.drive.command_delay + config.drive.dead_time
         stop = SETTLE + motion_profile(self.robot, self.angle).duration
-        told, tick = commands(self, np.arange(0.0, stop + RINGING, period) + ahead, period)
+        told = commands(self, np.arange(0.0, stop + RINGING, period) + ahead, period)
         builder = DiagramBuilder()
         station = builder.AddNamedSystem(
             "station", SimulatedStation(self.robot, config, "cascade", with_log=False, takes_torque=True)
@@ -70,7 +60,7 @@ class Trial:
         times, accelerations = _watched(simulator, station, integration, stop + RINGING)
         if progress:
             progress(1.0)
-        return Ringing(criterion(times, accelerations), tick)
+        return criterion(times, accelerations)
 
 
 class CommandPlayer(LeafSystem):
@@ -114,19 +104,17 @@ def references(trial: Trial, times: np.ndarray) -> list[JointReference]:
     ]
 
 
-def commands(trial: Trial, times: np.ndarray, period: float) -> tuple[np.ndarray, float]:
-    """What the drives are told, shape (n, 3, 6), and how long a tick of the feedforward takes in s."""
+def commands(trial: Trial, times: np.ndarray, period: float) -> np.ndarray:
+    """What the drives are told: positions, velocities and torques, shape (n, 3, 6)."""
     model = FEEDFORWARDS[trial.config.kind](trial.robot, trial.config, period, trial.payload)
-    memory, rows, ticks = model.fresh_memory(), [], []
+    memory, rows = model.fresh_memory(), []
     for reference in references(trial, times):
-        started = perf_counter()
         offsets = model.offsets(reference, memory)
-        ticks.append(perf_counter() - started)
         memory = offsets.memory
         rows.append(
             (reference.position + offsets.position, reference.velocity + offsets.velocity, offsets.torque)
         )
-    return np.array(rows), median(ticks)
+    return np.array(rows)
 
 
 def criterion(times: np.ndarray, accelerations: np.ndarray) -> float:

@@ -1,28 +1,18 @@
-"""Laws on a real station, and a virtual one started beside them."""
+"""Laws on a real station, one after the other."""
 
-import json
-import signal
-import subprocess
-import sys
-import tempfile
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from diagrams.guided_run import GuidedRecord, GuidedRun, StationError
+from diagrams.guided_run import GuidedRecord, GuidedRun
 from diagrams.log import RunLog
-from diagrams.scenario import LinkConfig, Scenario, scenario_text
+from diagrams.scenario import Scenario
 from diagrams.virtual_cell import CellRecord
-from experiments.workers import SimulationError
+from experiments.station_clients import station_clients
 from robots.model import RobotModel
-from systems.egm.client import EgmClient
-from systems.mocap.receiver import MocapReceiver
 from systems.servo import BLIND_LAWS
-
-_PATIENCE = 30.0  # s in which a cell must have ended
 
 
 @dataclass
@@ -66,43 +56,24 @@ def compare_on_station(
         ValueError: if a part refuses its configuration.
     """
     jobs = [(law, GuidedRun(scenario, law, robot)) for law in laws for _ in range(cycles)]
-    link, report = scenario.station.link, progress or (lambda share: None)
+    report = progress or (lambda share: None)
     records: dict[str, list[GuidedRecord]] = {law: [] for law in laws}
-    truth: CellRecord | None = None
-    cell: dict[str, Any] = {}
-    with EgmClient(
-        robot.speed,
-        0 if with_cell else link.port,
-        link.address,
-        link.controller or None,
-        link.break_after,
-        period=scenario.station.period,
-    ) as client:
-        beside = CellBeside(scenario, client.channel.address[1]) if with_cell else None
-        if beside:
-            link = replace_camera_port(link, beside.__enter__())
-        try:
-            camera = _camera(link, scenario) if any(law not in BLIND_LAWS for law in laws) else None
-            for number, (law, run) in enumerate(jobs):
-                record = run.run(
-                    client,
-                    camera,
-                    progress=lambda share, number=number: report((number + share) / len(jobs)),
-                )
-                records[law].append(record)
-            if camera:
-                camera.close()
-        except StationError as error:
-            raise SimulationError(str(error)) from error
-        finally:
-            if beside:
-                beside.__exit__(None, None, None)
-                truth, cell = beside.truth, beside.statistics
-    if truth is not None:
+    needs_camera = any(law not in BLIND_LAWS for law in laws)
+    with station_clients(scenario, robot, with_cell, needs_camera) as station:
+        for number, (law, run) in enumerate(jobs):
+            record = run.run(
+                station.client,
+                station.camera,
+                progress=lambda share, number=number: report((number + share) / len(jobs)),
+                signals=station.signals,
+            )
+            records[law].append(record)
+    cell = station.cell
+    if cell and cell.truth is not None:
         for cycles_of_law in records.values():
             for record in cycles_of_law:
-                record.log = with_truth(record, truth)
-    return GuidedComparison(records, cell)
+                record.log = with_truth(record, cell.truth)
+    return GuidedComparison(records, cell.statistics if cell else {})
 
 
 def with_truth(record: GuidedRecord, truth: CellRecord) -> RunLog:
@@ -114,68 +85,6 @@ def with_truth(record: GuidedRecord, truth: CellRecord) -> RunLog:
     known = np.isfinite(link_position)
     links = np.where(known, link_position, record.log.link_position)
     return replace(record.log, X_WE_true=X_WE, link_position=links)
-
-
-class CellBeside:
-    """``truetip cell`` in a process of its own, which this process learns nothing from but its ports."""
-
-    def __init__(self, scenario: Scenario, port: int) -> None:
-        """Prepares it; `__enter__` starts it.
-
-        Args:
-            scenario: whose station it is.
-            port: where the client listens for the controller.
-        """
-        self.truth: CellRecord | None = None
-        self.statistics: dict[str, Any] = {}
-        self._folder = tempfile.TemporaryDirectory(prefix="truetip-cell-")
-        folder = Path(self._folder.name)
-        self._truth, self._json = folder / "truth.npz", folder / "cell.json"
-        (folder / "scenario.yaml").write_text(scenario_text(scenario), encoding="utf-8")
-        command = [sys.executable, "-m", "experiments.cli", "cell", "--announce"]
-        command += ["--scenario", str(folder / "scenario.yaml"), "--set", f"station.link.port={port}"]
-        command += ["--set", "station.link.camera.server.port=0"]
-        self._command = [*command, "--truth", str(self._truth), "--json", str(self._json)]
-
-    def __enter__(self) -> int:
-        """Starts the cell; returns the port of its camera. Raises SimulationError if it does not start."""
-        self._process = subprocess.Popen(
-            self._command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
-        )
-        assert self._process.stdout is not None
-        line = self._process.stdout.readline()
-        if not line:
-            _, problem = self._process.communicate()
-            self._folder.cleanup()
-            raise SimulationError(f"the virtual cell did not start: {' '.join(problem.split())}")
-        return int(json.loads(line)["camera_port"])
-
-    def __exit__(self, *_: object) -> None:
-        """Ends the cell and reads what it leaves behind."""
-        self._process.send_signal(signal.SIGTERM)
-        try:
-            self._process.communicate(timeout=_PATIENCE)
-            if self._truth.exists() and self._json.exists():
-                self.truth = CellRecord.load(self._truth)
-                self.statistics = json.loads(self._json.read_text(encoding="utf-8"))
-        except subprocess.TimeoutExpired:
-            self._process.kill()
-            self._process.communicate()
-        finally:
-            self._folder.cleanup()
-
-
-def replace_camera_port(link: LinkConfig, port: int) -> LinkConfig:
-    """The same link with another port of the camera's computer."""
-    return replace(link, camera=replace(link.camera, server=replace(link.camera.server, port=port)))
-
-
-def _camera(link: LinkConfig, scenario: Scenario) -> MocapReceiver | None:
-    if not link.has_camera:
-        return None
-    # The camera's delay is one named number, whoever delays it.
-    clock = replace(link.camera.clock, smallest_delay=scenario.station.camera.delay)
-    return MocapReceiver(replace(link.camera, clock=clock), link.camera_frame.pose(), link.tool_frame.pose())
 
 
 def _link_json(record: GuidedRecord) -> dict[str, Any]:

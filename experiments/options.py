@@ -57,7 +57,7 @@ CameraOption = Annotated[
     typer.Option(
         "--camera",
         metavar="NAME",
-        help=f"Where poses come from: {', '.join(CAMERAS)} of markers.",
+        help=f"How the tip is measured: {', '.join(CAMERAS)} (of markers).",
         show_default="the scenario's",
     ),
 ]

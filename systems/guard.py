@@ -65,7 +65,8 @@ class CommandGuard(LeafSystem):
         out ``torque_feedforward``  vector 6 in N m, zero while the law's command is not followed
     in any case:
         out ``guard_status``      vector: how many ticks each of `KINDS` has happened, in that order
-        out ``deviation``         vector 6 in rad: where the joints are led less where the law would have them
+        out ``deviation``         vector 6 in rad: where the joints were led at the last tick less where the law
+                                  would have had them
 
     The command that was issued last is the state; the output is computed from it and the law's newest
     command, without delay. Before the first command, and while the robot does not run, the output is the
@@ -135,6 +136,7 @@ class CommandGuard(LeafSystem):
         state = self.DeclareDiscreteState(unknown)
         counts = self.DeclareDiscreteState(len(KINDS))
         self.DeclareStateOutputPort("guard_status", counts)
+        self.DeclareStateOutputPort("deviation", self.DeclareDiscreteState(NUM_JOINTS))
         inputs = {port.ticket() for port in self._inputs} | {self._joints.ticket()}
         # One entry computes everything; the ports are slices of it.
         self._next = self.DeclareCacheEntry(
@@ -144,8 +146,6 @@ class CommandGuard(LeafSystem):
         )
         for name, part in (("position_command", _POSITIONS), ("velocity_command", _VELOCITIES)):
             self.DeclareVectorOutputPort(name, NUM_JOINTS, self._slice(part), {self._next.ticket()})
-        compared = {self._next.ticket(), self._inputs[0].ticket()}
-        self.DeclareVectorOutputPort("deviation", NUM_JOINTS, self._calc_deviation, compared)
         if passes_torque:
             torque = self.DeclareVectorInputPort("torque_feedforward", NUM_JOINTS)
             self._torque = torque
@@ -158,11 +158,6 @@ class CommandGuard(LeafSystem):
             output.set_value(self._next.Eval(context)[0][part])
 
         return calc
-
-    def _calc_deviation(self, context: Context, output: BasicVector) -> None:
-        state = self._next.Eval(context)[0]
-        aside = state[_ASIDE] if self._is_speed_only else state[_POSITIONS] - self._inputs[0].Eval(context)
-        output.set_value(aside if math.isfinite(aside.sum()) else np.zeros(NUM_JOINTS))
 
     def _calc_torque(self, context: Context, output: BasicVector) -> None:
         kinds, torque = self._next.Eval(context)[1], self._torque.Eval(context)
@@ -303,6 +298,10 @@ class CommandGuard(LeafSystem):
         elif state[_MODE] not in (_IDLE, _RESUMING):
             state[_MODE] = _HOLDING if age >= self._config.hold_after - 1e-9 else _GOING
         discrete_state.set_value(0, state)
+        if kinds or context.get_discrete_state(2).value().any():
+            wished = self._inputs[0].Eval(context)
+            aside = state[_ASIDE] if self._is_speed_only else state[_POSITIONS] - wished
+            discrete_state.set_value(2, aside if math.isfinite(aside.sum()) else np.zeros(NUM_JOINTS))
         if kinds:
             counts = context.get_discrete_state(1).value().copy()
             counts[kinds] += 1.0

@@ -59,6 +59,10 @@ class EgmClient:
         data, sender = self.session.reply(mode, command, steady_time()), self.session.sender
         return data is not None and sender is not None and self.channel.send(data, sender)
 
+    def rehearse(self) -> None:
+        """Reads the last report and writes the last command once more, so that the next ones find it warm."""
+        self.session.rehearse()
+
     def close(self) -> None:
         """Frees the port."""
         self.channel.close()

@@ -86,6 +86,8 @@ class EgmSession:
         self._may_reply = False
         self._reply_number = 0
         self._safe: Command | None = None
+        self._last_data = b""
+        self._last_reply: tuple[Mode, Command, int, float] | None = None
 
     def receive(self, data: bytes, sender: Address, now: float) -> RobotReport | None:
         """Takes a datagram; returns its report if it is the newest of this session, else None."""
@@ -101,6 +103,7 @@ class EgmSession:
         if self.last is not None and not self._follows(report, now):
             return None
         self._accept(report, sender, now)
+        self._last_data = data
         return report
 
     def check(self, now: float) -> None:
@@ -121,6 +124,7 @@ class EgmSession:
         self._reply_number += 1
         try:
             data = encode_command(mode, command, self._reply_number, now)
+            self._last_reply = mode, command, self._reply_number, now
             self._safe = replace(
                 command,
                 velocity=None if command.velocity is None else np.zeros_like(command.velocity),
@@ -133,6 +137,12 @@ class EgmSession:
             data = encode_command(mode, self._safe, self._reply_number, now)
         self.counters.replies += 1
         return data
+
+    def rehearse(self) -> None:
+        """Decodes the last datagram and encodes the last reply without any effect."""
+        if self._last_data and self._last_reply:
+            decode_report(self._last_data)
+            encode_command(*self._last_reply)
 
     def _is_known(self, sender: Address) -> bool:
         if self._host is not None and sender[0] != self._host:

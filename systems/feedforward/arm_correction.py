@@ -20,7 +20,7 @@ _SHORT_LEVER = 0.1  # of the reach, 1 / sqrt(s_phi) of (3.59)
 
 
 class SigmoidDamping:
-    """Damping that falls from ``largest`` to ``smallest`` as a singular value grows, Reiner (2010) eq. (3.66)."""
+    """Damping that falls smoothly as a singular value grows, Reiner (2010) eq. (3.66)."""
 
     def __init__(
         self,
@@ -43,8 +43,8 @@ class SigmoidDamping:
         high, low = factors[0] * largest, factors[1] * smallest
         if not (0.0 < smallest < low < high < largest and 0.0 < bounds[0] < bounds[1]):
             raise ValueError(
-                f"damping: must fall from largest to smallest between two bounds in their order, got {largest}, "
-                f"{smallest} and {bounds}, with {high} and {low} at the bounds"
+                f"damping: must fall from largest to smallest between two bounds in their order, "
+                f"got {largest}, {smallest} and {bounds}, with {high} and {low} at the bounds"
             )
         span = largest - smallest
         # exp(-s (sigma - middle)) at the two bounds.
@@ -66,15 +66,17 @@ class LeastSquaresCorrection:
     the whole correction and not its change, so that nothing drifts where the arm is singular. The damping
     (3.66) belongs to each singular value by itself, so that only the lost direction stays uncorrected.
 
-    Axis 1 has a damping of its own, by how far the wrist is from it. Robots often move their wrist past
-    axis 1; the correction that a lever so short asks for would turn about within a few ticks.
+    Axes 1 and 3 have a damping of their own, by how far the wrist is from axis 1 and by how far the elbow is
+    bent. Robots move their wrist past axis 1 and stretch their arm, and what these levers ask for when they
+    are short would turn about within a few ticks.
     """
 
     def __init__(self, robot: RobotModel, arm: DeformedArm) -> None:
         """Sets the weights by the size of the robot."""
         self._arm, self._reach = arm, reach(robot)
-        self._damping = SigmoidDamping(0.03, 1e-5, (0.005, 0.02))
+        self._damping = SigmoidDamping(0.04, 1e-5, (0.012, 0.045))
         self._shoulder_damping = SigmoidDamping(0.15, 1e-5, (0.14, 0.5))
+        self._elbow_damping = SigmoidDamping(0.05, 1e-5, (0.15, 0.5))
         self._weights = np.repeat([_ROTATION_WEIGHT, 1.0 / self._reach], 3)
 
     def correction(
@@ -89,11 +91,12 @@ class LeastSquaresCorrection:
             last: correction at the last tick.
         """
         X, J = self._arm.pose_and_jacobian(q + last, deflection)
-        turns = np.empty((NUM_JOINTS + 1, NUM_JOINTS))
+        lever, bend = self._arm.posture()
+        turns, wanted = np.zeros((NUM_JOINTS + 2, NUM_JOINTS)), np.zeros(NUM_JOINTS + 2)
         turns[:NUM_JOINTS] = self._weights[:, None] * J
-        turns[NUM_JOINTS] = 0.0
-        turns[NUM_JOINTS, 0] = self._shoulder_damping.at(self._arm.wrist_lever() / self._reach)
-        wanted = np.append(self._weights * (pose_error(X_WE, X) + J @ last), 0.0)
+        turns[NUM_JOINTS, 0] = self._shoulder_damping.at(lever / self._reach)
+        turns[NUM_JOINTS + 1, 2] = self._elbow_damping.at(bend)
+        wanted[:NUM_JOINTS] = self._weights * (pose_error(X_WE, X) + J @ last)
         U, s, Vt = np.linalg.svd(turns, full_matrices=False)
         gain = s / (s * s + self._damping.at(s) ** 2)
         return (gain * (wanted @ U)) @ Vt

@@ -40,11 +40,12 @@ class DeformedArm:
         self._context, self._forces = plant.CreateDefaultContext(), MultibodyForces(plant)
         n = plant.num_positions()
         self._state, self._acceleration = np.zeros(2 * n), np.zeros(n)
-        self._links = [plant.GetBodyByName(f"link_{number}").body_frame() for number in range(1, 4)]
-        self._wrist = plant.GetBodyByName("link_5").body_frame()
-        first = parts.motors[0].frame_on_parent().CalcPoseInWorld(self._context)
-        self._axis_1, self._shoulder = first.rotation().multiply(robot.axes[0]), first.translation()
+        # The sockets of axes 2 and 3, and the point where axes 4, 5 and 6 meet.
+        wrist = plant.GetBodyByName("link_5").body_frame()
+        self._landmarks = [parts.motors[1].frame_on_parent(), parts.motors[2].frame_on_parent(), wrist]
         self._axes = robot.axes
+        socket = parts.motors[0].frame_on_parent().CalcPoseInWorld(self._context)
+        self._axis_1, self._p_W1 = socket.rotation().multiply(robot.axes[0]), socket.translation()
 
     def section_torques(self, reference: JointReference) -> np.ndarray:
         """What loads bearings and beams of an arm that does not yield, in N m, shape (size,).
@@ -78,31 +79,37 @@ class DeformedArm:
         )
         return X_WE, J[:, self._joints]
 
-    def wrist_lever(self) -> float:
-        """How far in m the wrist is from axis 1, in the positions that were asked for last."""
-        arm = self._wrist.CalcPoseInWorld(self._context).translation() - self._shoulder
-        along = float(self._axis_1 @ arm)
-        return math.sqrt(max(0.0, float(arm @ arm) - along * along))
+    def posture(self) -> tuple[float, float]:
+        """How near the arm is to singular, in the positions that were asked for last.
+
+        Returns:
+            How far in m the wrist is from axis 1, and the sine of the angle between upper arm and forearm.
+        """
+        shoulder, elbow, wrist = (
+            frame.CalcPoseInWorld(self._context).translation() for frame in self._landmarks
+        )
+        arm, upper_arm, forearm = wrist - self._p_W1, elbow - shoulder, wrist - elbow
+        squared = float(arm @ arm) - float(self._axis_1 @ arm) ** 2
+        lengths = float(upper_arm @ upper_arm) * float(forearm @ forearm)
+        sine_squared = 1.0 - float(upper_arm @ forearm) ** 2 / lengths
+        return math.sqrt(max(0.0, squared)), math.sqrt(max(0.0, sine_squared))
 
     def rigid_elbow(self, q: np.ndarray) -> np.ndarray:
         """Where axis 3 of an arm that does not yield is, in m in the world, shape (3,)."""
         self._set(q, np.zeros(self.size))
-        return self._links[2].CalcPoseInWorld(self._context).translation()
+        return self._landmarks[1].CalcPoseInWorld(self._context).translation()
 
     def lever(
         self, joint: int, q: np.ndarray, deflection: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
         """The axis of joint 0, 1 or 2 as a unit vector, a point on it, axis 3 and the tip; (3,) each."""
         self._set(q, deflection)
-        motor = self._parts.motors[joint].frame_on_parent().CalcPoseInWorld(self._context)
-        axis = motor.rotation().multiply(self._axes[joint])
-        elbow = self._parts.motors[2].frame_on_parent().CalcPoseInWorld(self._context).translation()
-        return (
-            axis,
-            motor.translation(),
-            elbow,
-            self._parts.tool.CalcPoseInWorld(self._context).translation(),
+        socket, elbow, tool = (
+            frame.CalcPoseInWorld(self._context)
+            for frame in (self._parts.motors[joint].frame_on_parent(), self._landmarks[1], self._parts.tool)
         )
+        axis = socket.rotation().multiply(self._axes[joint])
+        return axis, socket.translation(), elbow.translation(), tool.translation()
 
     def _set(self, q: np.ndarray, deflection: np.ndarray) -> None:
         positions = self._state[: len(self._acceleration)]

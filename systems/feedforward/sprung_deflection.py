@@ -4,7 +4,8 @@ import numpy as np
 
 from robots.drivetrain.stiffness import GearSpring
 
-_NEWTON_STEPS = 6
+_NEWTON_STEPS = 60  # at most; one or two if the load changes little in a tick
+_CONVERGED = 1e-12  # of a deflection
 
 
 class SprungDeflection:
@@ -60,13 +61,16 @@ class SprungDeflection:
         x = deflection
         for _ in range(_NEWTON_STEPS):
             excess = x - known + of_now * (spring.torque(x) - k * x)
-            x = x - excess / (1.0 + of_now * (spring.stiffness(x) - k))
+            step = excess / (1.0 + of_now * (spring.stiffness(x) - k))
+            x = x - step
+            if (np.abs(step) <= _CONVERGED * np.abs(x)).all():
+                break
         return x
 
     def _step_gains(self, stiffness: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """What the last deflection, the last load and the new one weigh in the new deflection."""
         retardation = self._damping / stiffness / self._period  # in ticks
-        with np.errstate(divide="ignore"):
+        with np.errstate(divide="ignore", over="ignore"):
             decay = np.exp(-1.0 / retardation)  # no damping: no memory
         lag = retardation * (1.0 - decay)
         return decay, (lag - decay) / stiffness, (1.0 - lag) / stiffness

@@ -194,8 +194,10 @@ class ServoLaw(LeafSystem):
         if not self._deviation.HasValue(context):
             return None
         deviation = self._deviation.Eval(context)
+        if deviation @ deviation < _NO_DEVIATION:
+            return None
         commanded = context.get_discrete_state(self._outputs[0]).value()
-        if deviation @ deviation < _NO_DEVIATION or math.isnan(commanded[0]):
+        if math.isnan(commanded[0]):
             return None
         # A law that commands speeds does so from where the joints are, any other from where they shall be.
         led = commanded if self.config.drive == "velocity" else commanded + deviation

@@ -1,14 +1,18 @@
 """What the cameras record of the markers on the level of images: pixels in windows about the body.
 
 A marker is an evenly lit ellipse. Blur turns its edge into the integral of a Gauss curve across it, and
-motion during the exposure shifts it; noise and eight bits are added pixel by pixel. A camera reads only the
-window in which the body is expected, as Probst (2024) section 8.1 plans. What is dark there stays as it is:
-its noise is not drawn, because none of it would reach the threshold (`ImageSource` refuses a threshold where
-it could). The noise of the lit parts is a stream that the numbers from outside are the key of: to bring tens
-of thousands of numbers for each exposure through a port would cost more than everything else.
+motion during the exposure shifts it; noise and eight bits are added pixel by pixel. What hides the centre of
+a sphere hides all of it.
+
+A camera reads only the window in which the body is expected, as Probst (2024) section 8.1 plans. What is dark
+there stays as it is: its noise is not drawn, because none of it would reach the threshold (`ImageSource`
+refuses a threshold where it could). The noise of the lit parts is a stream that the numbers from outside are
+the key of: to bring tens of thousands of numbers for each exposure through a port would cost more than
+everything else.
 """
 
 from dataclasses import dataclass
+from functools import cache
 
 import numpy as np
 from scipy.special import ndtr
@@ -26,7 +30,7 @@ CLEAR_OF_NOISE = 6.0  # sigma; one dark pixel in a thousand million is further f
 _PIXEL_SIGMA2 = 1.0 / 12.0  # px^2, a pixel gathers the light of its square
 _EDGE = 4.0  # sigma beyond the outline, where nothing is left to be seen
 _STILL = 0.2  # px, a shorter way during the exposure widens no edge by more than half a percent
-_NODES, _WEIGHTS = np.polynomial.legendre.leggauss(3)  # along the way, exact to the fifth order
+_MOST_NODES = 16  # along the way of a light
 _REFLECTION_SIZES = 0.7, 12.0  # px, half axes of false lights
 
 
@@ -123,10 +127,10 @@ class ImageSource:
         rng = np.random.Generator(np.random.Philox(key=np.ascontiguousarray(noise).view(np.uint64)))
         p_W = self._body.p_E @ X_WE[:3, :3].T + X_WE[:3, 3]
         spheres = sphere_images(self._cameras, p_W, 0.5 * self._body.diameter)
-        camera, marker = np.nonzero(
-            np.isfinite(spheres.center[..., 0])
-            & ~(occluded(self._cameras.p_WC, p_W, arm) if arm is not None else np.zeros(1, bool))
-        )
+        shown = np.isfinite(spheres.center[..., 0])
+        if arm is not None:
+            shown &= ~occluded(self._cameras.p_WC, p_W, arm)
+        camera, marker = np.nonzero(shown)
         way = self._way(X_WE, V_WE)[camera, marker]
         lights = Ellipses(spheres.center[camera, marker], spheres.shape[camera, marker])
         if self._config.reflections > 0.0:
@@ -215,14 +219,22 @@ def _lit_share(
     r2 = 1.0 / np.sqrt(np.linalg.det(S_inverse))
     S_inverse = S_inverse * (1.0 + sigma * sigma / r2)[:, None, None]
     a, b, c = (S_inverse[:, i, j].astype(np.float32)[light] for i, j in ((0, 0), (0, 1), (1, 1)))
-    moves = len(way) > 0 and np.abs(way).max() > _STILL
+    longest = float(np.abs(way).max(initial=0.0))
+    nodes, weights = _quadrature(1 if longest < _STILL else 2 + int(longest / (2.0 * sigma)))
     share = np.zeros(len(offset), np.float32)
-    for node, weight in zip(_NODES, _WEIGHTS, strict=True) if moves else ((0.0, 2.0),):
+    for node, weight in zip(nodes, weights, strict=True):
         u, v = (offset - (0.5 * node * way).astype(np.float32)[light]).T
         radius = np.sqrt(u * u + v * v)
         relative = np.sqrt(a * u * u + 2.0 * b * u * v + c * v * v) + np.float32(1e-6)
         share += np.float32(0.5 * weight) * ndtr((radius / relative - radius) / np.float32(sigma))
     return share
+
+
+@cache
+def _quadrature(count: int) -> tuple[list[float], list[float]]:
+    """Nodes in [-1, 1] and weights of Gauss and Legendre; so close that the blur fills what is between them."""
+    nodes, weights = np.polynomial.legendre.leggauss(min(count, _MOST_NODES))
+    return nodes.tolist(), weights.tolist()
 
 
 def _check(config: ImageConfig, threshold: float) -> None:

@@ -18,6 +18,7 @@ from systems.faulty_link import FaultyLink
 from systems.mocap.clock import ClockQuality
 from systems.samples import PoseSample
 
+LOOK = 2e-5  # s that it takes to look for a message
 TURN_AROUND = 4e-4  # s, of the client: its reply is heard at the next cycle
 CELL, STRANGER = ("127.0.0.1", 40000), ("127.0.0.1", 40001)
 
@@ -48,7 +49,7 @@ class Lockstep:
 
     def poll(self, timeout: float = 0.0) -> RobotReport | None:
         """As `systems.egm.client.EgmClient.poll`; time passes only here."""
-        end = self.time + timeout
+        end = self.time + max(timeout, LOOK)
         while not self._on_the_way or self._on_the_way[0][0] > end:
             if self.cell.time > end:
                 self.time = end
@@ -73,6 +74,10 @@ class Lockstep:
             if not delivery.is_foreign:
                 heapq.heappush(self._replies, (delivery.time, next(self._order), delivery.data))
         return True
+
+    def rehearse(self) -> None:
+        """As `systems.egm.client.EgmClient.rehearse`."""
+        self.session.rehearse()
 
     def switch_motors_off(self) -> None:
         """Somebody presses the button before the first message is out."""

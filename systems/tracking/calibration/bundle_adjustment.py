@@ -20,6 +20,7 @@ from systems.tracking.camera_model import Cameras
 
 _STEPS = 200
 _CONVERGED = 1e-9  # relative decrease of the sum of squares
+_EXACT = 1e-12  # mean square of the residuals over what is expected: there is no noise
 _LEAST_INFORMATION = 1e-14  # of a combination of parameters, relative to the best known one
 
 
@@ -68,7 +69,7 @@ def adjust(cameras: Cameras, scene: Scene, wand_p_W: np.ndarray, with_lens: bool
     now = _Linearized(cameras, scene, wand_p_W)
     if not np.isfinite(now.cost):
         raise UndeterminedError("the first guess of the cameras has points behind them")
-    while steps < _STEPS:
+    while steps < _STEPS and now.cost > _EXACT * now.count:
         steps += 1
         change, shift = now.step(free, damping)
         then = _Linearized(moved_cameras(cameras, change), scene, wand_p_W + shift)

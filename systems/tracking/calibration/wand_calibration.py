@@ -1,30 +1,30 @@
 """From what the cameras saw of wand and frame to where they stand and how they see.
 
-A camera that sees the frame finds its place by it, with the lens that its data sheet promises. What two of
-them see of the wand is triangulated, and a camera that does not see the frame finds its place by the wand
-(direct linear transformation). Then everything is adjusted together, first the places, then the lenses;
-pixels that do not belong to the rest are left out, and it is adjusted again.
+The cameras are placed one by one (`camera_placement`), then everything is adjusted together
+(`bundle_adjustment`), first the places, then the lenses; pixels that do not belong to the rest are left out,
+and it is adjusted again.
 """
 
 from dataclasses import dataclass, replace
 
-import cv2
 import numpy as np
 
 from robots.calibration.least_squares import UndeterminedError
 from systems.tracking.calibration.bundle_adjustment import Adjusted, Scene, adjust
-from systems.tracking.calibration.direct_linear import camera_from_projection, direct_linear
+from systems.tracking.calibration.camera_placement import (
+    MINIMUM_FRAME_POINTS,
+    MINIMUM_WAND_POINTS,
+    placed_cameras,
+    triangulated_wand,
+)
 from systems.tracking.calibration.wand import CalibrationKit, WandRun
 from systems.tracking.camera_model import Cameras
-from systems.tracking.triangulation import triangulate
 
-MINIMUM_FRAME_POINTS = 4
-MINIMUM_WAND_POINTS = 30  # in a camera: twice what its fifteen parameters take, and twice that again
 MINIMUM_PLACES = 20
 
 _OUTLIER = 5.0  # sigma
-_ROUNDS = 6  # of leaving out
-_WRONG_PLACE = 50.0  # px, a camera that is so far off in the middle is placed anew
+_ROUNDS = 8  # of leaving out
+_LARGEST_SIGMA = 3.0  # px; no camera is that bad, so points have wrong names or a lens is another one
 
 
 @dataclass(frozen=True)
@@ -84,10 +84,16 @@ def calibrate_with_wand(
         1e-3 * kit.wand_sigma_mm,
         pixel_sigma,
     )
-    cameras = _placed(guess, scene, names)
-    wand = _triangulated(cameras, pixels, pixel_sigma)
-    cameras = adjust(cameras, _within(scene, wand), wand[_whole(wand)], with_lens=False).cameras
-    return _report(*_adjusted(cameras, scene), run)
+    cameras = placed_cameras(guess, scene, names)
+    everything = ~np.isnan(pixels[..., 0])
+    cameras = _once(cameras, scene, everything, with_lens=False)[0].cameras
+    found, used = _adjusted(cameras, scene, names)
+    if found.sigma > _LARGEST_SIGMA:
+        raise UndeterminedError(
+            f"wand: pixels scatter by {found.sigma:.1f} px, {pixel_sigma:g} px are expected: are ends or "
+            "points exchanged, or lengths or lenses not those of the kit and the cell?"
+        )
+    return _report(found, used, run)
 
 
 def _refuse_too_little(run: WandRun, seen: np.ndarray, names: list[str]) -> None:
@@ -106,86 +112,51 @@ def _refuse_too_little(run: WandRun, seen: np.ndarray, names: list[str]) -> None
             )
 
 
-def _placed(guess: Cameras, scene: Scene, names: list[str]) -> Cameras:
-    """First guesses of where the cameras are."""
-    n = len(guess)
-    placed: list[Cameras | None] = [_by_frame(guess.subset([i]), scene, i) for i in range(n)]
-    for _ in range(n):
-        known = [i for i in range(n) if placed[i] is not None]
-        together = _joined([camera for camera in placed if camera is not None])
-        wand = _triangulated(together, scene.wand_pixels[known], scene.pixel_sigma).reshape(-1, 3)
-        for i in range(n):
-            pixels = scene.wand_pixels[i].reshape(-1, 2)
-            both = ~np.isnan(pixels[:, 0] + wand[:, 0])
-            camera = placed[i]
-            if camera is not None:
-                off = np.linalg.norm(camera.project(wand[both])[0] - pixels[both], axis=-1)
-                if np.nanmedian(off) < _WRONG_PLACE:
-                    continue
-            if both.sum() >= MINIMUM_WAND_POINTS:
-                placed[i] = camera_from_projection(direct_linear(wand[both], pixels[both]), wand[both])
-        if all(camera is not None for camera in placed):
-            break
-    for name, camera in zip(names, placed, strict=True):
-        if camera is None:
+def _refuse_contradiction(seen: np.ndarray, used: np.ndarray, names: list[str]) -> None:
+    """Refuses a camera of whose points, (n, f, 2), hardly any belong to the rest."""
+    for name, there, left in zip(names, seen.sum((1, 2)), used.sum((1, 2)), strict=True):
+        if left < MINIMUM_WAND_POINTS:
             raise UndeterminedError(
-                f"camera {name}: saw neither {MINIMUM_FRAME_POINTS} points of the frame nor enough of the "
-                "wand together with two others that did"
+                f"camera {name}: {there - left} of its {there} points contradict the other cameras: are the "
+                "ends of the wand exchanged?"
             )
-    return _joined([camera for camera in placed if camera is not None])
 
 
-def _by_frame(camera: Cameras, scene: Scene, i: int) -> Cameras | None:
-    """Where a camera with a known lens stands that sees the frame; None if it does not."""
-    seen = ~np.isnan(scene.known_pixels[i, :, 0])
-    if seen.sum() < MINIMUM_FRAME_POINTS:
-        return None
-    lens = np.array([*camera.radial[0, :2], *camera.tangential[0], camera.radial[0, 2]])
-    points, pixels = scene.known_points[seen], scene.known_pixels[i, seen]
-    found, turn, p_CQ = cv2.solvePnP(points, pixels, camera.intrinsics[0], lens, flags=cv2.SOLVEPNP_SQPNP)
-    if not found:
-        return None
-    R_CQ = cv2.Rodrigues(turn)[0]
-    return replace(camera, R_WC=R_CQ.T[None], p_WC=(-R_CQ.T @ p_CQ).T)
+def _adjusted(cameras: Cameras, scene: Scene, names: list[str]) -> tuple[Adjusted, Scene]:
+    """Adjusts, leaves out what does not belong to the rest, and adjusts again until nothing changes.
 
-
-def _joined(cameras: list[Cameras]) -> Cameras:
-    names = Cameras.__dataclass_fields__
-    return Cameras(*(np.concatenate([getattr(camera, name) for camera in cameras]) for name in names))
-
-
-def _triangulated(cameras: Cameras, pixels: np.ndarray, sigma: float) -> np.ndarray:
-    """Ends of the wand in m, (f, 2, 3), NaN where fewer than two cameras saw one."""
-    n, f = pixels.shape[:2]
-    return triangulate(cameras, pixels.reshape(n, 2 * f, 2), sigma).p_W.reshape(f, 2, 3)
-
-
-def _whole(wand: np.ndarray) -> np.ndarray:
-    """Which places of the wand have both ends."""
-    return np.isfinite(wand.reshape(len(wand), 6).sum(1))
-
-
-def _within(scene: Scene, wand: np.ndarray) -> Scene:
-    return replace(scene, wand_pixels=scene.wand_pixels[:, _whole(wand)])
-
-
-def _adjusted(cameras: Cameras, scene: Scene) -> tuple[Adjusted, Scene]:
-    """Adjusts, leaves out what does not belong to the rest, and adjusts again until nothing is left out."""
-    found = None
+    Returns:
+        What was found, and the scene with what was used of it.
+    """
+    used = ~np.isnan(scene.wand_pixels[..., 0])
+    found, some, whole = _once(cameras, scene, used)
     for _ in range(_ROUNDS):
-        wand = _triangulated(cameras, scene.wand_pixels, scene.pixel_sigma)
-        scene = _within(scene, wand)
-        found = adjust(cameras, scene, wand[_whole(wand)])
         cameras = found.cameras
         typical = 1.4826 * np.nanmedian(np.abs(found.wand_residual))  # outliers do not move the median
-        off = np.nan_to_num(np.abs(found.wand_residual).max(-1))
-        # The worst camera of a point first: it has drawn the point away from the others.
-        wrong = (off > _OUTLIER * max(typical, 1e-9)) & (off == off.max(0))
-        if not wrong.any():
+        seen = scene.wand_pixels[:, whole]
+        off = np.nan_to_num(np.abs(seen - cameras.project(found.wand)).max(-1))
+        far = off > _OUTLIER * max(typical, 1e-9)
+        # Of a point's pixels the worst goes first: it has drawn the point away from the others.
+        worst = off == np.where(used[:, whole], off, 0.0).max(0)
+        now = used.copy()
+        now[:, whole] = ~np.isnan(seen[..., 0]) & ~(far & (worst | ~used[:, whole]))
+        if np.array_equal(now, used):
             break
-        scene = replace(scene, wand_pixels=np.where(wrong[..., None], np.nan, scene.wand_pixels))
-    assert found is not None
-    return found, scene
+        used = now
+        _refuse_contradiction(~np.isnan(scene.wand_pixels[..., 0]), used, names)
+        found, some, whole = _once(cameras, scene, used)
+    return found, some
+
+
+def _once(
+    cameras: Cameras, scene: Scene, used: np.ndarray, with_lens: bool = True
+) -> tuple[Adjusted, Scene, np.ndarray]:
+    """Adjusts with some pixels; also the scene with only these, and which places of the wand it has."""
+    pixels = np.where(used[..., None], scene.wand_pixels, np.nan)
+    wand = triangulated_wand(cameras, pixels, scene.pixel_sigma)
+    whole = np.isfinite(wand.reshape(len(wand), 6).sum(1))
+    some = replace(scene, wand_pixels=pixels[:, whole])
+    return adjust(cameras, some, wand[whole], with_lens), some, np.flatnonzero(whole)
 
 
 def _report(found: Adjusted, scene: Scene, run: WandRun) -> WandCalibration:
@@ -196,7 +167,7 @@ def _report(found: Adjusted, scene: Scene, run: WandRun) -> WandCalibration:
     # A pixel off is an angle off, and that is a length at the point's depth.
     p_Q = found.wand.reshape(-1, 3)
     distance = np.linalg.norm(found.wand_residual.reshape(n, 2 * f, 2) / cameras.focal[:, None], axis=-1)
-    ends = _triangulated(cameras, scene.wand_pixels, scene.pixel_sigma)
+    ends = triangulated_wand(cameras, scene.wand_pixels, scene.pixel_sigma)
     lengths = np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1)
     return WandCalibration(
         cameras,

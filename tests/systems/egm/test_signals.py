@@ -10,6 +10,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from systems.egm.channel import UdpChannel
+from systems.egm.signal_client import SignalClient
 from systems.egm.signals import ControllerSignals, SignalCodec, SignalError, SignalLayout
 
 numbers = st.lists(st.floats(-100.0, 100.0), min_size=6, max_size=6).map(np.array)
@@ -70,3 +72,16 @@ def test_what_does_not_fit_is_refused_with_one_kind_of_error(number: str, data: 
 def test_layouts_that_cannot_be_are_refused(change: dict, message: str):
     with pytest.raises(SignalError, match=message):
         SignalCodec(SignalLayout(**change))
+
+
+def test_a_client_keeps_the_newest_and_counts_what_does_not_fit():
+    codec = SignalCodec(SignalLayout())
+    with SignalClient(SignalLayout()) as client, UdpChannel() as controller:
+        for number in (1.0, 2.0):
+            signals = ControllerSignals(number, np.full(6, number), np.zeros(6))
+            controller.send(codec.encode(signals), client.channel.address)
+        controller.send(b"nonsense", client.channel.address)
+        client.channel.wait(1.0)
+        client.poll()
+        assert client.newest.time == pytest.approx(2.0)
+        assert (client.received, client.undecodable) == (2, 1)

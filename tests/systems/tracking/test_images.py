@@ -48,7 +48,7 @@ def test_the_light_in_a_picture_is_the_area_of_the_ellipse_and_its_mean_the_cent
 
 
 def test_motion_stretches_the_picture_along_its_way_and_leaves_its_middle():
-    """2 m/s for 4 ms: a box of width w has the variance w^2/12; 3 nodes leave a few percent."""
+    """2 m/s for 4 ms: a box of width w has the variance w^2/12; eight bits cut the faint ends."""
     images = ImageSource(CAMERAS, CELL.windows, ONE, ImageConfig(exposure=4e-3, brightness=200.0, **DARK))
     slow, fast = (expose(images, np.array([0.0, 0, 0, v, 0, 0])) for v in (0.0, 2.0))
     half = np.array([0.004, 0.0, 0.0])

@@ -1,0 +1,144 @@
+"""From what was said and seen to delays: by how much must one motion be shifted to lie on the other?"""
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from scipy.interpolate import CubicSpline
+from scipy.optimize import minimize_scalar
+from scipy.signal import correlate, correlation_lags
+
+from diagrams.latency_run import LatencyRecord
+
+_LONGEST = 0.5  # s, of a delay that is looked for
+_TRIM = 0.6  # s at both ends, where the shifted motion is not known
+
+
+@dataclass(frozen=True)
+class Latency:
+    """The delays of a station in s."""
+
+    cycle: float  # between two messages of the controller
+    loop: float  # from a command to the joint at it, as the controller's stamps have it
+    dead_time: float  # of that, what is more than the one cycle in which a reply is heard
+    residual: float  # rad, root mean square of what is left of the motion
+    camera: float | None  # from exposure to arrival
+    camera_residual: float | None  # m
+    drift_ppm: float | None  # the camera's clock gains this on the controller's
+    drift_sigma_ppm: float | None
+    jitter: dict[str, dict[str, float]]  # s, of messages and frames above the smallest delay
+    turn_around: dict[str, float]  # s, our own, from a message in to its reply out
+
+    def as_dict(self) -> dict[str, Any]:
+        """For a JSON text, in ms."""
+
+        def ms(value: float | None) -> float | None:
+            return None if value is None else 1e3 * value
+
+        return {
+            "cycle_ms": ms(self.cycle),
+            "loop_ms": ms(self.loop),
+            "dead_time_ms": ms(self.dead_time),
+            "camera_ms": ms(self.camera),
+            "drift_ppm": self.drift_ppm,
+            "drift_sigma_ppm": self.drift_sigma_ppm,
+            "jitter_ms": {
+                name: {level: ms(value) for level, value in levels.items()}
+                for name, levels in self.jitter.items()
+            },
+            "turn_around_ms": {level: ms(value) for level, value in self.turn_around.items()},
+            "residual_rad": self.residual,
+            "camera_residual_mm": ms(self.camera_residual),
+        }
+
+
+def evaluate(record: LatencyRecord) -> Latency:
+    """Finds the delays.
+
+    Raises:
+        ValueError: if nothing moved, or the motions do not resemble each other.
+    """
+    cycle = float(np.median(np.diff(record.stamp)))
+    loop, residual = delay_between(record.stamp, record.commanded, record.stamp, record.measured[:, None], 1)
+    spread = float(record.commanded.std())
+    if residual > 0.1 * spread:
+        raise ValueError(
+            f"the joint does not follow: {residual:.1e} rad are left of a motion of {spread:.1e} rad"
+        )
+    camera = camera_residual = drift = drift_sigma = None
+    jitter = {"controller": record.robot_clock.jitter}
+    if record.camera_clock is not None and len(record.seen) > 10:
+        # A tool on a circle: its coordinates are polynomials of the joint's angle.
+        camera, camera_residual = delay_between(
+            record.reported, record.measured, record.seen, record.position, 3
+        )
+        # Both drifts are those of our clock against theirs.
+        drift = record.robot_clock.drift_ppm - record.camera_clock.drift_ppm
+        drift_sigma = float(np.hypot(record.camera_clock.drift_sigma_ppm, record.robot_clock.drift_sigma_ppm))
+        jitter["camera"] = record.camera_clock.jitter
+    levels = dict(zip(("50%", "99%", "100%"), np.percentile(record.turn_around, [50, 99, 100]), strict=True))
+    return Latency(
+        cycle,
+        loop,
+        loop - cycle,
+        residual,
+        camera,
+        camera_residual,
+        _finite(drift),
+        _finite(drift_sigma),
+        jitter,
+        {level: float(value) for level, value in levels.items()},
+    )
+
+
+def delay_between(
+    cause_time: np.ndarray, cause: np.ndarray, effect_time: np.ndarray, effect: np.ndarray, degree: int
+) -> tuple[float, float]:
+    """The delay after which an effect follows its cause, and what it does not explain.
+
+    The effect is a polynomial of the delayed cause, with coefficients that are found too: their scale does
+    not matter. The peak of the cross-correlation is the beginning, least squares find the rest.
+
+    Args:
+        cause_time: s, shape (n,).
+        cause: shape (n,).
+        effect_time: s, shape (m,), of the same clock.
+        effect: shape (m, k).
+        degree: of the polynomial.
+
+    Returns:
+        Delay in s, negative if the effect comes first, and the root mean square of the rest.
+    """
+    spline = CubicSpline(cause_time, cause)
+    inside = (effect_time > cause_time[0] + _TRIM) & (effect_time < cause_time[-1] - _TRIM)
+    time, values = effect_time[inside], effect[inside] - effect[inside].mean(axis=0)
+
+    def rest(delay: float) -> float:
+        moved = spline(time - delay)
+        scaled = (moved - moved.mean()) / (moved.std() or 1.0)
+        A = scaled[:, None] ** np.arange(degree + 1)
+        solution = np.linalg.lstsq(A, values, rcond=None)[0]
+        return float(np.sqrt(np.mean((values - A @ solution) ** 2)))
+
+    first = _correlation_peak(spline, time, values)
+    found = minimize_scalar(
+        rest, bounds=(first - 0.05, first + 0.05), method="bounded", options={"xatol": 1e-7}
+    )
+    return float(found.x), float(found.fun)
+
+
+def _correlation_peak(spline: CubicSpline, time: np.ndarray, values: np.ndarray) -> float:
+    """The delay at which the effect's strongest coordinate resembles the cause most, to a millisecond."""
+    step = 1e-3
+    grid = np.arange(time[0], time[-1], step)
+    strongest = values[:, int(np.argmax(values.std(axis=0)))]
+    effect = np.interp(grid, time, strongest)
+    cause = spline(grid)
+    similarity = np.abs(correlate(effect - effect.mean(), cause - cause.mean(), mode="full"))
+    lags = step * correlation_lags(len(grid), len(grid), mode="full")
+    near = np.abs(lags) <= _LONGEST
+    return float(lags[near][np.argmax(similarity[near])])
+
+
+def _finite(value: float | None) -> float | None:
+    return None if value is None or not np.isfinite(value) else float(value)

@@ -1,0 +1,117 @@
+"""truetip feedforward: its numbers are those of its runs, its page opens, wrong input is one line."""
+
+import json
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+import typer
+from typer.testing import CliRunner, Result
+
+from experiments.feedforward_command import PAGE, feedforward_command
+from experiments.feedforward_rectangle import RectangleTrial, rectangle, working_position
+from experiments.feedforward_study import KINDS
+from experiments.feedforward_trial import (
+    RINGING,
+    SPEEDING_UP,
+    Trial,
+    criterion,
+    motion_profile,
+    references,
+)
+from robots.kinematics import Kinematics
+from robots.model import load_robot, shipped_robots
+from robots.newton_inverse import inverse_kinematics
+from systems.feedforward import FeedforwardConfig
+from tests.experiments.browser import open_page
+
+APP = typer.Typer()
+APP.command("feedforward")(feedforward_command)
+ROBOT = load_robot("kr16")
+START = np.deg2rad([0.0, -60.0, 70.0, 0.0, 0.0, 0.0])
+
+
+def run(folder: Path, *arguments: str) -> Result:
+    return CliRunner().invoke(APP, ["--out", str(folder), "--grid=2", "--jobs=2", *arguments])
+
+
+@pytest.mark.slow
+def test_the_numbers_are_those_of_the_runs_and_the_page_opens(tmp_path: Path):
+    result = run(tmp_path, "--json", "-")
+    assert result.exit_code == 0, result.output
+    numbers = json.loads(result.stdout)
+    config = FeedforwardConfig()
+    rigid, flexible = (
+        RectangleTrial(ROBOT, 16.0, replace(config, kind=kind)).run() for kind in ("rigid", "flexible_joint")
+    )
+    assert numbers["path"]["integral"]["flexible_joint"] == pytest.approx(flexible.integral / rigid.integral)
+    assert numbers["path"]["max"]["flexible_joint"] == pytest.approx(flexible.max / rigid.max)
+    for angle in ("5", "20"):
+        found = numbers["criterion"][angle]
+        assert found["positions"] == 4
+        assert found["median_ratio"] <= found["worst_ratio"]
+    assert set(numbers["tick_us"]) == set(KINDS)
+    opened = open_page(tmp_path / PAGE)
+    assert not [line for line in opened.console if "rror" in line]
+    assert opened.dom.count("js-plotly-plot") >= 7
+
+
+def test_a_structure_in_the_model_calms_the_wrist():
+    found = [Trial(ROBOT, 16.0, START, np.deg2rad(5.0), FeedforwardConfig(kind)).run() for kind in KINDS]
+    assert found == sorted(found, reverse=True)
+    assert found[2] < 0.5 * found[1]
+
+
+def test_the_criterion_of_an_oscillation_is_its_mean_magnitude_times_the_time():
+    """Three directions, one of them constant as gravity would be: (6.1) takes the mean away."""
+    times = np.linspace(0.0, RINGING, 20_001)
+    wave = np.sin(2.0 * np.pi * 10.0 * times)
+    accelerations = np.stack([2.0 * wave, np.full_like(times, 9.81), -wave], axis=1)
+    assert criterion(times, accelerations) == pytest.approx(3.0 * RINGING * 2.0 / np.pi, rel=1e-4)
+
+
+@pytest.mark.parametrize("angle_deg", [5.0, -20.0])
+def test_three_axes_turn_together_from_rest_to_rest(angle_deg: float):
+    trial = Trial(ROBOT, 16.0, START, np.deg2rad(angle_deg), FeedforwardConfig("rigid"))
+    profile = motion_profile(ROBOT, trial.angle)
+    times = np.arange(0.0, profile.duration + 0.3, 1e-3)
+    path = references(trial, times)
+    moved = np.array([reference.position for reference in path]) - START
+    np.testing.assert_allclose(moved[-1], [trial.angle] * 3 + [0.0] * 3, atol=1e-12)
+    rates = np.array([reference.velocity for reference in path])
+    np.testing.assert_allclose(np.gradient(moved, times, axis=0)[1:-1], rates[1:-1], atol=1e-4)
+    assert not rates[0].any()
+    assert not rates[-1].any()
+    # The mean acceleration of half the motion.
+    assert np.abs(rates).max() * SPEEDING_UP / (0.5 * profile.duration) == pytest.approx(ROBOT.speed[0])
+
+
+@pytest.mark.parametrize("name", shipped_robots())
+def test_every_robot_reaches_its_rectangle_with_the_tool_down(name: str):
+    robot = load_robot(name)
+    home = working_position(robot)
+    for corner in rectangle(robot, home):
+        X_WE = np.vstack([Kinematics(robot).forward(home)[:3], [0.0, 0.0, 0.0, 1.0]])
+        assert X_WE[:3, 2] == pytest.approx([0.0, 0.0, -1.0], abs=1e-9)
+        X_WE[:3, 3] = 1e-3 * corner.translation_mm
+        q = inverse_kinematics(robot).nearest(X_WE, home)
+        assert np.linalg.norm(q - home) < 2.0
+
+
+REFUSED = {
+    "robot": ("--robot=kr211", "robot 'kr211': no file"),
+    "payload": ("--payload=17", "payload of KUKA KR 16-2 must be between 0 and 16.0 kg, got 17.0 kg"),
+    "grid": ("--grid=1", "--grid must be at least 2, got 1"),
+    "jobs": ("--jobs=0", "--jobs must be at least 1, got 0"),
+    "error": ("--stiffness-error=-1", "stiffness_error must be above -1, got -1"),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize(("option", "message"), REFUSED.values(), ids=REFUSED)
+def test_wrong_input_is_refused_in_one_line_and_leaves_nothing(tmp_path: Path, option: str, message: str):
+    result = run(tmp_path, option)
+    assert result.exit_code == 2
+    assert message in result.stderr
+    assert len(result.stderr.strip().splitlines()) == 1
+    assert not list(tmp_path.iterdir())

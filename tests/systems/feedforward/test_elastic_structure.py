@@ -1,0 +1,157 @@
+"""The approximate inverse of a structure that yields: right at rest, bounded always, and what it refuses."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from pydrake.multibody.plant import MultibodyPlant
+
+from robots.kinematics import Kinematics
+from robots.model import RobotModel, load_robot
+from robots.modes import stretched
+from robots.plant import add_robot
+from robots.pose import pose_error
+from systems.feedforward import (
+    ElasticStructureFeedforward,
+    FeedforwardConfig,
+    FlexibleJointFeedforward,
+    JointReference,
+)
+from systems.feedforward.config import CorrectionConfig
+
+PERIOD = 4e-3
+ROBOTS = {"irb1200": 7.0, "kr16": 16.0, "kr210": 210.0}
+# In degrees of the KR16: the arm level ahead, and upright over axis 2; the wrist is singular in both.
+SINGULAR = {
+    "stretched": [0, 0, 3, 0, 0, 0],
+    "upright": [0, -90, 3, 0, 0, 0],
+    "over axis 1": [0, -90, -22, 0, 0, 0],
+}
+
+
+def still(q: np.ndarray) -> JointReference:
+    return JointReference(q, np.zeros(6), np.zeros(6))
+
+
+def model(name: str, **settings) -> ElasticStructureFeedforward:
+    config = FeedforwardConfig("elastic_structure", **settings)
+    return ElasticStructureFeedforward(load_robot(name), config, PERIOD, ROBOTS[name])
+
+
+def working(robot: RobotModel) -> np.ndarray:
+    """Away from singular positions: the elbow and the wrist bent by about a radian from stretched."""
+    q = stretched(robot)
+    return np.clip(q + np.array([0.4, -0.5, 1.0, 0.3, 1.0, 0.2]), robot.lower, robot.upper)
+
+
+def stiffened(robot: RobotModel, factor: float) -> RobotModel:
+    """With bearings and beams that much stiffer."""
+    joints = [
+        replace(
+            joint, tilting=replace(joint.tilting, stiffness=[factor * k for k in joint.tilting.stiffness])
+        )
+        if joint.tilting
+        else joint
+        for joint in robot.joints
+    ]
+    links = [
+        replace(link, beam=replace(link.beam, stiffness=factor * link.beam.stiffness)) if link.beam else link
+        for link in robot.links
+    ]
+    return replace(robot, joints=joints, links=links)
+
+
+@pytest.mark.parametrize("name", ROBOTS)
+def test_at_rest_the_sagging_robot_has_its_tip_where_it_shall_be(name: str):
+    """The model's section torques are those of an arm that does not sag, wrong by a share of its angles."""
+    robot = load_robot(name)
+    q, inverse = working(robot), model(name)
+    offsets = inverse.offsets(still(q), inverse.fresh_memory())
+    plant = MultibodyPlant(0.0)
+    parts = add_robot(plant, robot, "structure", ROBOTS[name])
+    plant.Finalize()
+    context = plant.CreateDefaultContext()
+    parts.set_at_rest(context, q + offsets.position)
+    X_WE, wanted = parts.tool.CalcPoseInWorld(context).GetAsMatrix4(), Kinematics(robot).forward(q)
+    left = np.linalg.norm(pose_error(wanted, X_WE)[3:])
+    parts.set_at_rest(context, q)
+    sag = np.linalg.norm(parts.tool.CalcPoseInWorld(context).translation() - wanted[:3, 3])
+    assert sag > 3e-4
+    assert left < 0.004 * sag
+
+
+def test_a_stiff_structure_leaves_the_flexible_joint():
+    """Structure a million times stiffer deflects by nanoradians."""
+    robot = stiffened(load_robot("kr16"), 1e6)
+    found, expected = (
+        kind(robot, FeedforwardConfig(), PERIOD, 16.0)
+        for kind in (ElasticStructureFeedforward, FlexibleJointFeedforward)
+    )
+    memories, q = [found.fresh_memory(), expected.fresh_memory()], working(robot)
+    for tick in range(50):
+        s, rate = np.sin(12.0 * PERIOD * tick), 12.0 * np.cos(12.0 * PERIOD * tick)
+        reference = JointReference(q + 0.05 * s, np.full(6, 0.05 * rate), np.full(6, -0.05 * 144.0 * s))
+        a, b = (
+            each.offsets(reference, memory) for each, memory in zip((found, expected), memories, strict=True)
+        )
+        memories = [a.memory, b.memory]
+    np.testing.assert_allclose(a.position, b.position, atol=1e-8)
+    np.testing.assert_allclose(a.torque, b.torque, rtol=1e-4, atol=0.05)
+
+
+@pytest.mark.parametrize("method", ["least_squares", "geometric"])
+@pytest.mark.parametrize("pose", SINGULAR)
+def test_through_singular_positions_the_outputs_stay_bounded(method: str, pose: str):
+    """All axes swing by 0.2 rad at 1.5 Hz: offsets of millirads, and torques that the motion asks for."""
+    inverse = model("kr16", correction=CorrectionConfig(method))
+    memory, q = inverse.fresh_memory(), np.deg2rad(SINGULAR[pose])
+    w, size = 2.0 * np.pi * 1.5, 0.2
+    rigid = 0.0
+    for tick in range(200):
+        s, c = np.sin(w * PERIOD * tick), np.cos(w * PERIOD * tick)
+        reference = JointReference(q + size * s, np.full(6, size * w * c), np.full(6, -size * w * w * s))
+        offsets = inverse.offsets(reference, memory)
+        memory = offsets.memory
+        if tick < 5:  # the velocity begins with a jump, which the differences remember so long
+            continue
+        rigid = max(rigid, np.abs(inverse._load(reference)).max())
+        assert np.abs(offsets.position).max() < 0.03
+        assert np.abs(offsets.velocity).max() < 1.0
+        assert np.abs(offsets.torque).max() < 2.0 * rigid + 3e3
+
+
+def test_all_elastic_parameters_are_wrong_by_the_same_share():
+    q = working(load_robot("kr16"))
+    right, soft = (
+        model("kr16", stiffness_error=error).drive(still(q), np.full(500, np.nan)) for error in (0.0, -0.5)
+    )
+    # Twice the compliance, twice the deflection, but for what the sag changes in the levers.
+    np.testing.assert_allclose(soft.deflection, 2.0 * right.deflection, rtol=0.02, atol=2e-6)
+
+
+def test_the_correction_of_a_joint_is_limited():
+    q = working(load_robot("kr210"))
+    offsets = [
+        model("kr210", correction=CorrectionConfig(limit_deg=limit)).drive(still(q), np.full(500, np.nan))
+        for limit in (3.0, 0.01)
+    ]
+    gears = FlexibleJointFeedforward(load_robot("kr210"), FeedforwardConfig(), PERIOD, 210.0)
+    of_gears = gears.drive(still(q), np.full(gears.memory_size, np.nan)).deflection
+    free, limited = (np.abs(each.deflection - of_gears).max() for each in offsets)
+    assert free > 5e-4
+    assert limited < np.deg2rad(0.01) + 5e-5  # what the limiter's tails and the changed load of the gears add
+
+
+@pytest.mark.parametrize(
+    ("correction", "message"),
+    [
+        (
+            CorrectionConfig("newton"),
+            "correction.method must be one of least_squares, geometric, got 'newton'",
+        ),
+        (CorrectionConfig(limit_deg=0.0), "correction.limit_deg must be positive, got 0.0 deg"),
+    ],
+)
+def test_an_impossible_correction_is_refused(correction: CorrectionConfig, message: str):
+    with pytest.raises(ValueError, match=message):
+        model("kr16", correction=correction)
