@@ -24,6 +24,8 @@ from diagrams.log import RunLog
 from diagrams.run import Experiment
 from diagrams.scenario import Scenario, load_scenario
 from experiments.bench_bare import BarePlant
+from experiments.bench_feedforward import feedforward
+from experiments.bench_tracking import tracking
 from experiments.bench_wire import wire
 from experiments.metrics import write_json
 from robots.calibration.admissible import AdmissibleConfigurations
@@ -91,6 +93,8 @@ def benchmarks() -> Iterator[Row]:
         yield from closed_loop(law, robot)
     yield from kinematics(robot)
     yield from calibration(robot)
+    yield from feedforward()
+    yield from tracking()
     for law in COMPARED_LAWS:
         yield convergence(law, robot)
 

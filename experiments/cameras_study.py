@@ -19,6 +19,7 @@ from experiments.cameras_sweeps import SWEEPS, SweepPoint, SweepSetup
 from experiments.prepare import Prepared
 from systems.paths import make_path
 from systems.tracking.detection_body import load_body
+from systems.tracking.marker_camera import MarkerCamera
 from systems.tracking.measuring_cell import load_cell
 
 PATH_PLACES, WORKSPACE_PLACES = 60, 200
@@ -50,9 +51,12 @@ def study_setup(prepared: Prepared) -> SweepSetup:
     markers, path = scenario.station.markers, make_path(scenario.reference)
     times = np.linspace(path.path_start, path.dwell_start, 2_000)
     speed = np.linalg.norm(path.sample(times)[1][:, 3:], axis=1).max()
+    cell, body = load_cell(markers.cell), load_body(markers.body)
+    # Values of a sweep may fail, those that were given may not.
+    MarkerCamera(scenario.station.camera, markers, robot, "images")
     return SweepSetup(
-        cell=load_cell(markers.cell),
-        body=load_body(markers.body),
+        cell=cell,
+        body=body,
         robot=robot,
         path=places_on_path(scenario, robot, path, PATH_PLACES),
         workspace=places_in_workspace(robot, WORKSPACE_PLACES, scenario.seed),

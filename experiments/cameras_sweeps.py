@@ -84,7 +84,8 @@ def study_sweeps(
     points = in_processes(_study, jobs, processes, progress)
     found: dict[str, list[SweepPoint]] = {name: [] for name in SWEEPS}
     for job, point in zip(jobs, points, strict=True):
-        found[job.sweep].append(point)
+        if all(point.value != other.value for other in found[job.sweep]):  # there are no more than there are
+            found[job.sweep].append(point)
     return found
 
 
@@ -143,6 +144,10 @@ def _body(setup: SweepSetup, value: float, body: DetectionBody) -> SweepPoint:
     return _judged(setup, value, _cameras(setup), setup.cell.windows, body, setup.pixel_sigma)
 
 
+def _markers(setup: SweepSetup, count: int) -> SweepPoint:
+    return _body(setup, float(count), with_markers(setup.body, count))
+
+
 def _pictured(
     setup: SweepSetup,
     value: float,
@@ -153,7 +158,10 @@ def _pictured(
     cameras, windows = with_resolution(_cameras(setup), setup.cell.windows, resolution)
     body = body or setup.body
     some = list(setup.path.X_WE[:: max(1, len(setup.path.X_WE) // PICTURED)])
-    sigma, found = centroid_sigma(cameras, windows, body, images, some, setup.speed, setup.seed)
+    try:
+        sigma, found = centroid_sigma(cameras, windows, body, images, some, setup.speed, setup.seed)
+    except ValueError:  # light stays below the threshold, or noise reaches it
+        sigma, found = float("nan"), 0.0
     return _judged(setup, value, cameras, windows, body, sigma, found)
 
 
@@ -212,7 +220,7 @@ SWEEPS = {
     ),
     "markers": Sweep(
         "Number of markers", "markers", "Each as far as possible from those before.", (4, 5, 6, 8, 11),
-        lambda setup, value: _body(setup, value, with_markers(setup.body, min(int(value), len(setup.body)))),
+        lambda setup, value: _markers(setup, min(int(value), len(setup.body))),
     ),
     "body": Sweep(
         "Size of the body", "share of its size", "Markers nearer to or farther from the tool.",

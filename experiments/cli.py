@@ -25,6 +25,7 @@ from experiments.console import count, print_list, progress_bar, refusing
 from experiments.design_command import design_command
 from experiments.diagram_view import write_diagram
 from experiments.drivetrain_command import drivetrain_command
+from experiments.feedforward_command import feedforward_command
 from experiments.frame_commands import align_command, chain_command, frame_command, tool_command
 from experiments.guided_command import ask_before_moving, guide, on_station
 from experiments.latency_command import latency_command
@@ -132,7 +133,7 @@ def compare_command(
         stage = stack.enter_context(staged_folder(out))
         copy = stack.enter_context(staged_file(json_file)) if json_file not in (None, "-") else None
         if is_guided:
-            logs = guide(human, stage, prepared, list(COMPARED_LAWS), cycles, with_cell)
+            logs = guide(human, (stage, out), prepared, list(COMPARED_LAWS), cycles, with_cell)
         else:
             processes = min(jobs or usable_cores(), cycles * len(COMPARED_LAWS))
             runs = count(cycles * len(COMPARED_LAWS), "run")
@@ -185,7 +186,7 @@ def run_command(
     with refusing(OSError), ExitStack() as stack:
         stage = stack.enter_context(staged_folder(out))
         if is_guided:
-            logs = guide(console, stage, prepared, [law], 1, with_cell)
+            logs = guide(console, (stage, out), prepared, [law], 1, with_cell)
             _conclude(console, _write(console, stage, prepared, logs), out)
             return
         experiment = Experiment(prepared.scenario, law, prepared.robot)
@@ -230,6 +231,7 @@ app.command("cell")(cell_command)
 app.command("latency")(latency_command)
 app.command("modes")(modes_command)
 app.add_typer(cameras_app, name="cameras")
+app.command("feedforward")(feedforward_command)
 app.command("design")(design_command)
 app.command("calibrate")(calibrate_command)
 app.command("drivetrain")(drivetrain_command)

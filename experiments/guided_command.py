@@ -1,19 +1,23 @@
 """What ``truetip compare`` and ``truetip run`` do on a real station."""
 
 import ipaddress
+import shutil
 import sys
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import typer
 from rich.console import Console
 
+from diagrams.guided_run import GuidedRecord
 from diagrams.log import RunLog
 from experiments.console import count, progress_bar
 from experiments.guided import compare_on_station
 from experiments.metrics import write_json
 from experiments.prepare import Prepared
+from experiments.workers import SimulationError
 
 
 def on_station(
@@ -52,17 +56,53 @@ def ask_before_moving(console: Console, prepared: Prepared, is_agreed: bool) -> 
 
 
 def guide(
-    console: Console, stage: Path, prepared: Prepared, laws: Sequence[str], cycles: int, with_cell: bool
+    console: Console,
+    folders: tuple[Path, Path],
+    prepared: Prepared,
+    laws: Sequence[str],
+    cycles: int,
+    with_cell: bool,
 ) -> Mapping[str, Sequence[RunLog]]:
-    """Runs laws on a station, writes ``link.json`` and says what happened on the wire."""
+    """Runs laws on a station, writes ``link.json`` and the whole logs, and says what happened on the wire.
+
+    Args:
+        console: where to say it.
+        folders: where the results are staged, and where they go in the end. If a run breaks off before its
+            path has begun there is nothing to report on, but what was recorded goes there all the same.
+        prepared: what to run.
+        laws: which laws.
+        cycles: runs of each law.
+        with_cell: whether to start a virtual cell.
+
+    Raises:
+        SimulationError: if the station is not there or a run has not come as far as its path.
+    """
+    stage, out = folders
     where = "a virtual cell" if with_cell else f"UDP port {prepared.scenario.station.link.port}"
     with progress_bar(f"{count(cycles * len(laws), 'run')} on {where}") as progress:
         comparison = compare_on_station(prepared.scenario, prepared.robot, laws, cycles, with_cell, progress)
     link = comparison.link_json()
     write_json(stage / "link.json", link)
+    records = [
+        (law, n, record) for law, all_ in comparison.records.items() for n, record in enumerate(all_, 1)
+    ]
+    for law, number, record in records:
+        write_log(stage / f"{law}-{number}.npz", record)
     print_link(console, link)
-    console.print("Counts, delays and clocks of the wire are in link.json beside the report")
+    console.print("Counts, delays and clocks of the wire are in link.json, whole logs in *.npz")
+    for law, _, record in records:
+        if not len(record.log.time) or record.log.time[-1] <= record.log.path_start:
+            shutil.copytree(stage, out, dirs_exist_ok=True)
+            raise SimulationError(
+                f"law {law}: {record.ended} before the path had begun; see {out / 'link.json'}"
+            )
     return comparison.logs
+
+
+def write_log(path: Path, record: GuidedRecord) -> None:
+    """Everything that a run on a station has recorded, tick by tick, as arrays with the names of `RunLog`."""
+    arrays = {name: value for name, value in vars(record.log).items() if isinstance(value, np.ndarray)}
+    np.savez_compressed(path, **arrays, stamps=record.stamps, turn_around=record.turn_around)
 
 
 def print_link(console: Console, link: dict[str, Any]) -> None:

@@ -67,9 +67,7 @@ class FaultyLink:
         self._config, self._period = config, period
         self._random = np.random.default_rng(seed)
         self._burst_left = 0
-        self.counts: dict[str, int] = dict.fromkeys(
-            ("lost", "doubled", "overtaken", "garbage", "foreign"), 0
-        )
+        self.counts: dict[str, int] = dict.fromkeys(("lost", "doubled", "overtaken", "garbage", "foreign"), 0)
 
     def pass_on(self, time: float, data: bytes) -> list[Delivery]:
         """What arrives of a datagram, and when."""

@@ -65,8 +65,8 @@ class CommandGuard(LeafSystem):
         out ``torque_feedforward``  vector 6 in N m, zero while the law's command is not followed
     in any case:
         out ``guard_status``      vector: how many ticks each of `KINDS` has happened, in that order
-        out ``deviation``         vector 6 in rad: where the joints were led at the last tick less where the law
-                                  would have had them
+        out ``deviation``         vector 6 in rad: where the joints were led at the last tick less where the
+                                  law would have had them
 
     The command that was issued last is the state; the output is computed from it and the law's newest
     command, without delay. Before the first command, and while the robot does not run, the output is the

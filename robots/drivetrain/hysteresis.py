@@ -12,6 +12,8 @@ from typing import Any, ClassVar
 import numpy as np
 from scipy.signal import cont2discrete, tf2ss
 
+_ROUNDING = 1e-12  # of the largest threshold
+
 
 def play(x: np.ndarray | float, before: np.ndarray, threshold: np.ndarray) -> np.ndarray:
     """One step of the play operator, eq. (2.13): the output moves only when the input pushes it."""
@@ -66,9 +68,17 @@ class PrandtlIshlinskii:
         """The operator that undoes this one, eq. (2.16), corrected, and where its play operators start.
 
         In (2.16c) y'_i = sum_{j<=i} w_j y_i + sum_{j>i} w_j y_j; the printed y_j in the first sum is wrong.
+
+        Raises:
+            ValueError: if no input can have led to the start; no operator would undo this one from there.
         """
         w, r = np.array(self.weights), np.array(self.thresholds)
         y = np.zeros(len(w)) if start is None else np.asarray(start, dtype=float)
+        if (np.abs(np.diff(y)) > np.diff(r) + _ROUNDING * r[-1]).any():
+            raise ValueError(
+                f"PrandtlIshlinskii: no input leads to the start {y.tolist()}: neighbours may differ by "
+                f"{np.diff(r).tolist()} at most"
+            )
         sums = np.cumsum(w)
         weights = np.concatenate([[1.0 / w[0]], -w[1:] / (sums[1:] * sums[:-1])])
         thresholds = np.array([np.sum(w[: i + 1] * (r[i] - r[: i + 1])) for i in range(len(w))])

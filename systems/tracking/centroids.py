@@ -14,7 +14,7 @@ import cv2
 import numpy as np
 
 from systems.tracking.camera_model import Cameras
-from systems.tracking.images import FULL_SCALE, Picture
+from systems.tracking.rendering import FULL_SCALE, Picture
 from systems.tracking.sphere_images import sphere_centers
 
 _LARGEST_LABEL = 32_767  # more components than that are no picture of markers

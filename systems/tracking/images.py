@@ -1,36 +1,25 @@
 """What the cameras record of the markers on the level of images: pixels in windows about the body.
 
-A marker is an evenly lit ellipse. Blur turns its edge into the integral of a Gauss curve across it, and
-motion during the exposure shifts it; noise and eight bits are added pixel by pixel. What hides the centre of
-a sphere hides all of it.
-
-A camera reads only the window in which the body is expected, as Probst (2024) section 8.1 plans. What is dark
-there stays as it is: its noise is not drawn, because none of it would reach the threshold (`ImageSource`
-refuses a threshold where it could). The noise of the lit parts is a stream that the numbers from outside are
-the key of: to bring tens of thousands of numbers for each exposure through a port would cost more than
-everything else.
+A camera reads only the window in which the body is expected, as Probst (2024) section 8.1 plans. Each marker
+is a lit ellipse in it (`rendering`); what hides the centre of a sphere hides all of it. The noise is a stream
+that the numbers from outside are the key of: to bring tens of thousands of numbers for each exposure through
+a port would cost more than everything else.
 """
 
 from dataclasses import dataclass
-from functools import cache
 
 import numpy as np
-from scipy.special import ndtr
 
 from systems.tracking.arm_capsules import Capsules
 from systems.tracking.camera_model import Cameras
 from systems.tracking.detection_body import DetectionBody
 from systems.tracking.pose_refinement import moved
+from systems.tracking.rendering import Picture, Sensor, draw
 from systems.tracking.sphere_images import Ellipses, sphere_images
 from systems.tracking.visibility import occluded
 
-FULL_SCALE = 255  # of eight bits
 CLEAR_OF_NOISE = 6.0  # sigma; one dark pixel in a thousand million is further from the background
 
-_PIXEL_SIGMA2 = 1.0 / 12.0  # px^2, a pixel gathers the light of its square
-_EDGE = 4.0  # sigma beyond the outline, where nothing is left to be seen
-_STILL = 0.2  # px, a shorter way during the exposure widens no edge by more than half a percent
-_MOST_NODES = 16  # along the way of a light
 _REFLECTION_SIZES = 0.7, 12.0  # px, half axes of false lights
 
 
@@ -45,14 +34,6 @@ class ImageConfig:
     blur_sigma: float = 0.7  # px, of the lens; assumed
     reflections: float = 0.0  # false lights in a window on average
     margin: float = 16.0  # px, of a window beyond the markers that are expected in it
-
-
-@dataclass(frozen=True)
-class Picture:
-    """A window of an image; empty if there is none."""
-
-    pixels: np.ndarray  # 0 to 255, (h, w) of uint8
-    corner: np.ndarray  # px, u and v of the first pixel in the whole image, (2,)
 
 
 class ImageSource:
@@ -137,7 +118,13 @@ class ImageSource:
             count, lights = self._with_reflections(lights, windows, rng)
             camera = np.concatenate([camera, np.repeat(np.arange(len(windows)), count)])
             way = np.concatenate([way, np.zeros((count.sum(), 2))])
-        return self._draw(camera, lights, way, windows, rng)
+        sensor = Sensor(
+            self._config.brightness * self._config.exposure,
+            self._config.background,
+            self._config.noise_sigma,
+            self._config.blur_sigma,
+        )
+        return draw(camera, lights, way, windows, sensor, rng)
 
     def _way(self, X_WE: np.ndarray, V_WE: np.ndarray) -> np.ndarray:
         """How far the images of the markers move during the exposure in px, (n, m, 2)."""
@@ -161,80 +148,6 @@ class ImageSource:
         turn = np.stack([c, -s, s, c], -1).reshape(-1, 2, 2)
         shape = turn * (half * half)[:, None] @ turn.swapaxes(1, 2)
         return count, Ellipses(np.concatenate([lights.center, center]), np.concatenate([lights.shape, shape]))
-
-    def _draw(
-        self,
-        camera: np.ndarray,
-        lights: Ellipses,
-        way: np.ndarray,
-        windows: np.ndarray,
-        rng: np.random.Generator,
-    ) -> list[Picture]:
-        """The windows with k lights: their cameras (k,), outlines, and ways in px, (k, 2)."""
-        config = self._config
-        size = np.maximum(windows[:, 2:] - windows[:, :2] + 1, 0)
-        begin = np.concatenate([[0], np.cumsum(np.prod(size, axis=1))])
-        sigma = float(np.sqrt(config.blur_sigma**2 + _PIXEL_SIGMA2))
-        reach = np.sqrt(np.diagonal(lights.shape, axis1=1, axis2=2)) + _EDGE * sigma + 0.5 * np.abs(way)
-        light, place = _places(lights.center, reach, windows[camera])
-        offset = (place - lights.center[light]).astype(np.float32)
-        share = _lit_share(offset, np.linalg.inv(lights.shape), way, light, sigma)
-        value = config.brightness * config.exposure * share + config.background
-        value += config.noise_sigma * rng.standard_normal(len(value), dtype=np.float32)
-        np.clip(np.rint(FULL_SCALE * value), 0, FULL_SCALE, out=value)
-        memory = np.full(begin[-1], round(FULL_SCALE * config.background), np.uint8)
-        u, v = (place - windows[camera[light], :2]).T
-        # Of two lights in one place the brighter one is seen.
-        index = begin[camera[light]] + v * size[camera[light], 0] + u
-        np.maximum.at(memory, index, value.astype(np.uint8))
-        return [
-            Picture(memory[begin[i] : begin[i + 1]].reshape(size[i, ::-1]), windows[i, :2])
-            for i in range(len(windows))
-        ]
-
-
-def _places(center: np.ndarray, reach: np.ndarray, windows: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """The pixels about k lights: the light of each, and u and v of each, (p,) and (p, 2).
-
-    Center and reach are in px, (k, 2); a light has no pixels outside its window, (k, 4).
-    """
-    low = np.maximum(np.floor(center - reach).astype(int), windows[:, :2])
-    high = np.minimum(np.ceil(center + reach).astype(int), windows[:, 2:])
-    size = np.maximum(high - low + 1, 0)
-    count = np.prod(size, axis=1)
-    light = np.repeat(np.arange(len(center)), count)
-    number = np.arange(len(light)) - np.repeat(np.cumsum(count) - count, count)
-    v, u = np.divmod(number, size[light, 0])
-    return light, low[light] + np.stack([u, v], -1)
-
-
-def _lit_share(
-    offset: np.ndarray, S_inverse: np.ndarray, way: np.ndarray, light: np.ndarray, sigma: float
-) -> np.ndarray:
-    """How bright pixels are, 0 to 1, from their offsets (p, 2) in px from the centres of their lights.
-
-    The distance from the outline is measured along the radius, and the edge is taken as straight. A straight
-    edge about a circle of radius r would spread its light over pi (r^2 + sigma^2), so r is made smaller.
-    """
-    r2 = 1.0 / np.sqrt(np.linalg.det(S_inverse))
-    S_inverse = S_inverse * (1.0 + sigma * sigma / r2)[:, None, None]
-    a, b, c = (S_inverse[:, i, j].astype(np.float32)[light] for i, j in ((0, 0), (0, 1), (1, 1)))
-    longest = float(np.abs(way).max(initial=0.0))
-    nodes, weights = _quadrature(1 if longest < _STILL else 2 + int(longest / (2.0 * sigma)))
-    share = np.zeros(len(offset), np.float32)
-    for node, weight in zip(nodes, weights, strict=True):
-        u, v = (offset - (0.5 * node * way).astype(np.float32)[light]).T
-        radius = np.sqrt(u * u + v * v)
-        relative = np.sqrt(a * u * u + 2.0 * b * u * v + c * v * v) + np.float32(1e-6)
-        share += np.float32(0.5 * weight) * ndtr((radius / relative - radius) / np.float32(sigma))
-    return share
-
-
-@cache
-def _quadrature(count: int) -> tuple[list[float], list[float]]:
-    """Nodes in [-1, 1] and weights of Gauss and Legendre; so close that the blur fills what is between them."""
-    nodes, weights = np.polynomial.legendre.leggauss(min(count, _MOST_NODES))
-    return nodes.tolist(), weights.tolist()
 
 
 def _check(config: ImageConfig, threshold: float) -> None:

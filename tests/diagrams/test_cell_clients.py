@@ -42,7 +42,7 @@ def moved_by(package: str, mode: str) -> dict:
     ("mode", "what", "expected", "within"),
     [
         ("joint", "joints", [2.0, 0.0, -1.0, 0.0, 0.0, 3.0], 0.02),
-        # For a second, as the client's own clock has it: a twentieth of it is the least one can ask for.
+        # For a second, to a few of the client's answers that the machine may bring late.
         ("speed", "joints", [1.5, 0.0, 0.0, 0.0, 0.0, -2.0], 0.1),
         ("pose", "tool", [0.0, 10.0, 5.0], 0.05),
     ],

@@ -76,6 +76,7 @@ REFUSED = {
     "noise": ("calibrate", "--pixel-sigma=-1", "--pixel-sigma must be positive, got -1"),
     "scenario": ("study", "--scenario=nowhere", "scenario 'nowhere'"),
     "jobs": ("study", "--jobs=0", "--jobs must be at least 1, got 0"),
+    "light": ("study", "--set=station.markers.images.exposure=1e-5", "stay below the threshold"),
     "study cell": ("study", "--set=station.markers.cell=nowhere", "cell 'nowhere': no file"),
 }
 

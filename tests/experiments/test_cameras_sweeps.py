@@ -50,6 +50,14 @@ def test_exposure_has_an_optimum():
     assert dark.found <= right.found == 1.0
 
 
+def test_what_no_camera_can_do_is_a_value_without_a_result():
+    """With noise of a tenth of full scale, six sigma of it reach the threshold."""
+    (point,) = swept("sensor_noise", 0.1)
+    assert point.found == 0.0
+    assert point.path.seen == 0.0
+    assert point.as_dict()["pixel_sigma"] is None
+
+
 def test_more_pixels_are_worth_more_than_in_proportion():
     """Twice as many along an edge halve the angle of a pixel, and the centroid has more of them."""
     coarse, fine = swept("resolution", 1.0, 2.0)

@@ -23,11 +23,19 @@ def test_the_inverse_undoes_the_operator(x: np.ndarray):
     np.testing.assert_allclose(inverse.response(OPERATOR.response(x), starts), x, atol=1e-12)
 
 
-@given(signals, arrays(float, 5, elements=st.floats(-0.09, 0.09)))
-def test_and_from_any_start_that_the_operator_can_have(x: np.ndarray, start: np.ndarray):
-    start = play(0.0, start, np.array(OPERATOR.thresholds))
+@given(signals, signals)
+def test_and_from_any_start_that_the_operator_can_have(x: np.ndarray, past: np.ndarray):
+    start = np.zeros(5)
+    for sample in past:
+        start = play(sample, start, np.array(OPERATOR.thresholds))
     inverse, starts = OPERATOR.inverse(start)
     np.testing.assert_allclose(inverse.response(OPERATOR.response(x, start), starts), x, atol=1e-12)
+
+
+def test_a_start_that_no_past_leads_to_is_refused():
+    """Of two play operators one is at most as far behind the other as its threshold is larger."""
+    with pytest.raises(ValueError, match="no input leads to the start"):
+        OPERATOR.inverse(np.array([0.0, 0.06, -0.06, -0.06, -0.06]))
 
 
 def test_a_deflection_that_lags_its_torque_loses_energy_in_a_cycle():

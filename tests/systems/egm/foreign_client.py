@@ -1,17 +1,17 @@
 """A client of EGM that others wrote, in a process of its own: moves the robot and prints where it is.
 
-Usage: foreign_client.py PACKAGE PORT MODE, with MODE joint, pose or speed.
+Usage: foreign_client.py PACKAGE PORT MODE, with MODE joint, pose or speed. It counts time in the cycles of
+the robot: its own clock would run on where a busy machine lets it wait.
 """
 
 import importlib
 import json
 import sys
-import time
 
 import numpy as np
 
 PACKAGE, PORT, MODE = sys.argv[1], int(sys.argv[2]), sys.argv[3]
-DURATION = 2.0  # s
+PERIOD, MOVING, DURATION = 4.032e-3, 1.0, 2.0  # s
 egm = importlib.import_module(
     {"ABBRobotEGM": "ABBRobotEGM.egm", "abb_robot_client": "abb_robot_client.egm"}[PACKAGE]
 )
@@ -35,9 +35,8 @@ print("listening", flush=True)
 ok, state = client.receive_from_robot(20.0)
 assert ok, "the robot did not speak"
 start, pose = state.joint_angles, (position(state), orientation(state))
-began = time.monotonic()
-while time.monotonic() - began < DURATION:
-    share = min(1.0, (time.monotonic() - began) / 1.0)
+for cycle in range(int(DURATION / PERIOD)):
+    share = min(1.0, cycle * PERIOD / MOVING)
     if MODE == "joint":
         client.send_to_robot(start + share * np.array([2.0, 0.0, -1.0, 0.0, 0.0, 3.0]))
     elif MODE == "speed":

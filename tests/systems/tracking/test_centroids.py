@@ -5,8 +5,9 @@ import pytest
 
 from systems.tracking.camera_model import Cameras
 from systems.tracking.centroids import CentroidConfig, blobs_in, centroids, check_centroids
-from systems.tracking.images import ImageConfig, ImageSource, Picture
+from systems.tracking.images import ImageConfig, ImageSource
 from systems.tracking.marker_images import marker_diameters, touching
+from systems.tracking.rendering import Picture
 from tests.systems.tracking.rigs import BODY, CAMERAS, CELL, placed, random_pose
 
 CONFIG = CentroidConfig()

@@ -5,7 +5,8 @@ import pytest
 
 from systems.tracking.arm_capsules import Capsules
 from systems.tracking.detection_body import DetectionBody
-from systems.tracking.images import FULL_SCALE, ImageConfig, ImageSource, Picture
+from systems.tracking.images import ImageConfig, ImageSource
+from systems.tracking.rendering import FULL_SCALE, Picture
 from systems.tracking.sphere_images import sphere_images
 from tests.systems.tracking.rigs import BODY, CAMERAS, CELL, placed, random_pose
 
