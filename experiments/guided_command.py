@@ -101,7 +101,9 @@ def guide(
 
 def write_log(path: Path, record: GuidedRecord) -> None:
     """Everything that a run on a station has recorded, tick by tick, as arrays with the names of `RunLog`."""
-    arrays = {name: value for name, value in vars(record.log).items() if isinstance(value, np.ndarray)}
+    arrays: dict[str, Any] = {
+        name: value for name, value in vars(record.log).items() if isinstance(value, np.ndarray)
+    }
     np.savez_compressed(path, **arrays, stamps=record.stamps, turn_around=record.turn_around)
 
 

@@ -217,14 +217,14 @@ def test_when_the_camera_is_back_the_robot_may_be_led_back_onto_its_way():
     rig = GuardRig(ROBOT, GuardConfig(resume=True, resume_time=0.8))
     cruise(rig, 50)
     lost = rig.time
-    blind = cruise(rig, 200, seen=lost)
-    back = cruise(rig, 260)
-    assert blind[2]["stopped"] > 50
-    assert back[2]["resumed"] == 200  # 0.8 s
-    np.testing.assert_array_equal(blind[1][-1], 0.0)
-    assert is_smooth(*(np.concatenate([blind[k], back[k]]) for k in (0, 1)))
+    blind, blind_speed, counts = cruise(rig, 200, seen=lost)
+    assert counts["stopped"] > 50
+    back, back_speed, counts = cruise(rig, 260)
+    assert counts["resumed"] == 200  # 0.8 s
+    np.testing.assert_array_equal(blind_speed[-1], 0.0)
+    assert is_smooth(np.concatenate([blind, back]), np.concatenate([blind_speed, back_speed]))
     wanted = 0.1 * ROBOT.speed * (rig.time - PERIOD)
-    np.testing.assert_allclose(back[0][-1], wanted, atol=1e-12)
+    np.testing.assert_allclose(back[-1], wanted, atol=1e-12)
 
 
 def test_a_stop_lasts_unless_resuming_is_wanted():
