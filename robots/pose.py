@@ -112,10 +112,10 @@ def euler_rate_matrix(zyx: np.ndarray) -> np.ndarray:
     )
 
 
-def euler_difference(R_WD: np.ndarray, R_WE: np.ndarray) -> np.ndarray:
-    """The wrapped differences of the ZYX angles of two rotations (3, 3), wanted minus seen, in rad, (3,)."""
-    wanted, seen = zyx_from_rotation(R_WD).tolist(), zyx_from_rotation(R_WE).tolist()
-    return np.array([math.remainder(a - b, 2.0 * math.pi) for a, b in zip(wanted, seen, strict=True)])
+def euler_difference(zyx_D: np.ndarray, zyx_E: np.ndarray) -> np.ndarray:
+    """Wrapped differences of the angles of two orientations, wanted minus seen, in rad, shape (3,) each."""
+    pairs = zip(zyx_D.tolist(), zyx_E.tolist(), strict=True)
+    return np.array([math.remainder(a - b, 2.0 * math.pi) for a, b in pairs])
 
 
 def angular_velocity(zyx: np.ndarray, rates: np.ndarray) -> np.ndarray:

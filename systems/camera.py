@@ -6,7 +6,7 @@ import numpy as np
 from pydrake.common import RandomDistribution
 from pydrake.common.value import Value
 from pydrake.math import RigidTransform
-from pydrake.systems.framework import Context, DiscreteValues, LeafSystem
+from pydrake.systems.framework import Context, DiscreteValues, LeafSystem, ValueProducer
 from scipy.stats import norm
 
 from systems.samples import PoseSample
@@ -71,25 +71,36 @@ class PoseCamera(LeafSystem):
             self._calc_sample,
             {self.time_ticket(), self.xd_ticket()},
         )
+        # What the numbers do to the exposures of a block is worked out for all of them at once.
+        self._disturbances = self.DeclareCacheEntry(
+            "disturbances", ValueProducer(Value[object], self._calc_disturbances), {self._noise.ticket()}
+        )
         self.DeclarePeriodicDiscreteUpdateEvent(config.period, 0.0, self._expose)
+
+    def _calc_disturbances(self, context: Context, value) -> None:
+        """Of each exposure of a block a rotation and a shift in the world, and whether it is lost."""
+        noise = self._noise.Eval(context).reshape(BLOCK, _PER_EXPOSURE)
+        turns = _small_rotations(self._rotation_sigma * noise[:, :3])
+        shifts = self._config.position_sigma * noise[:, 3:6]
+        value.set_value((turns, shifts, (noise[:, 6] < self._lost_below).tolist()))
 
     def _expose(self, context: Context, discrete_state: DiscreteValues) -> None:
         time = context.get_time()
-        first = round(time / self._config.period) % BLOCK * _PER_EXPOSURE
-        noise = self._noise.Eval(context)[first : first + _PER_EXPOSURE]
-        a, b, c, x, y, z, chance = noise.tolist()
-        lost = chance < self._lost_below
+        turns, shifts, are_lost = self._disturbances.Eval(context)
+        number = round(time / self._config.period) % BLOCK
+        lost = are_lost[number]
         for start, end in self._config.dropouts:
             lost = lost or start <= time < end
         pose = self._X_WE.Eval(context).GetAsMatrix34()
-        turn, shift = self._rotation_sigma, self._config.position_sigma
-        if turn > 0.0:
-            pose[:, :3] = _small_rotation(turn * a, turn * b, turn * c) @ pose[:, :3]
-        pose[:, 3] += (shift * x, shift * y, shift * z)
+        exposure = np.empty(_WIDTH)
+        exposure[0], exposure[1] = time, not lost
+        seen = exposure[2:].reshape(3, 4)
+        seen[:, :3] = turns[number].dot(pose[:, :3])
+        seen[:, 3] = pose[:, 3] + shifts[number]
         older = discrete_state.get_mutable_value(self._older)
         older[_WIDTH:] = older[:-_WIDTH].copy()
         older[:_WIDTH] = context.get_discrete_state(0).value()
-        discrete_state.set_value(0, np.array([time, not lost, *pose.ravel().tolist()]))
+        discrete_state.set_value(0, exposure)
 
     def _calc_sample(self, context: Context, output) -> None:
         due = context.get_time() - self._config.delay + _EPSILON
@@ -102,17 +113,19 @@ class PoseCamera(LeafSystem):
         output.set_value(PoseSample(float(entry[0]), X_WE, bool(entry[1]), self._config.position_sigma))
 
 
-def _small_rotation(x: float, y: float, z: float) -> np.ndarray:
-    """The rotation of the quaternion along (1, x/2, y/2, z/2): to third order that of the rotation vector."""
-    x, y, z = 0.5 * x, 0.5 * y, 0.5 * z
+def _small_rotations(vectors: np.ndarray) -> np.ndarray:
+    """Rotations (n, 3, 3) of the quaternions along (1, v / 2): to third order those of rotation vectors v.
+
+    A vector of zeros gives the identity exactly.
+    """
+    x, y, z = 0.5 * vectors.T
     s = 2.0 / (1.0 + x * x + y * y + z * z)
-    return np.array(
-        [
-            [1.0 - s * (y * y + z * z), s * (x * y - z), s * (x * z + y)],
-            [s * (x * y + z), 1.0 - s * (x * x + z * z), s * (y * z - x)],
-            [s * (x * z - y), s * (y * z + x), 1.0 - s * (x * x + y * y)],
-        ]
-    )
+    rows = [
+        [1.0 - s * (y * y + z * z), s * (x * y - z), s * (x * z + y)],
+        [s * (x * y + z), 1.0 - s * (x * x + z * z), s * (y * z - x)],
+        [s * (x * z - y), s * (y * z + x), 1.0 - s * (x * x + y * y)],
+    ]
+    return np.moveaxis(np.array(rows), -1, 0).copy()
 
 
 def _check(config: CameraConfig) -> None:

@@ -1,14 +1,15 @@
-"""Turns commands that arrive every few milliseconds into a smooth set-point for continuous control."""
+"""Fine interpolation: from a position and velocity every few milliseconds to a smooth set-point."""
 
 import numpy as np
-from pydrake.systems.framework import Context, DiscreteValues, LeafSystem
+from pydrake.systems.framework import Context, Diagram, DiagramBuilder
+from pydrake.systems.primitives import DiscreteTimeDelay, LinearSystem, Multiplexer
 
 from robots.model import NUM_JOINTS
 
 _WIDTH = 2 * NUM_JOINTS  # one command: positions, then velocities
 
 
-class CommandInterpolator(LeafSystem):
+class CommandInterpolator(Diagram):
     """Steers a double integrator through the commands, each one a given delay after its issue.
 
     A command (p, v) issued at time s says "be at p with velocity v". At every tick t the interpolator finds
@@ -18,6 +19,8 @@ class CommandInterpolator(LeafSystem):
     the set-point moves on parabolas with continuous velocity; it reaches any command exactly within two
     periods (dead beat), and it follows a smooth command with an error of the order of jerk * period^3. A
     position that is merely held for a period would be late by half of it.
+
+    All of this is linear, so Drake's own systems do it without Python.
 
     Ports:
         in  ``position_command``  vector 6 in rad
@@ -46,44 +49,68 @@ class CommandInterpolator(LeafSystem):
                 f"because a command is interpolated over one period; got {delay} s"
             )
         # A command read at a tick was issued one period ago: number 0; number k another k periods before.
-        self._base = max(0, int(np.ceil((delay - 2.0 * period) / period - 1e-9)))
-        self._lead = 2.0 * period - delay + self._base * period
-        # Dead beat for a double integrator under a held acceleration.
-        self._position_gain = 1.0 / period**2 if tracks_position else 0.0
-        self._velocity_gain = 1.5 / period if tracks_position else 1.0 / period
-        self._period = period
-        self._position = self.DeclareVectorInputPort("position_command", NUM_JOINTS)
-        self._velocity = self.DeclareVectorInputPort("velocity_command", NUM_JOINTS)
-        self._setpoint = self.DeclareVectorInputPort("setpoint", _WIDTH)
-        acceleration = self.DeclareDiscreteState(NUM_JOINTS)
-        self._transit = self.DeclareDiscreteState(max(1, self._base) * _WIDTH)
-        self.DeclareStateOutputPort("acceleration", acceleration)
-        self.DeclarePeriodicDiscreteUpdateEvent(period, 0.0, self._update)
+        base = max(0, int(np.ceil((delay - 2.0 * period) / period - 1e-9)))
+        lead = 2.0 * period - delay + base * period
+        builder = DiagramBuilder()
+        commands = builder.AddNamedSystem("commands", Multiplexer([NUM_JOINTS, NUM_JOINTS]))
+        inputs = builder.AddNamedSystem("inputs", Multiplexer([_WIDTH, _WIDTH]))
+        steering = _steering(period, lead, base > 0, tracks_position)
+        self._steering = builder.AddNamedSystem("steering", steering)
+        self._transit = None
+        newest = commands.get_output_port()
+        if base > 1:
+            # The delay takes one period to read its input.
+            self._transit = builder.AddNamedSystem("transit", DiscreteTimeDelay(period, base - 2, _WIDTH))
+            builder.Connect(newest, self._transit.get_input_port())
+            newest = self._transit.get_output_port()
+        builder.Connect(newest, inputs.get_input_port(0))
+        builder.Connect(inputs.get_output_port(), self._steering.get_input_port())
+        for index, name in enumerate(("position_command", "velocity_command")):
+            builder.ExportInput(commands.get_input_port(index), name)
+        builder.ExportInput(inputs.get_input_port(1), "setpoint")
+        builder.ExportOutput(self._steering.get_output_port(), "acceleration")
+        builder.BuildInto(self)
 
-    def set_at_rest(self, context: Context, position: np.ndarray) -> None:
+    def set_at_rest(self, root_context: Context, position: np.ndarray) -> None:
         """Fills the transit with commands to stand still at position (rad, shape (6,))."""
         still = np.concatenate([position, np.zeros(NUM_JOINTS)])
-        count = context.get_discrete_state(self._transit).size() // _WIDTH
-        context.SetDiscreteState(self._transit, np.tile(still, count))
+        context = self._steering.GetMyMutableContextFromRoot(root_context)
+        context.SetDiscreteState(np.concatenate([np.zeros(NUM_JOINTS), still]))
+        if self._transit:
+            context = self._transit.GetMyMutableContextFromRoot(root_context)
+            context.SetDiscreteState(np.tile(still, context.get_discrete_state_vector().size() // _WIDTH))
 
-    def _update(self, context: Context, discrete_state: DiscreteValues) -> None:
-        command = np.concatenate([self._position.Eval(context), self._velocity.Eval(context)])
-        transit = discrete_state.get_mutable_value(1)
-        commands = np.concatenate([command, transit])
-        transit[:] = commands[:-_WIDTH]
-        base, newer = self._base * _WIDTH, max(0, self._base - 1) * _WIDTH
-        velocity = commands[base + NUM_JOINTS : base + _WIDTH]
-        if self._lead > 0.0:
-            older = newer + _WIDTH
-            change = (
-                commands[newer + NUM_JOINTS : newer + _WIDTH] - commands[older + NUM_JOINTS : older + _WIDTH]
-            )
-            velocity = velocity + self._lead / self._period * change
-        setpoint = self._setpoint.Eval(context)
-        acceleration = self._velocity_gain * (velocity - setpoint[NUM_JOINTS:])
-        if self._position_gain > 0.0:
-            # Where a uniform motion that ends at the target would be now.
-            position = commands[base : base + NUM_JOINTS] - self._period * velocity
-            position += 0.5 * self._lead * (commands[base + NUM_JOINTS : base + _WIDTH] + velocity)
-            acceleration += self._position_gain * (position - setpoint[:NUM_JOINTS])
-        discrete_state.set_value(0, acceleration)
+
+def _steering(period: float, lead: float, is_between: bool, tracks_position: bool) -> LinearSystem:
+    """The dead-beat control of a double integrator under a held acceleration.
+
+    Args:
+        period: time between commands in s.
+        lead: how far the instant to be at lies behind the command that it is found from, in s.
+        is_between: whether the newer one of two commands lies behind that instant, so that the older one is
+            what it is found from.
+        tracks_position: whether positions count.
+
+    Returns:
+        Inputs are the newer command and the set-point, states the acceleration and the older command.
+    """
+    # What the quantities of one joint are made of: p and v of the newer command, of the older one, and of
+    # the set-point.
+    (p_new, v_new), (p_old, v_old), (p_set, v_set) = np.eye(6).reshape(3, 2, 6)
+    p_base, v_base = (p_old, v_old) if is_between else (p_new, v_new)
+    velocity = v_base + lead / period * (v_new - v_old)
+    if tracks_position:
+        # Where a uniform motion that ends at the target would be now.
+        position = p_base + 0.5 * lead * (v_base + velocity) - period * velocity
+        acceleration = 1.5 / period * (velocity - v_set) + (position - p_set) / period**2
+    else:
+        acceleration = (velocity - v_set) / period
+    one, zero = np.eye(NUM_JOINTS), np.zeros((NUM_JOINTS, NUM_JOINTS))
+    from_newer, from_older, from_setpoint = (
+        np.kron(acceleration, one).reshape(NUM_JOINTS, 3, _WIDTH).swapaxes(0, 1)
+    )
+    remembered = np.zeros((_WIDTH, NUM_JOINTS + _WIDTH))
+    A = np.vstack([np.hstack([zero, from_older]), remembered])
+    B = np.vstack([np.hstack([from_newer, from_setpoint]), np.eye(_WIDTH, 2 * _WIDTH)])
+    C, D = np.hstack([one, zero, zero]), np.zeros((NUM_JOINTS, 2 * _WIDTH))
+    return LinearSystem(A, B, C, D, period)

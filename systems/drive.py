@@ -1,6 +1,6 @@
 """Controlled joints: from commands every few milliseconds to motor torques, with gravity and friction.
 
-The continuous part is made of Drake's C++ systems alone; Python runs once per command period.
+Made of Drake's C++ systems alone.
 """
 
 from dataclasses import dataclass, field
@@ -140,7 +140,7 @@ class Drive(Diagram):
         """
         still = np.concatenate([theta, np.zeros(NUM_JOINTS)])
         self._setpoint.GetMyMutableContextFromRoot(root_context).SetContinuousState(still)
-        self._interpolator.set_at_rest(self._interpolator.GetMyMutableContextFromRoot(root_context), theta)
+        self._interpolator.set_at_rest(root_context, theta)
         friction, context = self._friction, self._friction.GetMyMutableContextFromRoot(root_context)
         velocity_only = np.hstack(
             [np.zeros((NUM_JOINTS, NUM_JOINTS)), np.diag(1.0 / self.robot.coulomb_velocity)]

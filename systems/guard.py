@@ -298,7 +298,7 @@ class CommandGuard(LeafSystem):
         elif state[_MODE] not in (_IDLE, _RESUMING):
             state[_MODE] = _HOLDING if age >= self._config.hold_after - 1e-9 else _GOING
         discrete_state.set_value(0, state)
-        if kinds or context.get_discrete_state(2).value().any():
+        if kinds or any(context.get_discrete_state(2).value().tolist()):
             wished = self._inputs[0].Eval(context)
             aside = state[_ASIDE] if self._is_speed_only else state[_POSITIONS] - wished
             discrete_state.set_value(2, aside if math.isfinite(aside.sum()) else np.zeros(NUM_JOINTS))

@@ -32,12 +32,13 @@ class Pbvs(ServoLaw):
         if moment.measured is not None:
             added = robust_solve(J, self._within_limits(self._feedback(*moment.measured), correction))
             fastest = math.radians(self.config.correction_speed_limit_deg_s)
-            velocity = velocity + added * min(1.0, fastest / max(float(np.abs(added).max()), 1e-12))
+            largest = max(map(abs, added.tolist()))
+            velocity = velocity + added * min(1.0, fastest / max(largest, 1e-12))
         return Step(moment.position + self.period * velocity, velocity, correction, q_d)
 
     def _feedback(self, wanted: np.ndarray, seen: np.ndarray) -> np.ndarray:
+        zyx = zyx_from_rotation(seen[:, :3])
         twist = np.empty(6)
-        difference = euler_difference(wanted[:, :3], seen[:, :3])
-        twist[:3] = angular_velocity(zyx_from_rotation(seen[:, :3]), difference)
+        twist[:3] = angular_velocity(zyx, euler_difference(zyx_from_rotation(wanted[:, :3]), zyx))
         twist[3:] = wanted[:, 3] - seen[:, 3]
         return self._gains * twist

@@ -54,6 +54,6 @@ class PositionLevel(ServoLaw):
 def _euler_difference(X_WD: np.ndarray, X_WE: np.ndarray) -> np.ndarray:
     """z_d - z with wrapped angles (alpha, beta, gamma) in rad, then the position in m, eq. (5.10)."""
     difference = np.empty(6)
-    difference[:3] = euler_difference(X_WD[:, :3], X_WE[:, :3])
+    difference[:3] = euler_difference(zyx_from_rotation(X_WD[:, :3]), zyx_from_rotation(X_WE[:, :3]))
     difference[3:] = X_WD[:, 3] - X_WE[:, 3]
     return difference

@@ -36,7 +36,7 @@ def setpoints(
     simulator = Simulator(builder.Build())
     simulator.get_mutable_integrator().set_maximum_step_size(1e-3)
     context = simulator.get_mutable_context()
-    interpolator.set_at_rest(interpolator.GetMyMutableContextFromRoot(context), np.zeros(6))
+    interpolator.set_at_rest(context, np.zeros(6))
     found = []
     for time in times:
         simulator.AdvanceTo(time)
