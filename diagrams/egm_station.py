@@ -26,13 +26,16 @@ class EgmStation(LeafSystem):
         self._commands = [
             self.DeclareVectorInputPort(name, NUM_JOINTS) for name in ("position_command", "velocity_command")
         ]
-        for name, empty in (("joint_sample", JointSample()), ("pose_sample", PoseSample())):
-            index = AbstractParameterIndex(self.DeclareAbstractParameter(Value[object](empty)))
+        nothing = JointSample(), PoseSample()
+        # One parameter for both samples: what depends on either is told once.
+        index = AbstractParameterIndex(self.DeclareAbstractParameter(Value[object](nothing)))
+        self._heard = index
+        for part, (name, empty) in enumerate(zip(("joint_sample", "pose_sample"), nothing, strict=True)):
             self.DeclareAbstractOutputPort(
                 name,
                 lambda empty=empty: Value(empty),
-                lambda context, output, index=index: output.set_value(
-                    context.get_abstract_parameter(index).get_value()
+                lambda context, output, part=part: output.set_value(
+                    context.get_abstract_parameter(index).get_value()[part]
                 ),
                 {self.abstract_parameter_ticket(index)},
             )
@@ -40,8 +43,7 @@ class EgmStation(LeafSystem):
     def hear(self, root_context: Context, joints: JointSample, pose: PoseSample) -> None:
         """Makes these the newest samples."""
         context = self.GetMyMutableContextFromRoot(root_context)
-        for index, sample in enumerate((joints, pose)):
-            context.get_mutable_abstract_parameter(index).set_value(sample)
+        context.get_mutable_abstract_parameter(self._heard).set_value((joints, pose))
 
     def command(self, root_context: Context) -> tuple[np.ndarray, np.ndarray]:
         """The position (6,) in rad and velocity (6,) in rad/s that the servo commands now."""

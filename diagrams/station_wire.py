@@ -2,7 +2,6 @@
 
 import math
 from collections.abc import Callable
-from dataclasses import replace
 
 import numpy as np
 
@@ -187,7 +186,7 @@ class StationWire:
             return PoseSample()
         # The report left when its stamp says; its own arrival has jitter.
         reported = self.robot_clock.station_time(round(1e6 * last.time))
-        return replace(sample, time=time + sample.time - reported)
+        return PoseSample(time + sample.time - reported, sample.X_WE, sample.valid, sample.residual)
 
     def say(self, position: np.ndarray, velocity: np.ndarray) -> None:
         """Replies to the newest report, if it may be answered."""
@@ -228,10 +227,10 @@ class StationWire:
             self.velocity = (report.position - last.position) / (report.time - last.time)
         else:
             self.velocity = np.zeros(NUM_JOINTS)
-        torques = report.message.torqueRef.joints
         if newest is not None and is_new and newest.torque is not None:
             self.effort = newest.torque
         else:
+            torques = list(report.message.torqueRef.joints)
             self.effort = np.array(torques) if len(torques) == NUM_JOINTS else np.zeros(NUM_JOINTS)
 
     def _learn_clock(self) -> None:

@@ -137,8 +137,9 @@ class CommandGuard(LeafSystem):
         counts = self.DeclareDiscreteState(len(KINDS))
         self.DeclareStateOutputPort("guard_status", counts)
         self.DeclareStateOutputPort("deviation", self.DeclareDiscreteState(NUM_JOINTS))
-        inputs = {port.ticket() for port in self._inputs} | {self._joints.ticket()}
-        # One entry computes everything; the ports are slices of it.
+        inputs = {port.ticket() for port in self._inputs}
+        # One entry computes everything; the ports are slices of it. Joints that are read again later do not
+        # take back what has been issued at a tick, so it does not depend on their port.
         self._next = self.DeclareCacheEntry(
             "next",
             ValueProducer(Value[object], self._calc_next),

@@ -213,11 +213,11 @@ def encode_command(mode: Mode, command: Command, seqno: int, time: float) -> byt
     message = EgmSensor()
     _fill_header(message.header, seqno, time, CORRECTION)
     if mode.has_joints:
-        degrees = _checked("position", command.position, (NUM_JOINTS,)) * (180.0 / math.pi)
-        message.planned.joints.joints.extend(degrees.tolist())
+        degrees = map(math.degrees, _checked("position", command.position, (NUM_JOINTS,)).tolist())
+        message.planned.joints.joints.extend(degrees)
     if mode.has_joint_speeds:
-        speeds = _checked("velocity", command.velocity, (NUM_JOINTS,)) * (180.0 / math.pi)
-        message.speedRef.joints.joints.extend(speeds.tolist())
+        speeds = map(math.degrees, _checked("velocity", command.velocity, (NUM_JOINTS,)).tolist())
+        message.speedRef.joints.joints.extend(speeds)
     if mode.has_pose:
         if command.pose is None:
             raise EgmError("EGM command: this mode sends a pose, there is none")
@@ -315,7 +315,7 @@ def _pose(wire: Any) -> Pose:
 
 def _checked(name: str, value: np.ndarray | None, sizes: tuple[int, ...]) -> np.ndarray:
     # A sum is finite only if all its terms are.
-    if value is None or len(value) not in sizes or not math.isfinite(float(np.sum(value))):
+    if value is None or len(value) not in sizes or not math.isfinite(sum(value.tolist())):
         allowed = " or ".join(str(size) for size in sizes)
         raise EgmError(f"EGM {name}: {allowed} finite numbers are needed, got {value}")
     return value

@@ -78,7 +78,7 @@ class EgmSession:
         self.epoch = 0  # grows whenever commands must start anew from the measured position
         self.sender: Address | None = None
         self.last: RobotReport | None = None
-        self._speed, self._break_after, self._host = np.asarray(largest_speed), break_after, host
+        self._speed, self._break_after, self._host = np.asarray(largest_speed).tolist(), break_after, host
         self._period = period
         self._heard = -math.inf
         self._candidate: RobotReport | None = None
@@ -125,16 +125,12 @@ class EgmSession:
         try:
             data = encode_command(mode, command, self._reply_number, now)
             self._last_reply = mode, command, self._reply_number, now
-            self._safe = replace(
-                command,
-                velocity=None if command.velocity is None else np.zeros_like(command.velocity),
-                pose_velocity=None if command.pose_velocity is None else np.zeros_like(command.pose_velocity),
-            )
+            self._safe = command
         except EgmError:
             self.counters.withheld += 1
             if self._safe is None:
                 return None
-            data = encode_command(mode, self._safe, self._reply_number, now)
+            data = encode_command(mode, _standing(self._safe), self._reply_number, now)
         self.counters.replies += 1
         return data
 
@@ -161,8 +157,12 @@ class EgmSession:
         if ahead == 0 and passed == 0.0:
             self.counters.duplicates += 1
             return False
-        reach = 2.0 * self._speed * max(passed, ahead * self._period, self._period) + _POSITION_SLACK
-        is_plausible = bool((np.abs(report.position - last.position) <= reach).all())
+        longest = 2.0 * max(passed, ahead * self._period, self._period)
+        moves = (report.position - last.position).tolist()
+        is_plausible = all(
+            abs(move) <= longest * speed + _POSITION_SLACK
+            for move, speed in zip(moves, self._speed, strict=True)
+        )
         if 0 < ahead <= _LARGEST_GAP and 0.0 <= passed <= _LARGEST_WAIT and is_plausible:
             self.counters.missing += ahead - 1
             return True
@@ -204,3 +204,12 @@ class EgmSession:
         self._candidate, self._candidates = None, 0
         self._may_reply = self.link is Link.READY
         self.counters.accepted += 1
+
+
+def _standing(command: Command) -> Command:
+    """A command to be where another one says, and to stay there."""
+    return replace(
+        command,
+        velocity=None if command.velocity is None else np.zeros_like(command.velocity),
+        pose_velocity=None if command.pose_velocity is None else np.zeros_like(command.pose_velocity),
+    )
