@@ -1,7 +1,7 @@
 """The report of a comparison: one HTML file that opens offline and explains itself."""
 
 import json
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from html import escape
 from pathlib import Path
 from typing import Any
@@ -111,10 +111,20 @@ def _errors(summary: Mapping[str, Any]) -> str:
         "Largest and static error per axis",
         "From the start of the path to its end, in world axes. Static is the mean over the last half second "
         "of the dwell. The smallest number of each column is marked.",
-        '<div class="pair">'
-        f"<div><h3>True: what a perfect instrument would see</h3>{_error_table(summary, 'true')}</div>"
-        f"<div><h3>Measured: what the camera says</h3>{_error_table(summary, 'measured')}</div></div>",
+        _side_by_side(summary, lambda source: _error_table(summary, source)),
     )
+
+
+def _side_by_side(summary: Mapping[str, Any], table: Callable[[str], str]) -> str:
+    """A table of the truth, where it is known, beside one of what was measured."""
+    titles = {
+        "true": "True: what a perfect instrument would see",
+        "measured": "Measured: what the camera says",
+    }
+    if judged_by(summary) == "measured":
+        del titles["true"]
+    tables = (f"<div><h3>{title}</h3>{table(source)}</div>" for source, title in titles.items())
+    return f'<div class="pair">{"".join(tables)}</div>'
 
 
 def _error_table(summary: Mapping[str, Any], source: str) -> str:
@@ -140,7 +150,9 @@ def _plots(summary: Mapping[str, Any], data: Mapping[str, Any]) -> str:
         f'style="--law:{law["color"]}"></i>{escape(law["title"])}</button>'
         for law in data["laws"]
     )
-    chips += '<button type="button" aria-pressed="true" data-measured="yes">Measured samples</button>'
+    is_true = judged_by(summary) == "true"
+    if is_true:
+        chips += '<button type="button" aria-pressed="true" data-measured="yes">Measured samples</button>'
     chosen = _magnification(data)
     options = "".join(
         f'<option value="{factor}"{" selected" if factor == chosen else ""}>×{factor}</option>'
@@ -154,27 +166,30 @@ def _plots(summary: Mapping[str, Any], data: Mapping[str, Any]) -> str:
     bars = "".join(f'<div class="plot bar" id="bars-{unit}"></div>' for unit in ("mm", "deg"))
     bars = f'<div class="pair">{bars}</div>'
     axes_note = (
-        "Lines are true, faint dots are camera samples (thinned out). The range fits the laws; double-click "
-        "for the full range."
+        "Lines are true, faint dots are camera samples (thinned out)."
+        if is_true
+        else "What the camera says; nobody knows the truth on a real station."
     )
+    axes_note += " The range fits the laws; double-click for the full range."
     return "\n".join(
         [
             f'<div class="chips">{chips}</div>',
             _card(
                 "Error at a glance",
-                "Largest on the path and static, true distance and angle, on a logarithmic scale.",
+                f"Largest on the path and static, {judged_by(summary)} distance and angle, on a logarithmic "
+                "scale.",
                 bars,
             ),
             _card(
                 "Path",
-                "Wanted path (thin) and true paths with equal axes. The deviation at each instant is drawn "
-                "magnified.",
+                f"Wanted path (thin) and {judged_by(summary)} paths with equal axes. The deviation at each "
+                "instant is drawn magnified.",
                 path_plot,
             ),
             _card(
                 "Distance and angle from the wanted pose",
-                "True errors on a logarithmic scale, so that tens of millimetres and a few micrometres share "
-                "a picture.",
+                f"{judged_by(summary).capitalize()} errors on a logarithmic scale, so that tens of "
+                "millimetres and a few micrometres share a picture.",
                 '<div class="plot" id="distance"></div>',
             ),
             _card("Position error per axis", axes_note, '<div class="plot" id="position"></div>'),
@@ -260,8 +275,7 @@ def _iso(summary: Mapping[str, Any]) -> str:
         + ("cycle per law" if cycles == 1 else "cycles per law")
         + ("; repeatability needs at least two." if cycles == 1 else ".")
     )
-    tables = f"<div><h3>True</h3>{table('true')}</div><div><h3>Measured</h3>{table('measured')}</div>"
-    return _card("ISO 9283", note, f'<div class="pair">{tables}</div>')
+    return _card("ISO 9283", note, _side_by_side(summary, table))
 
 
 def _timing(timing: Mapping[str, Any]) -> str:
@@ -272,7 +286,7 @@ def _timing(timing: Mapping[str, Any]) -> str:
         for law, run in timing["runs"].items()
     )
     head = ["", "wall s", "simulated s", "real-time factor"]
-    return _card("Time", "Of the simulation alone.", _table(head, body))
+    return _card("Time", "Of the runs alone, without building and writing.", _table(head, body))
 
 
 def _scenario(text: str) -> str:

@@ -15,7 +15,7 @@ RESULTS = {
     "report.html": "errors, plots and guard events; opens offline",
     "replay.html": "the robot in motion; opens offline",
     "figure.svg": "distance of the tip over time",
-    "summary.json": "the numbers; same seed, same bytes",
+    "summary.json": "the numbers; a simulation with the same seed repeats them byte for byte",
     "timing.json": "wall times and real-time factors",
 }
 
