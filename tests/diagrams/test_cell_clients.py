@@ -25,7 +25,9 @@ def moved_by(package: str, mode: str) -> dict:
     client = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
     assert client.stdout is not None
     assert client.stdout.readline().strip() == "listening"
-    loop = CellLoop(load_scenario("cell"), load_robot("irb1200"), ("127.0.0.1", port), with_log=False)
+    # A busy machine may keep the client from answering for a while.
+    scenario = load_scenario("cell", ["station.egm.run.timeout=5"])
+    loop = CellLoop(scenario, load_robot("irb1200"), ("127.0.0.1", port), with_log=False)
     finished = threading.Event()
     waiter = threading.Thread(target=lambda: (client.wait(60.0), finished.set()))
     waiter.start()
