@@ -4,6 +4,7 @@ OpenCV's ``calibrateCamera`` gets the points that the adjustment has found and m
 each camera anew, so that its residual is the smallest possible one.
 """
 
+import statistics
 import time
 from collections.abc import Iterator
 from dataclasses import replace
@@ -18,7 +19,8 @@ from systems.tracking.calibration.wand_calibration import calibrate_with_wand
 from systems.tracking.measuring_cell import load_cell
 
 REQUIRED_RATIO = 1.02  # of the residual to OpenCV's
-REQUIRED_SIGMAS = 3.0  # of a parameter from the truth
+RUNS = 8
+EXPECTED_BEYOND = 0.27  # percent of what is normally distributed is beyond three standard deviations
 ALLOWED_TIME = 5.0  # s, to wait after waving the wand
 
 
@@ -26,13 +28,17 @@ def cameras() -> Iterator[Row]:
     """Benchmarks of the calibration of the shipped cell from a simulated wand run."""
     cell, kit = load_cell("probst"), CalibrationKit()
     true, names = cell.camera_model(cell.base.pose()), [camera.name for camera in cell.cameras]
-    run, _ = simulate_wand_run(true, cell.sensor_px, kit, SimulatedWandRun(), np.random.default_rng(0))
     guess = replace(true, radial=0.0 * true.radial, tangential=0.0 * true.tangential)
-    started = time.perf_counter()
-    calibration = calibrate_with_wand(run, kit, guess, names)
-    seconds = time.perf_counter() - started
-    found = CamerasFound(calibration, names, kit, seconds, true)
-    yield "cameras_time", "calibration of ten cameras", seconds, "s", ALLOWED_TIME, "allowed"
+    runs, calibrations, seconds = [], [], []
+    for seed in range(RUNS):
+        rng = np.random.default_rng(seed)
+        runs.append(simulate_wand_run(true, cell.sensor_px, kit, SimulatedWandRun(), rng)[0])
+        started = time.perf_counter()
+        calibrations.append(calibrate_with_wand(runs[-1], kit, guess, names))
+        seconds.append(time.perf_counter() - started)
+    text = "calibration of ten cameras"
+    yield "cameras_time", text, statistics.median(seconds), "s", ALLOWED_TIME, "allowed"
+    run, calibration = runs[0], calibrations[0]
     size = int(cell.sensor_px[0]), int(cell.sensor_px[1])
     ratios = []
     for i in range(len(names)):
@@ -47,9 +53,11 @@ def cameras() -> Iterator[Row]:
         ratios.append(calibration.rms_px[i] / rms)
     text = "calibration, residual over OpenCV's"
     yield "cameras_residual", text, max(ratios), "", REQUIRED_RATIO, "allowed"
-    assert found.ratios is not None
-    largest = float(np.abs(found.ratios).max())
-    yield "cameras_truth", "calibration, error over std", largest, "", REQUIRED_SIGMAS, "allowed"
+    found = np.array([CamerasFound(each, names, kit, 0.0, true).ratios for each in calibrations])
+    text = "calibration, error over its std, rms"
+    yield "cameras_spread", text, float(np.sqrt(np.mean(found**2))), "", 1.0, "expected"
+    text = "calibration, beyond three std"
+    yield "cameras_truth", text, 100.0 * float(np.mean(np.abs(found) > 3.0)), "%", EXPECTED_BEYOND, "expected"
 
 
 if __name__ == "__main__":

@@ -1,7 +1,8 @@
 """How well a pose can be known: by the geometry of cameras and markers, and by what images make of a marker.
 
-The bound is that of Cramer and Rao, sigma^2 (J^T J)^-1 over all pixels of markers that are seen and stand
-alone, which the tracker reaches within a few percent (`experiments.bench_tracking`).
+The bound is that of Cramer and Rao, sigma^2 (J^T J)^-1 over all blobs that are seen: markers that touch each
+other in an image are one blob there. The tracker reaches it within a few percent
+(`experiments.bench_tracking`).
 """
 
 from collections.abc import Sequence
@@ -21,8 +22,8 @@ from systems.tracking.camera_model import Cameras
 from systems.tracking.centroids import CentroidConfig, blobs_in
 from systems.tracking.detection_body import DetectionBody
 from systems.tracking.images import ImageConfig, ImageSource
-from systems.tracking.marker_images import marker_diameters, touching
-from systems.tracking.pose_refinement import linearize
+from systems.tracking.marker_images import image_shares, marker_diameters, touching
+from systems.tracking.pose_refinement import linearize, shared
 from systems.tracking.visibility import in_window, occluded
 
 _LEAST_INFORMATION = 1.0  # px^2 per m^2 or rad^2, as in `systems.tracking.pose_refinement`
@@ -64,15 +65,16 @@ def information(
 ) -> np.ndarray:
     """What each camera says of each pose for pixels with a standard deviation of 1 px, (p, n, 6, 6).
 
-    It counts a marker that is in its window, not behind the arm, and touches no other one.
+    Markers count that are in their windows and not behind the arm; those that touch each other are one.
     """
     arm, rows = ArmCapsules(robot), []
     for X, q in zip(places.X_WE, places.q, strict=True):
         pixels, J = linearize(cameras, body.p_E, X)
         p_W = body.p_E @ X[:3, :3].T + X[:3, 3]
         seen = in_window(pixels, windows) & ~occluded(cameras.p_WC, p_W, arm.at(q))
-        seen &= ~touching(pixels, marker_diameters(cameras, body, p_W)).any(2)
-        J = np.where(seen[..., None, None], J, 0.0).reshape(len(cameras), -1, 6)
+        size = marker_diameters(cameras, body, p_W)
+        share = image_shares(touching(pixels, size), seen, size)
+        J = np.nan_to_num(shared(J, share)).reshape(len(cameras), -1, 6)
         rows.append(J.swapaxes(1, 2) @ J)
     return np.array(rows)
 

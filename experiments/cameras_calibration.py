@@ -11,13 +11,14 @@ from rich.console import Console
 from rich.markup import escape
 from rich.table import Table
 
+from experiments.cameras_plots import SCENE
 from experiments.plot_page import Section, html_table, write_plot_page
-from systems.tracking.calibration.camera_parameters import LENS_NAMES, NUM_LENS
+from systems.tracking.calibration.camera_parameters import LENS_NAMES, NUM_LENS, change_between
 from systems.tracking.calibration.wand import CalibrationKit
 from systems.tracking.calibration.wand_calibration import WandCalibration
 from systems.tracking.camera_model import Cameras
 
-HEAD = ("camera", "x mm", "y mm", "z mm", "± mm", "points", "out", "px", "mm")
+HEAD = ("camera", "x mm", "y mm", "z mm", "± mm", "points", "out", "rms px", "ray mm")
 _COLOR = "#0f7cc0"
 
 
@@ -33,10 +34,11 @@ class CamerasFound:
 
     @property
     def ratios(self) -> np.ndarray | None:
-        """Errors of the lenses over their standard deviations, (n, 9); None without a truth."""
+        """Errors of the parameters over their standard deviations, (n, 15); None without a truth."""
         if self.truth is None:
             return None
-        return (lens_parameters(self.calibration.cameras) - lens_parameters(self.truth)) / self.lens_sigmas
+        sigmas = np.sqrt(np.einsum("nii->ni", self.calibration.covariance))
+        return change_between(self.truth, self.calibration.cameras) / sigmas
 
     @property
     def lens_sigmas(self) -> np.ndarray:
@@ -79,7 +81,7 @@ def calibration_json(found: CamerasFound) -> dict[str, Any]:
         "wand_length_mm": found.kit.wand_length_mm,
         "wand_length_mean_mm": float(1e3 * calibration.wand_lengths.mean()),
         "wand_length_standard_deviation_mm": 1e3 * calibration.wand_deviation,
-        "largest_lens_error_over_standard_deviation": None
+        "largest_error_over_standard_deviation": None
         if found.ratios is None
         else float(np.abs(found.ratios).max()),
         "seconds": found.seconds,
@@ -109,7 +111,10 @@ def verdict(found: CamerasFound) -> str:
     )
     if found.ratios is not None:
         largest = np.abs(found.ratios).max()
-        text += f" No parameter of a lens is off by more than {largest:.1f} standard deviations."
+        text += (
+            f" Of {found.ratios.size} parameters of lenses and places none is off by more than {largest:.1f} "
+            "standard deviations."
+        )
     return text
 
 
@@ -120,12 +125,18 @@ def write_calibration_page(path: Path, title: str, found: CamerasFound) -> None:
         "and left out; root mean square residuals in px, and average distances between points and rays "
         "in mm, as in Probst (2024), figure A.10."
     )
-    note_map = "Cameras with their optical axes, and where the wand was."
+    note_map = (
+        "Cameras with their optical axes, where the wand was (grey) and the L-frame at the origin (orange)."
+    )
+    note_lenses = (
+        "Focal lengths f and principal points c in px, radial distortion k and tangential p as in OpenCV, "
+        "with their standard deviations; p and its deviations in thousandths."
+    )
     sections = [
         Section("Cameras", note, html_table(HEAD, _rows(found))),
         Section("Where they stand", note_map, _map(found), 620),
-        Section("Length of the wand", "Each place by triangulation alone.", _lengths(found), 320),
-        Section("Lenses", "With their standard deviations.", html_table(*_lens_table(found))),
+        Section("Length of the wand", "In each place, by triangulation alone.", _lengths(found), 320),
+        Section("Lenses", note_lenses, html_table(*_lens_table(found))),
     ]
     write_plot_page(path, f"Cameras, {title}", verdict(found), sections)
 
@@ -150,11 +161,20 @@ def _rows(found: CamerasFound) -> list[list[str]]:
 
 
 def _lens_table(found: CamerasFound) -> tuple[list[str], list[list[str]]]:
-    values, sigmas = lens_parameters(found.calibration.cameras), found.lens_sigmas
+    thousandths = np.array([1e3 if name.startswith("p") else 1.0 for name in LENS_NAMES])
+    values, sigmas = (
+        thousandths * numbers for numbers in (lens_parameters(found.calibration.cameras), found.lens_sigmas)
+    )
     rows = []
     for name, value, sigma in zip(found.names, values, sigmas, strict=True):
-        rows.append([name, *(f"{v:.6g} ± {s:.1g}" for v, s in zip(value, sigma, strict=True))])
+        rows.append([name, *(_rounded(v, s) for v, s in zip(value, sigma, strict=True))])
     return ["camera", *LENS_NAMES], rows
+
+
+def _rounded(value: float, sigma: float) -> str:
+    """A value and its standard deviation, to the first digit of the latter."""
+    digits = max(0, -int(np.floor(np.log10(sigma)))) if sigma > 0.0 else 6
+    return f"{value:.{digits}f} ± {sigma:.{digits}f}"
 
 
 def _map(found: CamerasFound) -> go.Figure:
@@ -170,11 +190,15 @@ def _map(found: CamerasFound) -> go.Figure:
     x, y, z = cameras.p_WC.T
     dots = {"size": 4, "color": _COLOR}
     figure.add_trace(go.Scatter3d(x=x, y=y, z=z, mode="markers+text", text=found.names, marker=dots))
-    axes = {f"{axis}axis": {"title": f"{axis} in m"} for axis in "xyz"}
-    return figure.update_layout(scene={"aspectmode": "data", **axes}, showlegend=False)
+    frame = found.kit.p_Q
+    x, y, z = np.stack([frame[[0, -1]], frame[[0, 2]]]).reshape(-1, 3).T
+    figure.add_trace(go.Scatter3d(x=x, y=y, z=z, mode="lines", line={"color": "#d2691e", "width": 6}))
+    return figure.update_layout(scene=SCENE, showlegend=False)
 
 
 def _lengths(found: CamerasFound) -> go.Figure:
     off = 1e3 * found.calibration.wand_lengths - found.kit.wand_length_mm
     figure = go.Figure(go.Histogram(x=off, marker_color=_COLOR, nbinsx=60))
-    return figure.update_layout(xaxis={"title": "too long in mm"}, yaxis={"title": "places"})
+    return figure.update_layout(
+        xaxis={"title": "measured minus given length in mm"}, yaxis={"title": "places"}
+    )

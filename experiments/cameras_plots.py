@@ -15,7 +15,11 @@ ENLARGED = 500.0  # times, of the ellipsoids
 _SIGMAS = 3.0  # from the middle of an ellipsoid to its surface
 _INK, _SOFT, _BLUE, _ORANGE = "#5b6675", "#9aa5b4", "#0f7cc0", "#d2691e"
 _SIGHT = 1.1, 1.4  # m from the middle of the workspace, where lines point at the cameras
-_SCENE = {"aspectmode": "data", **{f"{axis}axis": {"title": f"{axis} in m"} for axis in "xyz"}}
+SCENE = {
+    "aspectmode": "data",
+    "camera": {"eye": {"x": 1.7, "y": 1.7, "z": 1.1}},  # the default one cuts corners off
+    **{f"{axis}axis": {"title": f"{axis} in m"} for axis in "xyz"},
+}
 
 
 def ellipsoid_figure(robot: RobotModel, places: Places, covariance: np.ndarray) -> go.Figure:
@@ -32,14 +36,14 @@ def ellipsoid_figure(robot: RobotModel, places: Places, covariance: np.ndarray) 
     figure = go.Figure(
         go.Mesh3d(
             x=x, y=y, z=z, i=i, j=j, k=k, intensity=np.repeat(sigma, len(points)), colorscale="Viridis",
-            colorbar={"title": "µm"}, flatshading=False, opacity=0.9,
+            colorbar={"title": "σ in µm"}, flatshading=False, opacity=0.9,
             hovertemplate="%{intensity:.1f} µm along an axis<extra></extra>",
         )
     )  # fmt: skip
     x, y, z = places.X_WE[:, :3, 3].T
     figure.add_trace(go.Scatter3d(x=x, y=y, z=z, mode="lines", line={"color": _INK}, name="path"))
     figure.add_trace(_arm(robot, places.q[0]))
-    return figure.update_layout(scene=_SCENE, showlegend=False)
+    return figure.update_layout(scene=SCENE, showlegend=False)
 
 
 def workspace_figure(
@@ -48,7 +52,7 @@ def workspace_figure(
     """The standard deviation of the position at poses all over the workspace, and where the cameras are."""
     sigma = 1e6 * np.sqrt(np.trace(covariance[:, 3:, 3:], axis1=1, axis2=2) / 3.0)
     x, y, z = places.X_WE[:, :3, 3].T
-    color = {"color": sigma, "colorscale": "Viridis", "size": 4, "colorbar": {"title": "µm"}}
+    color = {"color": sigma, "colorscale": "Viridis", "size": 4, "colorbar": {"title": "σ in µm"}}
     figure = go.Figure(
         go.Scatter3d(
             x=x, y=y, z=z, mode="markers", marker=color, customdata=sigma,
@@ -64,7 +68,7 @@ def workspace_figure(
     pointers = {"color": _ORANGE, "width": 5}
     figure.add_trace(go.Scatter3d(x=x, y=y, z=z, mode="lines", line=pointers, name="to a camera"))
     figure.add_trace(_arm(robot, np.zeros(6)))
-    return figure.update_layout(scene=_SCENE, showlegend=False)
+    return figure.update_layout(scene=SCENE, showlegend=False)
 
 
 def sweep_figure(sweep: Sweep, points: Sequence[SweepPoint]) -> go.Figure:
@@ -82,7 +86,7 @@ def sweep_figure(sweep: Sweep, points: Sequence[SweepPoint]) -> go.Figure:
     for name, (y, line) in curves.items():
         figure.add_trace(go.Scatter(x=x, y=y, name=name, mode="lines+markers", line=line))
     return figure.update_layout(
-        xaxis={"title": sweep.axis}, yaxis={"title": "µm along an axis", "rangemode": "tozero"}
+        xaxis={"title": sweep.axis}, yaxis={"title": "σ along an axis in µm", "rangemode": "tozero"}
     )
 
 

@@ -30,16 +30,17 @@ def print_study(console: Console, study: CamerasStudy) -> None:
     """A table of the sweeps and one of the laws."""
     table = Table(title="Standard deviation of the position on the path along an axis", **_TABLE)
     for head in ("what", "changed", "in µm", "best µm", "at"):
-        table.add_column(head, justify="left" if head == "what" else "right", no_wrap=True)
+        table.add_column(head, justify="left" if head in ("what", "changed", "at") else "right", no_wrap=True)
     for name, points in study.sweeps.items():
         first, last = points[0], points[-1]
         best = min(points, key=lambda point: np.nan_to_num(point.path.position, nan=np.inf))
+        unit = SWEEPS[name].unit
         table.add_row(
             escape(SWEEPS[name].title),
-            f"{first.value:g} → {last.value:g}",
+            f"{first.value:g} → {last.value:g} {unit}",
             f"{_micrometres(first)} → {_micrometres(last)}",
             _micrometres(best),
-            f"{best.value:g}",
+            f"{best.value:g} {unit}",
         )
     console.print(table)
     if study.laws:
@@ -59,8 +60,8 @@ def write_study_page(path: Path, title: str, study: CamerasStudy) -> None:
     ellipsoids = ellipsoid_figure(setup.robot, setup.path, study.covariance_on_path)
     dots = workspace_figure(setup.robot, cameras, setup.workspace, study.covariance_in_workspace)
     note = (
-        f"Three standard deviations of the position, {ENLARGED:g} times as large, for pixels of "
-        f"{setup.pixel_sigma:g} px; markers that are hidden or touch each other do not count."
+        f"Three standard deviations σ of the position, {ENLARGED:g} times as large, for pixels of "
+        f"{setup.pixel_sigma:g} px; markers that touch each other in an image count as one there."
     )
     note_workspace = "Configurations that touch neither floor nor base; lines point at the cameras."
     sections = [
@@ -70,7 +71,9 @@ def write_study_page(path: Path, title: str, study: CamerasStudy) -> None:
     for name, points in study.sweeps.items():
         sweep = SWEEPS[name]
         sections.append(Section(sweep.title, sweep.note, sweep_figure(sweep, points), 320))
-        if any(point.pixel_sigma != setup.pixel_sigma or point.cameras for point in points):
+        if any(
+            point.cameras or point.pixel_sigma not in (setup.pixel_sigma, point.value) for point in points
+        ):
             sections.append(Section(f"{sweep.title}: in numbers", "", _point_table(sweep.axis, points)))
     if study.laws:
         note = "True errors on the path and at rest, with one camera after the other and with fewer frames."
@@ -79,13 +82,20 @@ def write_study_page(path: Path, title: str, study: CamerasStudy) -> None:
 
 
 def _point_table(axis: str, points: Sequence[SweepPoint]) -> str:
-    head = [axis, "px", "found %", "path µm", "workspace µm", "path m°", "cameras"]
+    """Which cameras serve best, or how exactly images tell where markers are."""
+    named = any(point.cameras for point in points)
+    head = [axis, "which" if named else "centroid px", *(() if named else ("found %",))]
     rows = []
     for point in points:
+        what = [" ".join(point.cameras)] if named else _pictured(point)
         numbers = ["-" if number is None else f"{number:.1f}" for number in _numbers(point)]
-        pictured = [f"{point.pixel_sigma:.4f}", f"{100.0 * point.found:.0f}"]
-        rows.append([f"{point.value:g}", *pictured, *numbers, " ".join(point.cameras)])
-    return html_table(head, rows)
+        rows.append([f"{point.value:g}", *what, *numbers])
+    return html_table([*head, "path µm", "workspace µm", "path m°"], rows)
+
+
+def _pictured(point: SweepPoint) -> list[str]:
+    sigma = f"{point.pixel_sigma:.4f}" if np.isfinite(point.pixel_sigma) else "-"
+    return [sigma, f"{100.0 * point.found:.0f}"]
 
 
 def _numbers(point: SweepPoint) -> tuple[float | None, float | None, float | None]:

@@ -170,6 +170,7 @@ class Sweep:
     """What is changed, to which values, and how the rest follows from it."""
 
     title: str
+    unit: str  # of the values, where they have one
     axis: str
     note: str
     values: Sequence[float]
@@ -177,53 +178,61 @@ class Sweep:
 
 
 _ON_ARC = f"{RING_CAMERAS} cameras on an arc of {RING_RADIUS:g} m about the target, {RING_HEIGHT:g} m above."
+_ON_RING = f"{RING_CAMERAS} cameras evenly on a full ring about the target,"
+_PICTURED = "The error of the centroids is measured in simulated images"
 SWEEPS = {
     "cameras": Sweep(
-        "Number of cameras", "cameras", "The best ones for the path, added one at a time.",
+        "Number of cameras", "", "cameras", "The best ones for the path, added one at a time.",
         range(2, 11), _number,
     ),
     "arc": Sweep(
-        "Place: around the robot", "arc in degrees", _ON_ARC, (45.0, 90.0, 180.0, 270.0, 360.0),
+        "Place: around the robot", "°", "arc in degrees", _ON_ARC, (45.0, 90.0, 180.0, 270.0, 360.0),
         lambda setup, value: _ring(setup, value, RING_RADIUS, RING_HEIGHT, value),
     ),
     "distance": Sweep(
-        "Place: distance", "radius in m", "The same on a full ring, near and far.", (2.0, 3.0, 4.0, 6.0, 8.0),
+        "Place: distance", "m", "radius in m", f"{_ON_RING} {RING_HEIGHT:g} m above.",
+        (2.0, 3.0, 4.0, 6.0, 8.0),
         lambda setup, value: _ring(setup, value, value, RING_HEIGHT, 360.0),
     ),
     "height": Sweep(
-        "Place: height", "height in m", "The same on a full ring, low and high.", (-0.3, 0.0, 1.0, 2.0, 4.0),
+        "Place: height", "m", "height above the target in m", f"{_ON_RING} its radius {RING_RADIUS:g} m.",
+        (-0.3, 0.0, 1.0, 2.0, 4.0),
         lambda setup, value: _ring(setup, value, RING_RADIUS, value, 360.0),
     ),
     "pixel_noise": Sweep(
-        "Noise of the pixels", "px", "Given, on the level of features.", (0.02, 0.05, 0.1, 0.2, 0.5),
+        "Noise of the pixels", "px", "standard deviation of a marker in the images in px",
+        "On the level of features, where it is given.", (0.02, 0.05, 0.1, 0.2, 0.5),
         lambda setup, value: _body(replace(setup, pixel_sigma=value), value, setup.body),
     ),
     "resolution": Sweep(
-        "Resolution", "share of the pixels along an edge", "The error of the pixels is that of images.",
+        "Resolution", "×", "pixels along an edge, times those of the cell", f"{_PICTURED}.",
         (0.25, 0.5, 0.75, 1.0, 1.5, 2.0),
         lambda setup, value: _pictured(setup, value, setup.images, value),
     ),
     "exposure": Sweep(
-        "Exposure", "ms", "The same, at the largest speed of the path: light, saturation and blur.",
+        "Exposure", "ms", "exposure in ms",
+        f"{_PICTURED} at the largest speed of the path: light, saturation and blur.",
         (0.2, 0.3, 0.4, 0.8, 1.6, 3.2),
         lambda setup, value: _pictured(setup, value, replace(setup.images, exposure=1e-3 * value)),
     ),
     "sensor_noise": Sweep(
-        "Noise of the sensor", "share of full scale", "The same.", (0.0, 0.005, 0.01, 0.02, 0.05),
+        "Noise of the sensor", "", "standard deviation of a pixel in full scales", f"{_PICTURED}.",
+        (0.0, 0.005, 0.01, 0.02, 0.05),
         lambda setup, value: _pictured(setup, value, replace(setup.images, noise_sigma=value)),
     ),
     "marker_size": Sweep(
-        "Size of the markers", "mm", "The same.", (6.0, 8.0, 12.0, 16.0, 25.0),
+        "Size of the markers", "mm", "diameter in mm", f"{_PICTURED}; small ones are not found.",
+        (6.0, 8.0, 12.0, 16.0, 25.0),
         lambda setup, value: _pictured(
             setup, value, setup.images, body=replace(setup.body, marker_diameter_mm=value)
         ),
     ),
     "markers": Sweep(
-        "Number of markers", "markers", "Each as far as possible from those before.", (4, 5, 6, 8, 11),
+        "Number of markers", "", "markers", "Each as far as possible from those before.", (4, 5, 6, 8, 11),
         lambda setup, value: _markers(setup, min(int(value), len(setup.body))),
     ),
     "body": Sweep(
-        "Size of the body", "share of its size", "Markers nearer to or farther from the tool.",
+        "Size of the body", "×", "times its size", "Markers nearer to or farther from the tool.",
         (0.5, 0.75, 1.0, 1.5, 2.0),
         lambda setup, value: _body(setup, value, with_size(setup.body, value)),
     ),

@@ -6,6 +6,8 @@ from typing import TypeVar
 
 from pydrake.common.yaml import yaml_load_typed
 
+from systems.tracking.yaml_lines import first_misfit
+
 _Schema = TypeVar("_Schema")
 
 
@@ -36,9 +38,13 @@ def read_data_file(path: Path, schema: type[_Schema]) -> _Schema:
     """Reads a dataclass tree from a YAML file.
 
     Raises:
-        ValueError: if the file is not YAML or does not fit the schema; one line that names the file.
+        ValueError: if the file is not YAML or does not fit the schema; one line that names file and line.
     """
     try:
         return yaml_load_typed(schema=schema, filename=str(path))
     except Exception as error:  # the parser raises a dozen types, all of them about this file
+        misfit = first_misfit(path, schema)
+        if misfit:
+            line, reason = misfit
+            raise ValueError(f"file {path}, line {line}: {reason}") from error
         raise ValueError(f"file {path}: {' '.join(str(error).split())}") from error

@@ -1,11 +1,14 @@
 """The detection body: where the centres of the markers are in the frame of the tool."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 
 import numpy as np
 
+from systems.tracking.body_pose import collinear
 from systems.tracking.data_file import data_file, read_data_file
+from systems.tracking.yaml_lines import line_of
 
 MINIMUM_MARKERS = 4  # three give a pose, the fourth tells one naming of them from another
 
@@ -43,14 +46,15 @@ def load_body(name: str) -> DetectionBody:
     """Reads a shipped body by name (``"probst"``) or any body file by its path.
 
     Raises:
-        ValueError: if there is no such file, or it does not describe a body that can be told from its mirror
-            image and from itself turned; one line that names the file.
+        ValueError: if there is no such file, or it does not describe a body; one line that names file and
+            line.
     """
     path = data_file(name, "body")
     body = read_data_file(path, DetectionBody)
     problem = _problem(body)
     if problem:
-        raise ValueError(f"body file {path}: {problem}")
+        place, reason = problem
+        raise ValueError(f"body file {path}, line {line_of(path, place)}: {reason}")
     return body
 
 
@@ -59,19 +63,23 @@ def smallest_difference(distances: np.ndarray) -> float:
     return float(np.diff(np.sort(distances[np.triu_indices(len(distances), 1)])).min())
 
 
-def _problem(body: DetectionBody) -> str:
+def _problem(body: DetectionBody) -> tuple[Sequence[str | int], str] | None:
+    """Place and reason of the first thing that no body can have, or None."""
     markers = np.asarray(body.markers_mm, dtype=float)
     if markers.ndim != 2 or markers.shape[1:] != (3,) or not np.isfinite(markers).all():
-        return f"markers_mm must be rows of three finite numbers, got shape {markers.shape}"
+        return ["markers_mm"], f"markers_mm must be rows of three finite numbers, got shape {markers.shape}"
     if len(markers) < MINIMUM_MARKERS:
-        return f"needs at least {MINIMUM_MARKERS} markers, got {len(markers)}"
+        return ["markers_mm"], f"needs at least {MINIMUM_MARKERS} markers, got {len(markers)}"
     if not 0.0 < body.marker_diameter_mm < np.inf:
-        return f"marker_diameter_mm must be positive, got {body.marker_diameter_mm}"
+        reason = f"marker_diameter_mm must be positive, got {body.marker_diameter_mm}"
+        return ["marker_diameter_mm"], reason
+    if collinear(markers):
+        return ["markers_mm"], f"the {len(markers)} markers are collinear; turns about their line go unseen"
     apart = body.distances + np.where(np.eye(len(markers)), np.inf, 0.0)
     first, second = np.unravel_index(np.argmin(apart), apart.shape)
     if apart[first, second] < body.diameter:
-        return (
+        return ["markers_mm", int(second)], (
             f"markers {first + 1} and {second + 1} are {1e3 * apart[first, second]:.3g} mm apart, less than "
-            f"their diameter of {body.marker_diameter_mm:g} mm"
+            f"their diameter of {body.marker_diameter_mm:g} mm (are all coordinates in mm?)"
         )
-    return ""
+    return None

@@ -37,6 +37,8 @@ class MarkerCameraConfig:
     """Which cameras look at which body, and how well; read from a scenario file."""
 
     cell: str = "probst"  # a shipped cell or the path of a cell file
+    # The cell as the tracker knows it, such as `truetip cameras calibrate --write` makes; none: as it is.
+    calibration: str = ""
     body: str = "probst"  # a shipped detection body or the path of a body file
     features: FeatureConfig = field(default_factory=FeatureConfig)
     images: ImageConfig = field(default_factory=ImageConfig)
@@ -86,12 +88,20 @@ class MarkerCamera(LeafSystem):
         PoseCamera(config)  # refuses what no camera can be
         markers = markers or MarkerCameraConfig()
         cell, body = load_cell(markers.cell), load_body(markers.body)
-        cameras = cell.camera_model(robot.base.pose() if robot else None)
+        X_WB = robot.base.pose() if robot else None
+        cameras = cell.camera_model(X_WB)
+        known = load_cell(markers.calibration) if markers.calibration else cell
+        names, known_names = ([camera.name for camera in each.cameras] for each in (cell, known))
+        if known_names != names:
+            raise ValueError(
+                f"marker camera: the calibration {markers.calibration} must have the cameras of the cell, "
+                f"{', '.join(names)}, got {', '.join(known_names)}"
+            )
         self._config, self._level = config, level
         # Both are made, so that a wrong number is refused on either level.
         self._features = FeatureSource(cameras, cell.windows, body, markers.features)
         self._images = ImageBlobs(cameras, cell.windows, body, markers.images, markers.centroids)
-        self._tracker = Tracker(cameras, body, markers.tracker)
+        self._tracker = Tracker(known.camera_model(X_WB), body, markers.tracker)
         self._arm = ArmCapsules(robot) if robot else None
         self._lost_below = norm.ppf(config.dropout_probability)
         source = self._features if level == "features" else self._images

@@ -5,6 +5,7 @@ come from, or the word ``assumed``. Positions are those of the camera system's o
 gives them so); ``base`` is the robot's base B in that frame.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -14,6 +15,11 @@ from robots.model import Placement
 from robots.pose import rotation_from_zyx
 from systems.tracking.camera_model import Cameras
 from systems.tracking.data_file import data_file, read_data_file
+from systems.tracking.yaml_lines import line_of
+
+_IN_METRES = 20.0  # mm; a cell in metres by mistake is no larger, and two cameras are no nearer to each other
+
+_Problem = tuple[Sequence[str | int], str]  # a place in the file, and what is wrong there
 
 
 @dataclass
@@ -91,13 +97,15 @@ def load_cell(name: str) -> MeasuringCell:
     """Reads a shipped cell by name (``"probst"``) or any cell file by its path.
 
     Raises:
-        ValueError: if there is no such file, or it does not describe a cell; one line that names the file.
+        ValueError: if there is no such file, or it does not describe a cell; one line that names file and
+            line.
     """
     path = data_file(name, "cell")
     cell = read_data_file(path, MeasuringCell)
     problem = _problem(cell)
     if problem:
-        raise ValueError(f"cell file {path}: {problem}")
+        place, reason = problem
+        raise ValueError(f"cell file {path}, line {line_of(path, place)}: {reason}")
     return cell
 
 
@@ -115,38 +123,49 @@ def _aimed(ray_C: np.ndarray, direction: np.ndarray) -> np.ndarray:
     return np.column_stack([right, np.cross(axis, right), axis])
 
 
-def _problem(cell: MeasuringCell) -> str:
-    """The first reason why the cell is impossible, or an empty string."""
+def _problem(cell: MeasuringCell) -> _Problem | None:
+    """The first reason why the cell is impossible, or None."""
     if len(cell.cameras) < 2:
-        return f"needs at least two cameras, got {len(cell.cameras)}"
+        return ["cameras"], f"needs at least two cameras, got {len(cell.cameras)}"
     if not 0.0 < cell.frame_rate_hz < np.inf:
-        return f"frame_rate_hz must be positive, got {cell.frame_rate_hz}"
+        return ["frame_rate_hz"], f"frame_rate_hz must be positive, got {cell.frame_rate_hz}"
     if np.shape(cell.sensor_px) != (2,) or not np.all(np.asarray(cell.sensor_px) > 0.0):
-        return f"sensor_px must be a width and a height, got {cell.sensor_px}"
+        return ["sensor_px"], f"sensor_px must be a width and a height, got {cell.sensor_px}"
     if np.shape(cell.target_mm) != (3,) or not np.isfinite(cell.target_mm).all():
-        return f"target_mm must be three finite numbers, got {cell.target_mm}"
-    return next(filter(None, (_camera_problem(camera, cell) for camera in cell.cameras)), "")
+        return ["target_mm"], f"target_mm must be three finite numbers, got {cell.target_mm}"
+    for number, camera in enumerate(cell.cameras):
+        problem = _camera_problem(camera, cell)
+        if problem:
+            place, reason = problem
+            return ["cameras", number, *place], f"camera {camera.name}: {reason}"
+    return None
 
 
-def _camera_problem(camera: CellCamera, cell: MeasuringCell) -> str:
-    where, lens = f"camera {camera.name}", camera.lens
+def _camera_problem(camera: CellCamera, cell: MeasuringCell) -> _Problem | None:
+    lens = camera.lens
     sizes = {
-        "position_mm": (camera.position_mm, 3),
-        "window_px": (camera.window_px, 4),
-        "focal_length_px": (lens.focal_length_px, 2),
-        "principal_point_px": (lens.principal_point_px, 2),
-        "radial": (lens.radial, 3),
-        "tangential": (lens.tangential, 2),
+        ("position_mm",): (camera.position_mm, 3),
+        ("window_px",): (camera.window_px, 4),
+        ("lens", "focal_length_px"): (lens.focal_length_px, 2),
+        ("lens", "principal_point_px"): (lens.principal_point_px, 2),
+        ("lens", "radial"): (lens.radial, 3),
+        ("lens", "tangential"): (lens.tangential, 2),
     }
-    for name, (value, size) in sizes.items():
+    for place, (value, size) in sizes.items():
         if np.shape(value) != (size,) or not np.isfinite(value).all():
-            return f"{where}: {name} must be {size} finite numbers, got {value}"
+            return place, f"{place[-1]} must be {size} finite numbers, got {value}"
     if camera.zyx_deg and not (len(camera.zyx_deg) == 3 and np.isfinite(camera.zyx_deg).all()):
-        return f"{where}: zyx_deg must be three finite angles or none, got {camera.zyx_deg}"
+        return ["zyx_deg"], f"zyx_deg must be three finite angles or none, got {camera.zyx_deg}"
+    if 0.0 < np.linalg.norm(camera.position_mm) < _IN_METRES:
+        return [
+            "position_mm"
+        ], f"position_mm is {camera.position_mm}, hardly off the origin: is it in metres?"
     if not np.all(lens.focal_length_px > 0.0):
-        return f"{where}: focal_length_px must be positive, got {lens.focal_length_px}"
+        return ["lens", "focal_length_px"], (
+            f"focal_length_px must be positive, or the camera matrix is singular, got {lens.focal_length_px}"
+        )
     u0, v0, u1, v1 = camera.window_px
     width, height = cell.sensor_px
     if not (0 <= u0 < u1 <= width and 0 <= v0 < v1 <= height):
-        return f"{where}: window_px must lie in 0, 0, {width:g}, {height:g}, got {camera.window_px}"
-    return ""
+        return ["window_px"], f"window_px must lie in 0, 0, {width:g}, {height:g}, got {camera.window_px}"
+    return None

@@ -27,20 +27,27 @@ class PixelFit:
     count: int  # of the pixels (u, v) that were used
 
 
-def refine_pose(cameras: Cameras, p_E: np.ndarray, pixels: np.ndarray, X_WE: np.ndarray) -> PixelFit:
+def refine_pose(
+    cameras: Cameras, p_E: np.ndarray, pixels: np.ndarray, X_WE: np.ndarray, share: np.ndarray | None = None
+) -> PixelFit:
     """Gauss-Newton steps from a pose that is known well enough.
 
     Args:
         cameras: n cameras.
         p_E: markers in the tool's frame in m, shape (m, 3).
-        pixels: where they were seen, shape (n, m, 2), NaN where they were not.
+        pixels: where they were seen, shape (n, m, 2), NaN where they were not; behind them those of the
+            blobs of ``share``, (n, m + s, 2).
         X_WE: where to begin, homogeneous matrix (4, 4).
+        share: what markers have in the middles of s blobs that show more than one, (n, s, m), as
+            `systems.tracking.marker_images.shared_images` says; None for no such blobs.
 
     Raises:
         UndeterminedError: if the pixels do not determine the pose, or the steps lead nowhere.
     """
     for _ in range(_STEPS):
         predicted, J = linearize(cameras, p_E, X_WE)
+        if share is not None and share.size:
+            predicted, J = (np.concatenate([each, shared(each, share)], 1) for each in (predicted, J))
         step, fit = gauss_newton_step(predicted, J, pixels, X_WE)
         X_WE = fit.X_WE
         if np.abs(step).max() < _CONVERGED:
@@ -60,6 +67,19 @@ def linearize(cameras: Cameras, p_E: np.ndarray, X_WE: np.ndarray) -> tuple[np.n
     x, y, z = arm.T[:, :, None]
     turning = np.stack([y * jz - z * jy, z * jx - x * jz, x * jy - y * jx], -1)
     return pixels, np.concatenate([turning, J_point], -1)
+
+
+def shared(of_markers: np.ndarray, share: np.ndarray) -> np.ndarray:
+    """What holds for the middles of shared blobs: their share of what holds for the markers, (n, m, ...).
+
+    A row of ``share``, (n, s, m), that is zero gives NaN. The result has the shape (n, s, ...).
+    """
+    n, m = of_markers.shape[:2]
+    flat = of_markers.reshape(n, m, -1)
+    # A marker behind a camera is NaN there and has no share in anything.
+    mean = share @ np.where(np.isnan(flat), 0.0, flat)
+    mean[~share.any(2)] = np.nan
+    return mean.reshape(n, -1, *of_markers.shape[2:])
 
 
 def gauss_newton_step(

@@ -17,14 +17,21 @@ from systems.tracking.body_pose import body_pose, collinear
 from systems.tracking.camera_model import Cameras
 from systems.tracking.correspondence import SceneMatcher, blobs_of_points
 from systems.tracking.detection_body import MINIMUM_MARKERS, DetectionBody
-from systems.tracking.marker_images import marker_diameters, touching
+from systems.tracking.marker_images import marker_diameters, shared_images, touching
 from systems.tracking.marker_names import MarkerNames
 from systems.tracking.matching import match_to_prediction, unexplained_share
-from systems.tracking.pose_refinement import PixelFit, gauss_newton_step, linearize, moved
+from systems.tracking.pose_refinement import (
+    PixelFit,
+    gauss_newton_step,
+    linearize,
+    moved,
+    refine_pose,
+    shared,
+)
 from systems.tracking.triangulation import triangulate
 
 _STEPS = 8
-_NEARLY_CONVERGED, _CONVERGED = 1e-3, 1e-6  # m and rad; a step leaves an error of about its square
+_NEAR = 1e-3  # m and rad; a step of this size leaves an error of its square, a hundredth of a pixel
 _LARGEST_RATIO = 2.0  # of the scatter of the pixels to what is expected; chance matches have 3
 _MERGE_MARGIN = 1.05  # images nearer to each other than this many diameters may be one blob
 
@@ -69,7 +76,7 @@ class TrackedPose:
 
     valid: bool
     X_WE: np.ndarray  # homogeneous matrix (4, 4); where it was looked for last, if it is not valid
-    blobs: np.ndarray  # the index of the blob of each marker in each camera, -1 for none, (n, m)
+    blobs: np.ndarray  # of each marker in each camera the blob that it has alone, -1 for none, (n, m)
     fit: PixelFit | None = None  # accuracy and residual; None if it is not valid
     recovered: bool = False  # found without a prediction
     reason: str = ""  # why it is not valid
@@ -89,7 +96,8 @@ class Tracker:
         """Prepares geometry and names.
 
         Raises:
-            ValueError: if a number of the configuration is not positive.
+            ValueError: if a number of the configuration is not positive, or the body looks the same in two
+                ways.
         """
         self._config = config or TrackerConfig()
         _check(self._config)
@@ -98,6 +106,11 @@ class Tracker:
         self._gate = max(self._config.gate, self._fit_gate)
         self._scene = SceneMatcher(cameras, 1.5 * self._fit_gate, self._config.min_cameras)
         self._names = MarkerNames(body, self._config.distance_tolerance)
+        if self._names.name(body.p_E) is None:
+            raise ValueError(
+                f"body {body.name}: its markers look the same in two ways, within "
+                f"{1e3 * self._config.distance_tolerance:g} mm; move one to make it asymmetric"
+            )
 
     def predict(self, state: TrackerState, time: float) -> np.ndarray | None:
         """Where the body is expected at a time in s, (4, 4); None if it has not been seen for too long."""
@@ -147,27 +160,43 @@ class Tracker:
         return fit.X_WE
 
     def _lock(self, X_WE: np.ndarray, blobs: np.ndarray) -> TrackedPose:
-        """Matches and fits in turn, in ever narrower gates, and checks what has come out."""
-        gate, index, settled = self._gate, np.zeros(0), False
-        p_W = self._body.p_E @ X_WE[:3, :3].T + X_WE[:3, 3]
-        reach = _MERGE_MARGIN * marker_diameters(self._cameras, self._body, p_W)
+        """Fits the pose to all that can be told of the body from near a first guess, and checks it."""
+        try:
+            X_WE, expected = self._approached(X_WE, blobs)
+            diameters = self._diameters(X_WE)
+            share = shared_images(touching(expected, diameters), np.isfinite(expected[..., 0]), diameters)
+            # Matched once: a blob at the edge of its gate could come and go with every step.
+            shown = np.concatenate([expected, shared(expected, share)], 1)
+            index = match_to_prediction(shown, blobs, self._fit_gate)
+            fit = refine_pose(self._cameras, self._body.p_E, blobs_of_points(blobs, index), X_WE, share)
+        except UndeterminedError as error:
+            return self._lost(X_WE, str(error))
+        index = index[:, : len(self._body)]
+        problem = self._doubt(fit, index, expected, blobs)
+        return self._lost(X_WE, problem) if problem else TrackedPose(True, fit.X_WE, index, fit)
+
+    def _approached(self, X_WE: np.ndarray, blobs: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """The pose (4, 4) after steps in ever narrower gates, by markers whose images stand alone.
+
+        Also where it shows the markers, px, shape (n, m, 2).
+
+        Raises:
+            UndeterminedError: if they do not determine it, or it does not come to rest.
+        """
+        gate, reach = self._gate, _MERGE_MARGIN * self._diameters(X_WE)
         for _ in range(_STEPS):
             expected, J = linearize(self._cameras, self._body.p_E, X_WE)
-            if not settled:  # afterwards a blob at the edge of its gate could come and go with every step
-                crowded = np.any(touching(expected, reach), axis=2)  # images that may be one blob
-                index = match_to_prediction(np.where(crowded[..., None], np.nan, expected), blobs, gate)
-                settled = gate == self._fit_gate
-            try:
-                step, fit = gauss_newton_step(expected, J, blobs_of_points(blobs, index), X_WE)
-            except UndeterminedError as error:
-                return self._lost(X_WE, str(error))
-            X_WE, size = fit.X_WE, np.abs(step).max()
-            if settled and size < _CONVERGED:
-                problem = self._doubt(fit, index, expected, blobs)
-                return self._lost(X_WE, problem) if problem else TrackedPose(True, X_WE, index, fit)
-            # The gate closes as the pose comes to rest in it.
-            gate = self._fit_gate if size < _NEARLY_CONVERGED else max(0.5 * gate, self._fit_gate)
-        return self._lost(X_WE, "the pose does not come to rest")
+            crowded = np.any(touching(expected, reach), axis=2)
+            index = match_to_prediction(np.where(crowded[..., None], np.nan, expected), blobs, gate)
+            step, fit = gauss_newton_step(expected, J, blobs_of_points(blobs, index), X_WE)
+            X_WE = fit.X_WE
+            if np.abs(step).max() < _NEAR:
+                return X_WE, expected + J @ step
+            gate = max(0.5 * gate, self._fit_gate)
+        raise UndeterminedError("the pose does not come to rest")
+
+    def _diameters(self, X_WE: np.ndarray) -> np.ndarray:
+        return marker_diameters(self._cameras, self._body, self._body.p_E @ X_WE[:3, :3].T + X_WE[:3, 3])
 
     def _doubt(self, fit: PixelFit, index: np.ndarray, expected: np.ndarray, blobs: np.ndarray) -> str:
         """The first reason why a fitted pose should not be believed, or an empty string."""

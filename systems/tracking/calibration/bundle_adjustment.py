@@ -36,7 +36,9 @@ class Scene:
     wand_pixels: np.ndarray  # (n, f, 2, 2), the third axis is the end
     wand_length: float  # m
     wand_sigma: float = 1e-5  # m, standard deviation of the length as it is known
-    pixel_sigma: float = 0.1  # px, expected along u and v
+    pixel_sigma: float = 0.1  # px, expected along u and v of one exposure
+    # Of how many exposures the pixels of the known points are the mean, (n, k); None for one.
+    known_exposures: np.ndarray | None = None
 
 
 @dataclass(frozen=True)
@@ -110,8 +112,10 @@ class _Linearized:
         self.known_residual = scene.known_pixels - known
         self.wand_residual = (seen - wand).reshape(n, f, 2, 2)
         lost = np.isnan(known) & ~np.isnan(scene.known_pixels), np.isnan(wand) & ~np.isnan(seen)
-        r_known, J_known, _ = _weighted(self.known_residual, J_known, J_known, scene.pixel_sigma)
-        r_wand, J_wand, J_point = _weighted(seen - wand, J_wand, J_point, scene.pixel_sigma)
+        averaged = np.ones(known.shape[:2]) if scene.known_exposures is None else scene.known_exposures
+        known_sigma = scene.pixel_sigma / np.sqrt(np.maximum(averaged, 1))[..., None]
+        r_known, J_known, _ = _weighted(self.known_residual, J_known, J_known, known_sigma)
+        r_wand, J_wand, J_point = _weighted(seen - wand, J_wand, J_point, np.array([scene.pixel_sigma]))
         self._A = _gram(J_known) + _gram(J_wand)  # (n, 15, 15)
         self._a = _pull(J_known, r_known) + _pull(J_wand, r_wand)  # (n, 15)
         # (n, 15, 2 f, 3) to (15 n, f, 6): what cameras and places have to do with each other.
@@ -170,14 +174,14 @@ class _Linearized:
 
 
 def _weighted(
-    residual: np.ndarray, J: np.ndarray, J_point: np.ndarray, sigma: float
+    residual: np.ndarray, J: np.ndarray, J_point: np.ndarray, sigma: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Over sigma, and zero where nothing was seen."""
+    """Over sigma (..., 1), and zero where nothing was seen."""
     seen = ~np.isnan(residual)
     return (
         np.where(seen, residual, 0.0) / sigma,
-        np.where(seen[..., None], J, 0.0) / sigma,
-        np.where(seen[..., None], J_point, 0.0) / sigma,
+        np.where(seen[..., None], J, 0.0) / sigma[..., None],
+        np.where(seen[..., None], J_point, 0.0) / sigma[..., None],
     )
 
 

@@ -33,6 +33,16 @@ def moved_cameras(cameras: Cameras, change: np.ndarray) -> Cameras:
     )
 
 
+def change_between(cameras: Cameras, others: Cameras) -> np.ndarray:
+    """The change (n, 15) that makes others of cameras; the inverse of `moved_cameras`."""
+    turn = others.R_CW @ cameras.R_WC
+    shift = others.p_CW - (turn @ cameras.p_CW[:, :, None])[:, :, 0]
+    lens = (
+        getattr(others, name) - getattr(cameras, name) for name in ("focal", "center", "radial", "tangential")
+    )
+    return np.hstack([*lens, Rotation.from_matrix(turn).as_rotvec(), shift])
+
+
 def project_with_parameters(cameras: Cameras, p_W: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Pixels and all their derivatives.
 

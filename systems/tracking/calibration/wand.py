@@ -13,7 +13,9 @@ class CalibrationKit:
     """Two bodies of known size. The frame defines the camera system's own frame Q: origin, axes and scale."""
 
     wand_length_mm: float = 601.7  # between the centres of the two spheres at its ends; assumed
-    wand_sigma_mm: float = 0.01  # standard deviation of that length; assumed
+    # Standard deviation of that length from place to place, for a wand bends; assumed. What it is wrong by
+    # everywhere scales the whole cell, and no calibration can know it.
+    wand_sigma_mm: float = 0.01
     # The spheres of the L-frame in Q, L1 at the origin, L2 and L3 on the x axis, L4 on the y axis; assumed.
     frame_mm: np.ndarray = field(
         default_factory=lambda: np.array(
@@ -32,6 +34,7 @@ class WandRun:
     """What n cameras saw of the frame, and of the wand in f places; NaN where they saw nothing."""
 
     frame_pixels: np.ndarray  # the mean over all exposures, (n, k, 2)
+    frame_exposures: np.ndarray  # of how many it is the mean, (n, k)
     wand_pixels: np.ndarray  # the third axis is the end, (n, f, 2, 2)
 
 
@@ -71,8 +74,9 @@ def simulate_wand_run(
     Raises:
         ValueError: if a number is out of its range.
     """
-    if run.places < 1 or run.frame_exposures < 1:
-        raise ValueError(f"wand run: places must be at least 1, got {run.places}")
+    for name in ("places", "frame_exposures"):
+        if getattr(run, name) < 1:
+            raise ValueError(f"wand run: {name} must be at least 1, got {getattr(run, name)}")
     if not (run.pixel_sigma >= 0.0 and 0.0 <= run.false_share < 1.0):
         raise ValueError(f"wand run: pixel_sigma must not be negative, got {run.pixel_sigma} px")
     # A slow tour through the volume and a faster turning, with periods that never meet again.
@@ -83,14 +87,16 @@ def simulate_wand_run(
     along = np.sin(turning) + 1e-3
     along /= np.linalg.norm(along, axis=1, keepdims=True)
     middle = 1e-3 * (run.middle_mm + run.reach_mm * tour)
-    half = 0.5e-3 * kit.wand_length_mm * along
+    length = 1e-3 * (kit.wand_length_mm + kit.wand_sigma_mm * rng.standard_normal((run.places, 1)))
+    half = 0.5 * length * along
     wand = np.stack([middle - half, middle + half], axis=1)
     wand_pixels = _seen(cameras, sensor_px, wand.reshape(-1, 3), run.pixel_sigma, rng)
     false = rng.uniform(size=wand_pixels.shape[:2]) < run.false_share
     wand_pixels[false] += rng.uniform(5.0, 50.0, (false.sum(), 2))
     frame_sigma = run.pixel_sigma / np.sqrt(run.frame_exposures)
     frame_pixels = _seen(cameras, sensor_px, kit.p_Q, frame_sigma, rng)
-    return WandRun(frame_pixels, wand_pixels.reshape(len(cameras), run.places, 2, 2)), wand
+    exposures = np.where(np.isnan(frame_pixels[..., 0]), 0, run.frame_exposures)
+    return WandRun(frame_pixels, exposures, wand_pixels.reshape(len(cameras), run.places, 2, 2)), wand
 
 
 def _seen(

@@ -83,6 +83,7 @@ def calibrate_with_wand(
         1e-3 * kit.wand_length_mm,
         1e-3 * kit.wand_sigma_mm,
         pixel_sigma,
+        run.frame_exposures,
     )
     cameras = placed_cameras(guess, scene, names)
     everything = ~np.isnan(pixels[..., 0])

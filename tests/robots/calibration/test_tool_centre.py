@@ -28,10 +28,11 @@ def tilts(rng: np.random.Generator, count: int = POSES, largest: float = 0.6) ->
     return rng.uniform(-largest, largest, (count, 3))
 
 
-@given(st.integers(0, 2**32 - 1), st.integers(3, 20))
+@given(st.integers(0, 2**32 - 1), st.integers(4, 20))
 def test_exact_poses_give_the_tool_exactly(seed: int, count: int):
+    """From four on: one in some thousand triples turns about one axis only, which is refused."""
     tool = tool_centre(flange_poses(tilts(np.random.default_rng(seed), count, 1.0)))
-    # Three random orientations may be nearly about one axis, which loses digits.
+    # A few random orientations may be nearly about one axis, which loses digits.
     assert tool.p_FE == pytest.approx(TOOL, abs=1e-11)
     assert tool.p_BP == pytest.approx(PIVOT, abs=1e-11)
     assert tool.statistics.outliers == ()

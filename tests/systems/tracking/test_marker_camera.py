@@ -1,6 +1,8 @@
 """The marker camera in a diagram: ports, stamps and delays of the pose camera, and errors of its own."""
 
 from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -14,12 +16,14 @@ from robots.model import load_robot
 from robots.pose import pose_error
 from systems.camera import BLOCK, CameraConfig, PoseCamera
 from systems.samples import PoseSample
+from systems.tracking.cell_file import cell_text, with_cameras
 from systems.tracking.centroids import CentroidConfig
 from systems.tracking.features import FeatureConfig
 from systems.tracking.images import ImageConfig
 from systems.tracking.marker_camera import MarkerCamera, MarkerCameraConfig
 from systems.tracking.tracker import TrackerConfig
 from tests.systems.rigs import ValueSignal, VectorSignal, pose
+from tests.systems.tracking.rigs import CELL
 
 ROBOT = load_robot("irb1200")
 Q = np.array([0.3, 0.4, 0.2, 0.1, 0.5, -0.2])
@@ -196,6 +200,30 @@ def test_by_images_the_seed_decides_the_noise():
     )
     np.testing.assert_array_equal(once, again)
     assert not np.isclose(once, other, rtol=0.0, atol=1e-9).any()
+
+
+def shifted_cell(folder: Path, by_mm: float, cameras: int = 10) -> str:
+    """The file of a cell whose cameras, or the first of them, are believed to stand beside their places."""
+    true = CELL.camera_model(CELL.base.pose())
+    believed = replace(true, p_WC=true.p_WC + 1e-3 * by_mm)
+    cell = with_cameras(CELL, believed, "shifted")
+    (folder / "shifted.yaml").write_text(cell_text(replace(cell, cameras=cell.cameras[:cameras])))
+    return str(folder / "shifted.yaml")
+
+
+@pytest.mark.parametrize("level", ["features", "images"])
+def test_a_calibration_that_is_off_moves_the_pose_with_it(tmp_path: Path, level: str):
+    """2 mm along each axis: so is the pose then, and cameras and pixels agree none the less."""
+    markers = replace(EXACT, calibration=shifted_cell(tmp_path, 2.0))
+    found = each_exposure(CameraConfig(), markers, 3, level)
+    np.testing.assert_allclose(np.abs(errors(found)[:, 3:]), 2e-3, atol=2e-5)
+    assert found[-1].residual < 1e-5
+
+
+def test_a_calibration_of_other_cameras_is_refused(tmp_path: Path):
+    markers = MarkerCameraConfig(calibration=shifted_cell(tmp_path, 0.0, cameras=9))
+    with pytest.raises(ValueError, match=r"must have the cameras of the cell, 01, .* 10, got 01, .* 09$"):
+        MarkerCamera(CameraConfig(), markers)
 
 
 def test_refuses_a_level_that_does_not_exist():

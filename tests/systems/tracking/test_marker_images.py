@@ -2,7 +2,13 @@
 
 import numpy as np
 
-from systems.tracking.marker_images import marker_diameters, merged_images, touching
+from systems.tracking.marker_images import (
+    image_shares,
+    marker_diameters,
+    merged_images,
+    shared_images,
+    touching,
+)
 from tests.systems.tracking.rigs import BODY, CAMERAS, placed, random_pose
 
 
@@ -33,3 +39,25 @@ def test_touching_markers_shine_as_one_amid_them_weighted_by_size():
     np.testing.assert_array_equal(centers[0, [0, 3]], pixels[0, [0, 3]])
     centers, _ = merged_images(pixels, seen, np.array([[16.0, 4.0, 10.0, 1.0]]))
     np.testing.assert_allclose(centers[0, 0], [9.0 * 4.0**2 / (16.0**2 + 4.0**2), 0.0])
+
+
+def test_every_marker_that_is_seen_has_a_share_in_one_blob():
+    rng = np.random.default_rng(0)
+    pixels, diameters = rng.uniform(0.0, 60.0, (40, 9, 2)), rng.uniform(5.0, 12.0, (40, 9))
+    close, seen = touching(pixels, diameters), rng.uniform(size=(40, 9)) < 0.8
+    share = image_shares(close, seen, diameters)
+    np.testing.assert_array_equal(np.count_nonzero(share, axis=1), seen)  # in one blob, or none
+    np.testing.assert_allclose(share.sum(2), share.any(2))
+    together = (share.swapaxes(1, 2) > 0.0).astype(float) @ (share > 0.0) > 0.0
+    both = seen[:, :, None] & seen[:, None]
+    assert np.all(together[close & both])
+    shared = shared_images(close, seen, diameters)
+    assert shared.any(2).sum() == np.sum(np.count_nonzero(share, axis=2) > 1) >= 20
+
+
+def test_lone_markers_share_nothing():
+    pixels = np.array([[[0.0, 0], [50, 0], [0, 50]]])
+    diameters, seen = np.full((1, 3), 8.0), np.ones((1, 3), bool)
+    close = touching(pixels, diameters)
+    np.testing.assert_array_equal(image_shares(close, seen, diameters), [np.eye(3)])
+    assert shared_images(close, seen, diameters).shape == (1, 0, 3)

@@ -6,7 +6,7 @@ from scipy.spatial.transform import Rotation
 
 from robots.calibration.least_squares import UndeterminedError
 from robots.pose import pose_error
-from systems.tracking.pose_refinement import linearize, moved, refine_pose
+from systems.tracking.pose_refinement import linearize, moved, refine_pose, shared
 from tests.systems.tracking.rigs import BODY, CAMERAS, placed, random_pose
 
 RNG = np.random.default_rng(0)
@@ -54,6 +54,27 @@ def test_the_spread_is_the_predicted_covariance_and_the_cramer_rao_bound():
     np.testing.assert_allclose(whitened.std(axis=1), 1.0, rtol=allowed)
     np.testing.assert_allclose(np.corrcoef(whitened), np.eye(6), atol=4.0 / np.sqrt(n))
     assert np.mean([fit.sigma for fit in fits]) == pytest.approx(sigma, rel=0.01)
+
+
+def test_blobs_that_two_markers_share_say_what_their_middle_says():
+    """With shared blobs alone, 0.3 of one marker and 0.7 of the next, the pose is exact all the same."""
+    X, m = random_pose(RNG), len(BODY)
+    share = np.tile(0.3 * np.eye(m) + 0.7 * np.roll(np.eye(m), 1, axis=1), (len(CAMERAS), 1, 1))
+    share[:, -1] = 0.0  # a row without a blob
+    true = CAMERAS.project(placed(X, BODY.p_E))
+    middles = shared(true, share)
+    np.testing.assert_allclose(middles[:, 0], 0.3 * true[:, 0] + 0.7 * true[:, 1])
+    assert np.isnan(middles[:, -1]).all()
+    pixels = np.concatenate([np.full_like(true, np.nan), middles], axis=1)
+    start = moved(X, np.full(6, 0.01))
+    fit = refine_pose(CAMERAS, BODY.p_E, pixels, start, share)
+    np.testing.assert_allclose(fit.X_WE, X, atol=1e-11)
+    assert fit.count == len(CAMERAS) * (m - 1)
+
+
+def test_a_marker_behind_a_camera_has_no_share_in_its_blobs():
+    of_markers = np.array([[[1.0, 2.0], [np.nan, np.nan], [3.0, 4.0]]])
+    np.testing.assert_allclose(shared(of_markers, np.array([[[0.5, 0.0, 0.5]]])), [[[2.0, 3.0]]])
 
 
 def test_a_motion_turns_about_the_origin_of_the_tool_and_shifts_in_the_world():

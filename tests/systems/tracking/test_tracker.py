@@ -163,6 +163,31 @@ def test_pixels_that_scatter_more_than_expected_are_refused():
     assert "px are expected" in found.reason
 
 
+def test_all_that_is_seen_is_used_merged_blobs_too():
+    """The Cramer-Rao bound of the blobs, by finite differences of what the cameras report, is allowed 2 %.
+
+    Lost is only what is too near to something else to be told from it.
+    """
+    source, nothing = FeatureSource(CAMERAS, CELL.windows, BODY, FeatureConfig(0.0)), np.zeros(1_000)
+    rng, h, merged = np.random.default_rng(9), 1e-7, 0
+    for _ in range(20):
+        X = random_pose(rng, 0.2)
+
+        def seen(pose: np.ndarray) -> np.ndarray:
+            return source.blobs(pose, nothing[: source.noise_size])
+
+        blobs = seen(X)
+        columns = [(seen(moved(X, h * axis)) - seen(moved(X, -h * axis))) / (2 * h) for axis in np.eye(6)]
+        J = np.stack(columns, -1)[~np.isnan(blobs)]
+        bound = np.sqrt(np.diag(np.linalg.inv(J.T @ J)))
+        fit = TRACKER.track(TrackerState(0.0, X), PERIOD, blobs)[1].fit
+        assert fit is not None
+        ratio = np.sqrt(np.diag(fit.cofactor)) / bound
+        assert 0.999 < ratio.min() <= ratio.max() < 1.02
+        merged += np.sum(~np.isnan(blobs[..., 0])) < len(CAMERAS) * len(BODY)
+    assert merged == 20  # there are some in every pose
+
+
 def test_the_residual_is_the_standard_deviation_of_the_position():
     """500 measurements of three axes tell it to 1.8 %; four times that."""
     rng, X = np.random.default_rng(8), random_pose(np.random.default_rng(8), 0.1)
@@ -182,6 +207,13 @@ def test_the_memory_is_a_vector():
     np.testing.assert_array_equal(again.X_WE, state.X_WE)
     np.testing.assert_array_equal(again.V_WE, state.V_WE)
     assert TrackerState.from_vector(TrackerState().to_vector()).time == -np.inf
+
+
+def test_a_body_that_looks_the_same_in_two_ways_is_refused():
+    square = np.array([[0, 0, 0], [100, 0, 0], [100, 100, 0], [0, 100, 0], [50, 50, 40]])
+    with pytest.raises(ValueError, match="look the same in two ways, within 1 mm"):
+        Tracker(CAMERAS, replace(BODY, markers_mm=square))
+    Tracker(CAMERAS, replace(BODY, markers_mm=square + np.eye(5, 3) * [10, 10, 10]))
 
 
 @pytest.mark.parametrize("name", ["gate", "pixel_sigma", "coast"])

@@ -6,6 +6,7 @@ import pytest
 from systems.tracking.calibration.camera_parameters import (
     NAMES,
     NUM,
+    change_between,
     moved_cameras,
     project_with_parameters,
 )
@@ -40,6 +41,11 @@ def test_no_change_changes_nothing_and_a_turn_leaves_a_rotation():
     np.testing.assert_allclose(same.p_WC, CAMERAS.p_WC, atol=1e-12)
     turned = moved_cameras(CAMERAS, np.full((4, NUM), 0.3))
     np.testing.assert_allclose(turned.R_WC @ turned.R_CW, np.tile(np.eye(3), (4, 1, 1)), atol=1e-12)
+
+
+def test_a_change_is_found_again():
+    change = RNG.uniform(-0.5, 0.5, (4, NUM))
+    np.testing.assert_allclose(change_between(CAMERAS, moved_cameras(CAMERAS, change)), change, atol=1e-12)
 
 
 def test_points_behind_a_camera_have_no_pixels():
