@@ -63,7 +63,7 @@ class StationConfig:
 
     kind: str = "simulated"  # or egm: a controller and a camera at the addresses of ``link``
     period: float = 4e-3  # s, between two commands and between two joint samples
-    elasticity: str = "joints"  # of the true robot: rigid or joints
+    elasticity: str = "joints"  # of the true robot: rigid, joints or structure
     payload: float = 0.0  # kg at the flange
     errors: GeometricErrors = field(default_factory=GeometricErrors)
     drive: DriveConfig = field(default_factory=DriveConfig)

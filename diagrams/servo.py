@@ -10,6 +10,9 @@ from systems.guard import CommandGuard
 from systems.reference import Reference
 from systems.servo import BLIND_LAWS, LAWS, LawConfig
 
+# Laws whose position commands start from where the motors are: the gears are wound up there already.
+_FROM_MOTORS = ("pbvs",)
+
 
 class Servo(Diagram):
     """Reference, law and guard.
@@ -81,10 +84,10 @@ class Servo(Diagram):
                 source = self.reference.GetOutputPort(f"{name}_preview")
                 builder.Connect(source, ahead.GetInputPort(f"{name}_desired"))
             builder.ConnectInput(joints, ahead.GetInputPort("joint_sample"))
-            for name, offset in (
-                ("position_command", "position_offset"),
-                ("velocity_command", "velocity_offset"),
-            ):
+            offsets = {"velocity_command": "velocity_offset"}
+            if law not in _FROM_MOTORS:
+                offsets["position_command"] = "position_offset"
+            for name, offset in offsets.items():
                 total = builder.AddNamedSystem(f"{name}_with_feedforward", Adder(2, NUM_JOINTS))
                 builder.Connect(commands[name], total.get_input_port(0))
                 builder.Connect(ahead.GetOutputPort(offset), total.get_input_port(1))

@@ -22,6 +22,7 @@ from systems.camera import BLOCK, PoseCamera
 from systems.drive import Drive
 from systems.egm.motion import EgmMotion
 from systems.joint_sensor import JointSensor
+from systems.stiffening_gears import stiffening_gears
 from systems.tip_pose import TipPose
 from systems.tracking.marker_camera import MarkerCamera
 
@@ -118,6 +119,11 @@ class SimulatedStation(Diagram):
             no_torque = builder.AddNamedSystem("no_feedforward", ConstantVectorSource(np.zeros(NUM_JOINTS)))
             builder.Connect(no_torque.get_output_port(), ahead)
         builder.Connect(self.drive.GetOutputPort("joint_torque"), self.plant.get_actuation_input_port())
+        if self.robot.stiffening_gears is not None:
+            stiffening = builder.AddNamedSystem("stiffening_gears", stiffening_gears(self.robot))
+            builder.Connect(state, stiffening.get_input_port())
+            port = self.plant.get_applied_generalized_force_input_port()
+            builder.Connect(stiffening.get_output_port(), port)
         builder.Connect(motor_state.get_output_port(), sensor.GetInputPort("motor_state"))
         builder.Connect(torque, sensor.GetInputPort("motor_torque"))
         builder.Connect(state, tip.GetInputPort("state"))
@@ -170,7 +176,8 @@ class SimulatedStation(Diagram):
         K, D = np.zeros(n), np.zeros(n)
         K[motors], D[motors] = stiffness, damping
         sprung = self.robot.sprung
-        K[[joint.position_start() for joint in sprung]] = self.robot.sprung_stiffness
+        rows = [joint.position_start() for joint in sprung]
+        K[rows] = self.robot.tangent_stiffness(self.plant.GetPositions(context)[rows])
         for joint in (*self.robot.motors, *sprung):
             D[joint.velocity_start()] += joint.default_damping()
         M_inverse = np.linalg.inv(self.plant.CalcMassMatrix(context))

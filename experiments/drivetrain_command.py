@@ -57,7 +57,7 @@ def drivetrain_command(
     rows = [[name, "yes" if part.invertible else "no"] for name, part in PARTS.items()]
     parameters = [
         *([name, f"T = {T} s, psi = {psi}, n = {n}"] for name, (T, psi, n) in PLAY_APPROXIMATIONS.items()),
-        ["hysteresis and its inverse", f"w = {WEIGHTS}, r = {THRESHOLDS}"],
+        ["hysteresis and its exact inverse", f"w = {WEIGHTS}, r = {THRESHOLDS}"],
     ]
     with refusing(OSError), ExitStack() as stack:
         page = stack.enter_context(staged_file(out))
@@ -65,18 +65,33 @@ def drivetrain_command(
         sections = [
             Section(
                 "Friction",
-                "Figure 2.3; its numbers are assumed, the source shows none.",
+                "Figure 2.3: the torque of a joint over its velocity, in three parts that join smoothly. Its "
+                "numbers are assumed, the source shows none.",
                 friction_figure(),
                 360,
             ),
             Section(
                 "Efficiency",
-                "Figure 2.4: a ramp of torque through a gear with losses.",
+                "Figure 2.4: a ramp of torque drives two inertias through a gear with losses. Friction holds "
+                "it at first; later the direction in which power flows decides what is lost.",
                 efficiency_figure(),
                 360,
             ),
-            Section("Play", "Figure 2.5: a gap and its smooth substitute.", backlash_figure(), 380),
-            Section("Hysteresis", "Figure 2.6.", hysteresis_figure(), 420),
+            Section(
+                "Play",
+                "Figure 2.5: a gap between teeth, in which nothing is transmitted, and a smooth substitute "
+                "that an inverse model can follow; it yields more when it is slow. On the right, near zero.",
+                backlash_figure(),
+                380,
+            ),
+            Section(
+                "Hysteresis",
+                "Figure 2.6. On the left the play operator, which moves only when it is pushed, and three "
+                "smooth approximations of the table below. On the right a hysteresis, and what is left of it "
+                "behind its inverse: a straight line.",
+                hysteresis_figure(),
+                420,
+            ),
             Section(
                 "Parameters of table 2.1",
                 "Corrected: thresholds begin with zero, and psi is meant where the table says s.",

@@ -22,11 +22,7 @@ EFFICIENCY = SmoothEfficiency(
 # Table 2.1. The thresholds begin with zero and psi is meant where the table says s (errata).
 WEIGHTS = (0.2, 0.2, 0.2, 0.2, 0.2)
 THRESHOLDS = (0.0, 0.2, 0.3, 0.4, 0.5)
-PLAY_APPROXIMATIONS = {
-    "P1: T = 0.01 s, psi = 50, n = 6": (0.01, 50.0, 6),
-    "P2: T = 0.01 s, psi = 25, n = 3": (0.01, 25.0, 3),
-    "P3: T = 0.1 s, psi = 25, n = 3": (0.1, 25.0, 3),
-}
+PLAY_APPROXIMATIONS = {"P1": (0.01, 50.0, 6), "P2": (0.01, 25.0, 3), "P3": (0.1, 25.0, 3)}  # T, psi, n
 
 
 def friction_figure() -> go.Figure:
@@ -78,17 +74,22 @@ def backlash_figure() -> go.Figure:
     """Figure 2.5: a gap, and the visco-elastic substitute, under a slow and a fast deflection."""
     gap = Backlash(CubicSpring(2e4, 2e4), 0.0, 0.004)
     smooth = ViscoElasticGear(CubicSpring(500.0, 7e5), 4e3, 500.0, 60.0)
-    figure = go.Figure()
     phi = 0.01 * np.sin(np.linspace(0.0, 4.0 * np.pi, 8001))
-    trace = gap.torque(phi, np.zeros_like(phi))
-    figure.add_trace(go.Scatter(x=phi[4000:], y=trace[4000:], name="gap of 4 mrad"))
+    curves = {"gap of 4 mrad": gap.torque(phi, np.zeros_like(phi))}
     for frequency in (0.5, 10.0):
         dt, x, torques = 2.0 / frequency / 8000, np.array(0.0), []
         for angle in phi:
             torques.append(float(smooth.torque(np.array(angle), x)))
             x = x + dt * smooth.rate(np.array(angle), x)
-        figure.add_trace(go.Scatter(x=phi[4000:], y=torques[4000:], name=f"visco-elastic, {frequency:g} Hz"))
-    return figure.update_layout(xaxis={"title": "deflection in rad"}, yaxis={"title": "torque in N m"})
+        curves[f"visco-elastic, {frequency:g} Hz"] = np.array(torques)
+    figure, cycle = make_subplots(1, 2, subplot_titles=["play", "near zero"]), slice(4000, None)
+    for (name, torque), color in zip(curves.items(), ("#2c3e50", "#0f7cc0", "#e0a030"), strict=True):
+        for column in (1, 2):
+            line, group = {"color": color}, {"legendgroup": name, "showlegend": column == 1}
+            trace = go.Scatter(x=1e3 * phi[cycle], y=torque[cycle], name=name, line=line, **group)
+            figure.add_trace(trace, 1, column)
+    figure.update_xaxes(title="deflection in mrad").update_xaxes(range=[-3.5, 3.5], col=2)
+    return figure.update_yaxes(title="torque in N m", col=1).update_yaxes(range=[-45, 45], col=2)
 
 
 def hysteresis_signal() -> tuple[np.ndarray, float]:

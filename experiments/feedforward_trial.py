@@ -109,11 +109,9 @@ def commands(trial: Trial, times: np.ndarray, period: float) -> np.ndarray:
     model = FEEDFORWARDS[trial.config.kind](trial.robot, trial.config, period, trial.payload)
     memory, rows = model.fresh_memory(), []
     for reference in references(trial, times):
-        offsets = model.offsets(reference, memory)
-        memory = offsets.memory
-        rows.append(
-            (reference.position + offsets.position, reference.velocity + offsets.velocity, offsets.torque)
-        )
+        answer = model.answer(reference, memory)
+        memory = answer.memory
+        rows.append((answer.position, answer.velocity, answer.torque))
     return np.array(rows)
 
 

@@ -2,11 +2,10 @@
 
 import sys
 import time
-from collections.abc import Callable
+from collections.abc import Sequence
 from contextlib import ExitStack
-from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated
 
 import numpy as np
 import typer
@@ -17,59 +16,14 @@ from rich.table import Table
 
 from experiments.console import progress_bar, refusing
 from experiments.metrics import json_text, write_json
+from experiments.modes_study import SHOWN_MODES, ModalStudy, modes_json, spread, study_modes
 from experiments.modes_view import frequency_figure, show_mode, write_animation
 from experiments.plot_page import Section, html_table, write_plot_page
 from experiments.staging import staged_file
-from robots.model import RobotModel, load_robot
-from robots.modes import ModalAnalysis, Modes, stretched
+from robots.model import load_robot
 
-SHOWN_MODES = 6
-JOINTS_HEAD = "yielding joints"
-HEAD = ("mode", "Hz", "damp. %", JOINTS_HEAD, "min Hz", "median", "max Hz")
-
-
-@dataclass(frozen=True)
-class ModalStudy:
-    """The modes of one robot, stretched and over a grid of its axes 2 and 3; all other axes at zero."""
-
-    robot: RobotModel
-    elasticity: str
-    payload: float  # kg
-    theta: np.ndarray  # (6,) rad, the stretched position
-    stretched: Modes
-    axis_2: np.ndarray  # (n,) rad
-    axis_3: np.ndarray  # (m,) rad
-    frequency_hz: np.ndarray  # (n, m, shown modes)
-    damping_ratio: np.ndarray  # (n, m, shown modes)
-
-
-def study_modes(
-    robot: RobotModel,
-    elasticity: str,
-    payload: float,
-    grid: int,
-    progress: Callable[[float], None] | None = None,
-) -> ModalStudy:
-    """Finds the modes at grid x grid positions of axes 2 and 3 within their limits.
-
-    Raises:
-        ValueError: if the grid is too small, or `ModalAnalysis` refuses the robot.
-    """
-    if grid < 2:
-        raise ValueError(f"--grid must be at least 2, got {grid}")
-    analysis = ModalAnalysis(robot, elasticity, payload)
-    theta = stretched(robot)
-    axis_2, axis_3 = np.linspace(robot.lower[1:3], robot.upper[1:3], grid).T
-    frequency, damping = np.empty((2, grid, grid, SHOWN_MODES))
-    for i, q2 in enumerate(axis_2):
-        for j, q3 in enumerate(axis_3):
-            modes = analysis.at(np.array([0.0, q2, q3, 0.0, 0.0, 0.0]))
-            frequency[i, j] = modes.frequency_hz[:SHOWN_MODES]
-            damping[i, j] = modes.damping_ratio[:SHOWN_MODES]
-        if progress:
-            progress((i + 1) / grid)
-    at_reach = analysis.at(theta)
-    return ModalStudy(robot, elasticity, payload, theta, at_reach, axis_2, axis_3, frequency, damping)
+STRETCHED_HEAD = ("mode", "Hz", "damp. %", "tip", "yielding joints")
+WORKSPACE_HEAD = ("mode", "Hz", "median", "damp. %", "tip", "yielding joints")
 
 
 def modes_command(
@@ -115,7 +69,10 @@ def modes_command(
             write_json(copy, modes_json(study))
     if json_file == "-":
         sys.stdout.write(json_text(modes_json(study)))
-    human.print(modes_table(study))
+    title = f"{model.name}, {mass:g} kg, motors held, stretched"
+    human.print(_table(title, STRETCHED_HEAD, stretched_rows(study, joints=3)))
+    title = f"over {grid} x {grid} positions of axes 2 and 3"
+    human.print(_table(title, WORKSPACE_HEAD, workspace_rows(study, joints=2)))
     human.print(escape(modes_verdict(study)))
     for path in (out, animation):
         human.print(escape(str(path)), soft_wrap=True)
@@ -125,17 +82,42 @@ def modes_command(
             _wait(human)
 
 
-def modes_rows(study: ModalStudy, num_joints: int) -> list[list[str]]:
-    """A row for each shown mode: where stretched with the joints that yield most, then over the grid."""
+def stretched_rows(study: ModalStudy, joints: int) -> list[list[str]]:
+    """A row for each shown mode where the arm is stretched, with the joints that yield most."""
+    return [
+        [
+            str(k + 1),
+            f"{study.stretched.frequency_hz[k]:.2f}",
+            f"{100.0 * study.stretched.damping_ratio[k]:.1f}",
+            *_shape(study, k, joints, everywhere=False),
+        ]
+        for k in range(SHOWN_MODES)
+    ]
+
+
+def workspace_rows(study: ModalStudy, joints: int) -> list[list[str]]:
+    """A row for each shown mode over the workspace, with the joints that yield most on the average."""
     rows = []
     for k in range(SHOWN_MODES):
-        frequency = f"{study.stretched.frequency_hz[k]:.2f}"
-        damping = f"{100.0 * study.stretched.damping_ratio[k]:.1f}"
-        dominant = study.stretched.dominant_joints(k, num_joints)
-        joints = ", ".join(f"{_label(name)} {100.0 * share:.0f}%" for name, share in dominant)
-        spread = (f"{value:.1f}" for value in _spread(study.frequency_hz[..., k]).values())
-        rows.append([str(k + 1), frequency, damping, joints, *spread])
+        frequency, damping = spread(study.frequency_hz[..., k]), spread(100.0 * study.damping_ratio[..., k])
+        rows.append(
+            [
+                str(k + 1),
+                f"{frequency['min']:.1f}-{frequency['max']:.1f}",
+                f"{frequency['median']:.1f}",
+                f"{damping['min']:.1f}-{damping['max']:.1f}",
+                *_shape(study, k, joints, everywhere=True),
+            ]
+        )
     return rows
+
+
+def _shape(study: ModalStudy, mode: int, joints: int, everywhere: bool) -> tuple[str, str]:
+    """How the tip moves most, and the joints that yield most, as many as asked for."""
+    motion = next(iter(study.tip_motion(mode, everywhere)))
+    yielding = list(study.yielding(mode, everywhere).items())[:joints]
+    names = ", ".join(f"{_label(name)} {100.0 * part:.0f}%" for name, part in yielding)
+    return motion, names
 
 
 def _label(name: str) -> str:
@@ -147,14 +129,12 @@ def _label(name: str) -> str:
     return " ".join(["gear" if kind == "deflection" else kind, *rest])
 
 
-def modes_table(study: ModalStudy) -> Table:
-    """The lowest modes for a terminal."""
-    title = f"{study.robot.name}, {study.payload:g} kg, motors held: stretched, then over axes 2 and 3"
+def _table(title: str, head: Sequence[str], rows: Sequence[Sequence[str]]) -> Table:
     table = Table(box=box.SIMPLE_HEAD, title=escape(title), title_justify="left", title_style="italic")
-    for name in HEAD:
-        is_text = name == JOINTS_HEAD
+    for name in head:
+        is_text = name in ("tip", "yielding joints")
         table.add_column(name, justify="left" if is_text else "right", no_wrap=not is_text)
-    for row in modes_rows(study, num_joints=2):
+    for row in rows:
         table.add_row(*map(escape, row))
     return table
 
@@ -170,29 +150,6 @@ def modes_verdict(study: ModalStudy) -> str:
     )
 
 
-def modes_json(study: ModalStudy) -> dict[str, Any]:
-    """The numbers, with the units in their names."""
-    shown, modes = range(SHOWN_MODES), study.stretched
-    return {
-        "robot": study.robot.name,
-        "elasticity": study.elasticity,
-        "payload_kg": study.payload,
-        "stretched": {
-            "position_deg": np.rad2deg(study.theta).tolist(),
-            "frequency_hz": modes.frequency_hz[:SHOWN_MODES].tolist(),
-            "damping_ratio": modes.damping_ratio[:SHOWN_MODES].tolist(),
-            "energy_share": [dict(modes.dominant_joints(k, len(modes.joints))) for k in shown],
-        },
-        "workspace": {
-            "axis_2_deg": np.rad2deg(study.axis_2).tolist(),
-            "axis_3_deg": np.rad2deg(study.axis_3).tolist(),
-            "lowest_frequency_hz": study.frequency_hz[..., 0].tolist(),
-            "frequency_hz": [_spread(study.frequency_hz[..., k]) for k in shown],
-            "damping_ratio": [_spread(study.damping_ratio[..., k]) for k in shown],
-        },
-    }
-
-
 def write_modes_page(path: Path, study: ModalStudy) -> None:
     """The picture as a page that opens offline."""
     figure = frequency_figure(np.rad2deg(study.axis_2), np.rad2deg(study.axis_3), study.frequency_hz[..., 0])
@@ -200,17 +157,20 @@ def write_modes_page(path: Path, study: ModalStudy) -> None:
     sections = [
         Section("Lowest natural frequency", note, figure, 560),
         Section(
-            "Lowest modes",
-            "Stretched, then the spread over axes 2 and 3. Shares are those of the strain energy.",
-            html_table(HEAD, modes_rows(study, num_joints=4)),
+            "Lowest modes, stretched",
+            "Damping of a hundred percent swings no more. How the tip moves most: in and out of the robot, "
+            "sideways, up and down, or turning in place. The joints that yield, by their share of the strain "
+            "energy: gear 2 is that of axis 2, tilt 2a and 2b its bearing, beam 2 the link behind it.",
+            html_table(STRETCHED_HEAD, stretched_rows(study, joints=5)),
+        ),
+        Section(
+            "Lowest modes over the workspace",
+            "The spread over the positions of axes 2 and 3; tip and joints on the average of all positions.",
+            html_table(WORKSPACE_HEAD, workspace_rows(study, joints=5)),
         ),
     ]
     title = f"Modes, {study.robot.name}, {study.payload:g} kg"
     write_plot_page(path, title, modes_verdict(study), sections)
-
-
-def _spread(values: np.ndarray) -> dict[str, float]:
-    return {"min": float(values.min()), "median": float(np.median(values)), "max": float(values.max())}
 
 
 def _wait(console: Console) -> None:

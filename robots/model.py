@@ -23,6 +23,8 @@ from pydrake.math import RigidTransform, RotationMatrix
 from robots.beam import Beam, beam_surrogate
 from robots.counterbalance_spring import CounterbalanceSpring
 from robots.drivetrain.counterbalance import Counterbalance
+from robots.drivetrain.stiffening import Stiffening, gear_springs
+from robots.drivetrain.stiffness import SpringRow
 from robots.pose import rotation_from_zyx
 
 NUM_JOINTS = 6
@@ -66,7 +68,8 @@ class DriveTrain:
 
     ratio: float = 1.0
     rotor_inertia: float = 0.0  # kg m^2, about the motor's axis
-    stiffness: float = 0.0  # N m / rad, joint side
+    stiffness: float = 0.0  # N m / rad, joint side, at rest
+    stiffening: Stiffening | None = None  # under load; None for a linear spring
     damping: float = 0.0  # N m s / rad, joint side, parallel to the stiffness
     viscous_friction: float = 0.0  # N m s / rad, motor side
     coulomb_friction: float = 0.0  # N m, motor side
@@ -192,8 +195,15 @@ class RobotModel:
 
     @property
     def joint_stiffness(self) -> np.ndarray:
-        """Stiffness of the gears in N m / rad, joint side, shape (6,)."""
+        """Stiffness of the gears at rest in N m / rad, joint side, shape (6,)."""
         return self._drive_train("stiffness")
+
+    @property
+    def stiffening_gears(self) -> SpringRow | None:
+        """The springs of the six gears where one of them stiffens under load, None if all are linear."""
+        return gear_springs(
+            self.joint_stiffness.tolist(), [joint.drive_train.stiffening for joint in self.joints]
+        )
 
     @property
     def joint_damping(self) -> np.ndarray:
@@ -319,7 +329,17 @@ def _joint_problem(joint: Joint, number: int) -> str:
         "stiffness": train.stiffness,
         "coulomb_velocity": train.coulomb_velocity,
     }
-    return _not_positive(f"joint {number}", positive) or _tilting_problem(f"joint {number}: tilting", joint)
+    return (
+        _not_positive(f"joint {number}", positive)
+        or _stiffening_problem(f"joint {number}", train)
+        or _tilting_problem(f"joint {number}: tilting", joint)
+    )
+
+
+def _stiffening_problem(where: str, train: DriveTrain) -> str:
+    stiffening = train.stiffening
+    problem = "" if stiffening is None else _refusal(lambda: stiffening.spring(train.stiffness))
+    return problem and f"{where}: {problem}"
 
 
 def _tilting_problem(where: str, joint: Joint) -> str:

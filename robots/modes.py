@@ -10,6 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from pydrake.multibody.plant import MultibodyPlant
+from pydrake.multibody.tree import JacobianWrtVariable
 from scipy.linalg import eigh
 
 from robots.inverse_kinematics import seen_from_base
@@ -31,6 +32,7 @@ class Modes:
     shape: np.ndarray  # (n, n), a column per mode: deflections of the joints, normed to unit modal mass
     rest: np.ndarray  # (n,) rad, deflections of the joints at rest
     energy_share: np.ndarray  # (n, n), a column per mode: each spring's share of the strain energy
+    tip: np.ndarray  # (6, n), a column per mode: how the tool turns (rad) and moves (m) in the world
 
     @property
     def frequency_hz(self) -> np.ndarray:
@@ -67,7 +69,6 @@ class ModalAnalysis:
         sprung = self._parts.sprung
         self.joints = tuple(joint.name() for joint in sprung)
         self._rows = [joint.position_start() for joint in sprung]
-        self._stiffness = self._parts.sprung_stiffness
         self._damping = np.array([joint.default_damping() for joint in sprung])
 
     def at(self, theta: np.ndarray) -> Modes:
@@ -81,11 +82,13 @@ class ModalAnalysis:
             raise ValueError(f"modes: a configuration must be {NUM_JOINTS} finite angles, got {theta}")
         self._parts.set_at_rest(self._context, theta)
         rest = self._plant.GetPositions(self._context)
-        load, held = self._parts.load(self._context)[self._rows], self._stiffness * rest[self._rows]
+        load, deflection = self._parts.load(self._context)[self._rows], rest[self._rows]
+        stiffness = self._parts.tangent_stiffness(deflection)
         M = self._plant.CalcMassMatrix(self._context)[np.ix_(self._rows, self._rows)]
-        K = np.diag(self._stiffness) + self._load_stiffness(rest)
+        K = np.diag(stiffness) + self._load_stiffness(rest)
         squared, shape = eigh(K, M)
-        is_at_rest = np.abs(load - held).max() <= _UNBALANCED * np.abs(load).max()
+        unbalanced = stiffness * (self._parts.yielding(load) - deflection)
+        is_at_rest = np.abs(unbalanced).max() <= _UNBALANCED * np.abs(load).max()
         if not (is_at_rest and squared[0] > 0.0):
             raise ValueError(
                 f"modes of {self._robot.name}: too soft to carry itself with the motors at "
@@ -94,9 +97,19 @@ class ModalAnalysis:
         frequency = np.sqrt(squared)
         # Small dampers couple the modes by what is off the diagonal in second order only.
         damping = np.einsum("ij,i,ij->j", shape, self._damping, shape)
-        strain = self._stiffness[:, None] * shape**2
+        strain = stiffness[:, None] * shape**2
+        world = self._plant.world_frame()
+        J = self._plant.CalcJacobianSpatialVelocity(
+            self._context, JacobianWrtVariable.kV, self._parts.tool, np.zeros(3), world, world
+        )
         return Modes(
-            self.joints, frequency, 0.5 * damping / frequency, shape, rest[self._rows], strain / strain.sum(0)
+            self.joints,
+            frequency,
+            0.5 * damping / frequency,
+            shape,
+            deflection,
+            strain / strain.sum(0),
+            J[:, self._rows] @ shape,
         )
 
     def _load_stiffness(self, rest: np.ndarray) -> np.ndarray:

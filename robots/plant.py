@@ -3,7 +3,8 @@
 Elastic gears are two coaxial revolute joints in series: ``motor_i`` turns a massless rotor against the
 inertia of the motor, ``deflection_i`` sprung and damped turns the link against the rotor. In these
 coordinates the plant is the flexible-joint model without gyroscopic coupling of the rotors: link
-positions are motor + deflection.
+positions are motor + deflection. A gear that stiffens under load has in the plant the spring that it has at
+rest; `PlantRobot.stiffening_torque` is what it has beyond that.
 
 An elastic structure has more sprung joints behind the gears: ``tilt_a_i``, ``tilt_b_i`` where a bearing
 tilts across its axis, ``beam_i_...`` where a link is a beam.
@@ -29,6 +30,7 @@ from pydrake.multibody.tree import (
 from pydrake.systems.framework import Context
 
 from robots.counterbalance_spring import free_length
+from robots.drivetrain.stiffness import SpringRow
 from robots.elastic_structure import (
     SprungJoints,
     add_beam_link,
@@ -56,6 +58,8 @@ class PlantRobot:
         tool: frame E.
         structure: the sprung joints of bearings and beams, empty without an elastic structure.
         structure_springs: the springs of these joints.
+        has_counterbalance: whether a spring pulls at axis 2.
+        stiffening_gears: the six characteristics of gears that yield and stiffen, None if all are linear.
     """
 
     plant: MultibodyPlant
@@ -66,6 +70,7 @@ class PlantRobot:
     structure: list[RevoluteJoint] = field(default_factory=list)
     structure_springs: list[RevoluteSpring] = field(default_factory=list)
     has_counterbalance: bool = False
+    stiffening_gears: SpringRow | None = None
 
     @property
     def sprung(self) -> list[RevoluteJoint]:
@@ -74,8 +79,27 @@ class PlantRobot:
 
     @property
     def sprung_stiffness(self) -> np.ndarray:
-        """The stiffness of all sprung joints in N m / rad, in the order of `sprung`."""
+        """The stiffness of all sprung joints at rest in N m / rad, in the order of `sprung`."""
         return np.array([spring.default_stiffness() for spring in (*self.springs, *self.structure_springs)])
+
+    def tangent_stiffness(self, deflection: np.ndarray) -> np.ndarray:
+        """The stiffness of all sprung joints in N m / rad at deflections in rad, in the order of `sprung`."""
+        stiffness = self.sprung_stiffness
+        if self.stiffening_gears is not None:
+            stiffness[:NUM_JOINTS] = self.stiffening_gears.stiffness(deflection[:NUM_JOINTS])
+        return stiffness
+
+    def yielding(self, load: np.ndarray) -> np.ndarray:
+        """How far all sprung joints yield, in rad, to loads in N m, in the order of `sprung`."""
+        deflection = load / self.sprung_stiffness
+        if self.stiffening_gears is not None:
+            deflection[:NUM_JOINTS] = self.stiffening_gears.deflection(load[:NUM_JOINTS])
+        return deflection
+
+    def stiffening_torque(self, deflection: np.ndarray) -> np.ndarray:
+        """What the gears take beyond the linear springs of the plant, in N m at deflections in rad, (6,)."""
+        assert self.stiffening_gears is not None
+        return self.stiffening_gears.torque(deflection) - self.stiffening_gears.c_0 * deflection
 
     def motor_indices(self) -> list[int]:
         """Where motor positions, then motor velocities stand in the plant's state; 12 numbers."""
@@ -130,10 +154,10 @@ class PlantRobot:
         positions[[joint.position_start() for joint in self.motors]] = theta
         self.plant.SetVelocities(context, np.zeros(self.plant.num_velocities()))
         self.plant.SetPositions(context, positions)
-        rows, stiffness = [joint.position_start() for joint in self.sprung], self.sprung_stiffness
+        rows = [joint.position_start() for joint in self.sprung]
         # The sag changes the lever arms by about a thousandth, so each pass gains three digits.
         for _ in range(6 if rows else 0):
-            positions[rows] = self.load(context)[rows] / stiffness
+            positions[rows] = self.yielding(self.load(context)[rows])
             self.plant.SetPositions(context, positions)
 
 
@@ -205,6 +229,7 @@ def add_robot(
         structure.joints,
         structure.springs,
         robot.counterbalance is not None,
+        None if elasticity == "rigid" else robot.stiffening_gears,
     )
 
 

@@ -8,8 +8,11 @@ a few microseconds where the array operations below cost tens.
 """
 
 import math
+from collections.abc import Sequence
 
 import numpy as np
+
+Floats = tuple[float, float, float]
 
 # Below this cosine of beta the ZYX angles alpha and gamma cannot be told apart.
 _GIMBAL_LOCK = 1e-9
@@ -71,12 +74,7 @@ def zyx_from_rotation(rotation: np.ndarray) -> np.ndarray:
         Angles (alpha, beta, gamma) in rad, shape (..., 3).
     """
     if rotation.ndim == 2:
-        (r00, r01, r02), (r10, r11, r12), (r20, _, _) = rotation.tolist()
-        cos_beta = math.hypot(r00, r10)
-        alpha = math.atan2(r10, r00) if cos_beta > _GIMBAL_LOCK else math.atan2(-r01, r11)
-        sa, ca = math.sin(alpha), math.cos(alpha)
-        gamma = math.atan2(sa * r02 - ca * r12, ca * r11 - sa * r01)
-        return np.array([alpha, math.atan2(-r20, cos_beta), gamma])
+        return np.array(zyx_angles(rotation.tolist()))
     r = np.asarray(rotation)
     cos_beta = np.hypot(r[..., 0, 0], r[..., 1, 0])
     regular = np.arctan2(r[..., 1, 0], r[..., 0, 0])
@@ -84,6 +82,16 @@ def zyx_from_rotation(rotation: np.ndarray) -> np.ndarray:
     sa, ca = np.sin(alpha), np.cos(alpha)
     gamma = np.arctan2(sa * r[..., 0, 2] - ca * r[..., 1, 2], ca * r[..., 1, 1] - sa * r[..., 0, 1])
     return np.stack([alpha, np.arctan2(-r[..., 2, 0], cos_beta), gamma], -1)
+
+
+def zyx_angles(rows: Sequence[Sequence[float]]) -> Floats:
+    """`zyx_from_rotation` of one rotation given as rows; what follows in a row, as in a pose, is ignored."""
+    (r00, r01, r02, *_), (r10, r11, r12, *_), (r20, *_), *_ = rows
+    cos_beta = math.hypot(r00, r10)
+    alpha = math.atan2(r10, r00) if cos_beta > _GIMBAL_LOCK else math.atan2(-r01, r11)
+    sa, ca = math.sin(alpha), math.cos(alpha)
+    gamma = math.atan2(sa * r02 - ca * r12, ca * r11 - sa * r01)
+    return alpha, math.atan2(-r20, cos_beta), gamma
 
 
 def euler_rate_matrix(zyx: np.ndarray) -> np.ndarray:
@@ -112,37 +120,34 @@ def euler_rate_matrix(zyx: np.ndarray) -> np.ndarray:
     )
 
 
-def euler_difference(zyx_D: np.ndarray, zyx_E: np.ndarray) -> np.ndarray:
-    """Wrapped differences of the angles of two orientations, wanted minus seen, in rad, shape (3,) each."""
-    pairs = zip(zyx_D.tolist(), zyx_E.tolist(), strict=True)
-    return np.array([math.remainder(a - b, 2.0 * math.pi) for a, b in pairs])
+def euler_difference(zyx_D: Sequence[float], zyx_E: Sequence[float]) -> Floats:
+    """Wrapped differences of the angles of two orientations, wanted minus seen, in rad."""
+    (a, b, c), (d, e, f) = zyx_D, zyx_E
+    turn = 2.0 * math.pi
+    return math.remainder(a - d, turn), math.remainder(b - e, turn), math.remainder(c - f, turn)
 
 
-def angular_velocity(zyx: np.ndarray, rates: np.ndarray) -> np.ndarray:
-    """w = T(zyx) rates for one orientation, see `euler_rate_matrix`; shape (3,) each, rad and rad/s."""
-    alpha, beta, _ = zyx.tolist()
-    alpha_rate, beta_rate, gamma_rate = rates.tolist()
+def angular_velocity(zyx: Sequence[float], rates: Sequence[float]) -> Floats:
+    """w = T(zyx) rates for one orientation, see `euler_rate_matrix`; in rad and rad/s."""
+    (alpha, beta, _), (alpha_rate, beta_rate, gamma_rate) = zyx, rates
     ca, sa, cb = math.cos(alpha), math.sin(alpha), math.cos(beta)
-    return np.array(
-        [
-            ca * cb * gamma_rate - sa * beta_rate,
-            sa * cb * gamma_rate + ca * beta_rate,
-            alpha_rate - math.sin(beta) * gamma_rate,
-        ]
+    return (
+        ca * cb * gamma_rate - sa * beta_rate,
+        sa * cb * gamma_rate + ca * beta_rate,
+        alpha_rate - math.sin(beta) * gamma_rate,
     )
 
 
-def euler_rates(zyx: np.ndarray, w: np.ndarray) -> np.ndarray:
+def euler_rates(zyx: Sequence[float], w: Sequence[float]) -> Floats:
     """The inverse of `angular_velocity`.
 
     Raises:
         ZeroDivisionError: at beta = +-pi/2 exactly, where the rates are not defined.
     """
-    alpha, beta, _ = zyx.tolist()
-    x, y, z = w.tolist()
+    (alpha, beta, _), (x, y, z) = zyx, w
     ca, sa = math.cos(alpha), math.sin(alpha)
     gamma_rate = (ca * x + sa * y) / math.cos(beta)
-    return np.array([z + math.sin(beta) * gamma_rate, ca * y - sa * x, gamma_rate])
+    return z + math.sin(beta) * gamma_rate, ca * y - sa * x, gamma_rate
 
 
 def _skew_part(m: np.ndarray) -> np.ndarray:

@@ -32,6 +32,7 @@ _OFFSET, _OFFSET_RATE, _ASIDE, _WERE_AT = slice(24, 30), slice(30, 36), slice(36
 _WIDTH = 48
 _GOING, _HOLDING, _STOPPING, _RESUMING, _IDLE = 0.0, 1.0, 2.0, 3.0, 4.0
 _RESUME_SPEED = 0.25  # share of the largest joint speed that the way back may add
+_NO_DEVIATION = np.zeros(NUM_JOINTS)
 
 
 @dataclass
@@ -217,6 +218,14 @@ class CommandGuard(LeafSystem):
     ) -> None:
         """Goes to the law's command as far as the limits allow. Plain floats: this runs every tick."""
         start = state[_POSITIONS].tolist()
+        if all(
+            lower <= wanted <= upper and abs(rate) <= speed and abs(wanted - last) <= stride
+            for wanted, rate, last, (lower, upper, speed, stride) in zip(
+                position, velocity, start, self._limits, strict=True
+            )
+        ):
+            state[_ISSUED], state[_BRAKING_FROM] = position + velocity, velocity
+            return
         steps, rates = [], []
         excess, is_outside = 0.0, False
         for wanted, rate, last, (lower, upper, speed, stride) in zip(
@@ -302,7 +311,7 @@ class CommandGuard(LeafSystem):
         if kinds or any(context.get_discrete_state(2).value().tolist()):
             wished = self._inputs[0].Eval(context)
             aside = state[_ASIDE] if self._is_speed_only else state[_POSITIONS] - wished
-            discrete_state.set_value(2, aside if math.isfinite(aside.sum()) else np.zeros(NUM_JOINTS))
+            discrete_state.set_value(2, aside if math.isfinite(sum(aside.tolist())) else _NO_DEVIATION)
         if kinds:
             counts = context.get_discrete_state(1).value().copy()
             counts[kinds] += 1.0

@@ -8,8 +8,6 @@ import numpy as np
 from robots.drivetrain.friction import SigmoidFriction
 from robots.drivetrain.monotone import monotone_inverse
 
-_DIFFERENCE = 1e-6
-
 
 @dataclass(frozen=True)
 class DirectionalEfficiency:
@@ -68,10 +66,17 @@ class SmoothEfficiency:
 
     def loss(self, torque_A: np.ndarray, speed_A: np.ndarray) -> np.ndarray:
         """tau_loss in N m, eqs. (2.11b), (2.11c), with one friction for both directions."""
+        return self._load_loss(torque_A, speed_A)[0] + self.friction.torque(np.asarray(speed_A))
+
+    def _load_loss(self, torque_A: np.ndarray, speed_A: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """What the load loses, without friction, and its derivative by the torque."""
         forward, backward = self.efficiency.both(speed_A)
-        share = np.arctan(self.steepness * np.asarray(torque_A) * speed_A) / np.pi + 0.5
+        power = self.steepness * np.asarray(torque_A) * speed_A
+        share = np.arctan(power) / np.pi + 0.5
         load = share * (1.0 - forward) + (1.0 - share) * (1.0 - 1.0 / backward)
-        return load * torque_A + self.friction.torque(np.asarray(speed_A))
+        # d(share) / d(torque) times the torque
+        change = power / (np.pi * (1.0 + np.square(power)))
+        return load * torque_A, load + change * (1.0 / backward - forward)
 
     def output_torque(self, torque_A: np.ndarray, speed_A: np.ndarray) -> np.ndarray:
         """What the gear gives to the output: i (tau_A - tau_loss) in N m, -tau_B of eq. (2.11a)."""
@@ -82,10 +87,9 @@ class SmoothEfficiency:
         wanted = np.asarray(output, dtype=float) / self.ratio + self.friction.torque(np.asarray(speed_A))
 
         def without_friction(torque: np.ndarray) -> np.ndarray:
-            return torque - self.loss(torque, speed_A) + self.friction.torque(np.asarray(speed_A))
+            return torque - self._load_loss(torque, speed_A)[0]
 
         def slope(torque: np.ndarray) -> np.ndarray:
-            step = _DIFFERENCE * (1.0 + np.abs(torque))
-            return (without_friction(torque + step) - without_friction(torque - step)) / (2.0 * step)
+            return 1.0 - self._load_loss(torque, speed_A)[1]
 
         return monotone_inverse(without_friction, slope, wanted, np.maximum(np.abs(wanted), 1e-9))

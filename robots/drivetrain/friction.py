@@ -120,6 +120,17 @@ class PolynomialFriction:
         _refuse_negative(self, slope_at_one=self.slope_at_one)
         if not self.step < 1.0:
             raise ValueError(f"PolynomialFriction: step must be below 1 rad/s, got {self.step}")
+        cubic = self.coefficients
+        turns = np.roots(np.polyder(cubic))
+        speeds = np.array(
+            [1.0, *turns.real[(turns.imag == 0.0) & (turns.real > self.step) & (turns.real < 1.0)]]
+        )
+        least = np.polyval(cubic, speeds).min()
+        if least < 0.0:
+            raise ValueError(
+                "PolynomialFriction: the cubic between step and 1 rad/s must not drive the motion, "
+                f"got {least:.4g} N m at {speeds[np.argmin(np.polyval(cubic, speeds))]:.4g} rad/s"
+            )
 
     def _sigmoid(self) -> SigmoidFriction:
         return SigmoidFriction(0.0, self.coulomb, self.steepness)

@@ -121,6 +121,7 @@ class SmoothPrandtlIshlinskii:
     delay: float  # s
     order: int  # of the Pade approximation
 
+    # As nearly as it is the operator: its inverse is the smooth form of the operator's inverse.
     invertible: ClassVar[bool] = True
 
     def __post_init__(self) -> None:

@@ -14,12 +14,20 @@ from robots.model import NUM_JOINTS, RobotModel
 from robots.newton_inverse import inverse_kinematics
 from robots.plant import add_robot
 from systems.feedforward.config import FeedforwardConfig
-from systems.feedforward.joint_motion import Drive, JointReference, Offsets
+from systems.feedforward.joint_motion import Answer, Drive, JointReference
 from systems.feedforward.prefilter import Prefilter
 from systems.samples import JointSample
 
 _SMALL_TURN = 1e-5  # s times the joint velocity: over which the change of the Jacobian is measured
 _NOTHING = np.zeros(NUM_JOINTS)
+_NO_COMMAND = np.full(NUM_JOINTS, np.nan)
+_OUTPUTS = {  # before the first tick, and out of reach
+    "position_command": _NO_COMMAND,
+    "velocity_command": _NO_COMMAND,
+    "torque_feedforward": _NOTHING,
+    "position_offset": _NOTHING,
+    "velocity_offset": _NOTHING,
+}
 
 
 class Feedforward(LeafSystem):
@@ -30,13 +38,16 @@ class Feedforward(LeafSystem):
         in  ``V_WE_desired``        vector 6, its spatial velocity
         in  ``A_WE_desired``        vector 6, its spatial acceleration
         in  ``joint_sample``        JointSample, whose positions choose the branch at the beginning
+        out ``position_command``    vector 6 in rad, of the motors
+        out ``velocity_command``    vector 6 in rad/s, likewise
+        out ``torque_feedforward``  vector 6 in N m, joint side, beyond the drives' gravity compensation
         out ``position_offset``     vector 6 in rad, what a law's commands for the links lack to be motors'
         out ``velocity_offset``     vector 6 in rad/s, likewise
-        out ``torque_feedforward``  vector 6 in N m, joint side, beyond the drives' gravity compensation
 
-    The offsets are added to the commands of any law: the law leads the links along the path and corrects what
-    the model leaves. Where a calibrated robot knows its compliances, the law's commands contain the
-    deflection under gravity already, and the offsets only the rest. Out of reach the outputs are zero.
+    The commands drive a robot by themselves. Beside a law the offsets are added to its commands: the law
+    leads the links along the path and corrects what the model leaves. Where a calibrated robot knows its
+    compliances, the law's commands contain the deflection under gravity already, and the offsets only the
+    rest. Out of reach the commands are NaN, which is none, and the other outputs zero.
 
     With a prefilter the derivatives of the path come from it, and the links follow the path as late as the
     filter is; the offsets contain the difference, so that this too goes with any law. ``delay`` says how much
@@ -69,8 +80,10 @@ class Feedforward(LeafSystem):
         super().__init__()
         self._memory_size = NUM_JOINTS + self.memory_size + extra_memory
         for label in ("stiffness_error", "inertia_error"):
-            if not getattr(config, label) > -1.0:
-                raise ValueError(f"feedforward: {label} must be above -1, got {getattr(config, label)}")
+            if not -1.0 < getattr(config, label) < np.inf:
+                raise ValueError(
+                    f"feedforward: {label} must be above -1 and finite, got {getattr(config, label)}"
+                )
         self._period, self._inertia = period, 1.0 + config.inertia_error
         self._stiffness = (1.0 + config.stiffness_error) * robot.joint_stiffness
         self._damping = (1.0 + config.stiffness_error) * robot.joint_damping
@@ -94,8 +107,8 @@ class Feedforward(LeafSystem):
         self._V_WD = self.DeclareVectorInputPort("V_WE_desired", 6)
         self._A_WD = self.DeclareVectorInputPort("A_WE_desired", 6)
         self._joints = self.DeclareAbstractInputPort("joint_sample", Value(JointSample()))
-        for name in ("position_offset", "velocity_offset", "torque_feedforward"):
-            self.DeclareStateOutputPort(name, self.DeclareDiscreteState(NUM_JOINTS))
+        for name, value in _OUTPUTS.items():
+            self.DeclareStateOutputPort(name, self.DeclareDiscreteState(value))
         self._last = self.DeclareDiscreteState(np.full(NUM_JOINTS, np.nan))
         self._memory = self.DeclareDiscreteState(self.fresh_memory())
         order = self._filter.order if self._filter else 0
@@ -106,7 +119,7 @@ class Feedforward(LeafSystem):
         """The memory before the first tick."""
         return np.full(self._memory_size, np.nan)
 
-    def offsets(self, reference: JointReference, memory: np.ndarray) -> Offsets:
+    def answer(self, reference: JointReference, memory: np.ndarray) -> Answer:
         """One tick of the inverse model.
 
         Args:
@@ -120,7 +133,14 @@ class Feedforward(LeafSystem):
         # The drives hold a torque for a period: on the average it is half a period late.
         ahead = torque if np.isnan(last_torque[0]) else 1.5 * torque - 0.5 * last_torque
         memory = np.concatenate([torque, drive.memory])
-        return Offsets(sag - drive.deflection, sag_rate - drive.deflection_rate, ahead, memory)
+        return Answer(
+            reference.position - drive.deflection,
+            reference.velocity - drive.deflection_rate,
+            sag - drive.deflection,
+            sag_rate - drive.deflection_rate,
+            ahead,
+            memory,
+        )
 
     def drive(self, reference: JointReference, memory: np.ndarray) -> Drive:
         """What the motors shall do; the memory is the model's, of the last tick, NaN at the first one."""
@@ -144,8 +164,8 @@ class Feedforward(LeafSystem):
         try:
             q = self._link_positions(self._X_WD.Eval(context), last)
         except (UnreachableError, JointLimitError):
-            for index in range(3):
-                discrete_state.set_value(index, _NOTHING)
+            for index, value in enumerate(_OUTPUTS.values()):
+                discrete_state.set_value(index, value)
             discrete_state.set_value(int(self._memory), self.fresh_memory())
             return
         if self._filter is None:
@@ -155,16 +175,18 @@ class Feedforward(LeafSystem):
             state = self._filter.at_rest(q) if is_first else self._filter.step(state, last, q)
             reference = self._filtered_reference(state, q)
             discrete_state.set_value(int(self._filtered), state.ravel())
-        offsets = self.offsets(reference, context.get_discrete_state(self._memory).value())
-        position, velocity = offsets.position, offsets.velocity
+        answer = self.answer(reference, context.get_discrete_state(self._memory).value())
+        position_offset, velocity_offset = answer.position_offset, answer.velocity_offset
         if self._filter is not None:
-            position = position + reference.position - q
-            velocity = velocity + reference.velocity - self._velocity(q, self._V_WD.Eval(context))
-        discrete_state.set_value(0, position)
-        discrete_state.set_value(1, velocity)
-        discrete_state.set_value(2, offsets.torque)
+            position_offset = position_offset + reference.position - q
+            velocity_offset = (
+                velocity_offset + reference.velocity - self._velocity(q, self._V_WD.Eval(context))
+            )
+        outputs = (answer.position, answer.velocity, answer.torque, position_offset, velocity_offset)
+        for index, value in enumerate(outputs):
+            discrete_state.set_value(index, value)
         discrete_state.set_value(int(self._last), q)
-        discrete_state.set_value(int(self._memory), offsets.memory)
+        discrete_state.set_value(int(self._memory), answer.memory)
 
     def _link_positions(self, X_WD: RigidTransform, last: np.ndarray) -> np.ndarray:
         q = self._inverse.nearest(X_WD.GetAsMatrix34(), last)

@@ -13,9 +13,10 @@ from systems.feedforward.sprung_deflection import SprungDeflection
 class FlexibleJointFeedforward(Feedforward):
     """Deflections from the load of the links, then torques of motors that turn ahead by them.
 
-    The load tau bends spring and damper of a joint by K delta + D d(delta)/dt = -tau, Reiner (2010) eqs.
-    (3.78), (3.93) for linear springs: a relative degree of three, so the motors' acceleration depends on the
-    third derivative of the reference. They move by theta = q - delta and carry J theta'' + friction + tau.
+    The load tau bends spring and damper of a joint by c(delta) + D d(delta)/dt = -tau, Reiner (2010) eqs.
+    (3.78), (3.93), with the linear or stiffening c of the robot's gears: a relative degree of three, so the
+    motors' acceleration depends on the third derivative of the reference. They move by theta = q - delta and
+    carry J theta'' + friction + tau.
 
     The memory holds the load of the last tick and the deflections of the last three.
     """
@@ -33,7 +34,10 @@ class FlexibleJointFeedforward(Feedforward):
     ) -> None:
         """Builds the model; arguments and errors as of `Feedforward`."""
         super().__init__(robot, config, period, payload, extra_memory)
-        self._gears = SprungDeflection(self._stiffness, self._damping, period)
+        springs = robot.stiffening_gears
+        if springs is not None:
+            springs = springs.scaled(1.0 + config.stiffness_error)
+        self._gears = SprungDeflection(self._stiffness, self._damping, period, springs)
         self._differences = BackwardDifferences(period)
 
     def _drive(self, reference: JointReference, load: np.ndarray, memory: np.ndarray) -> Drive:

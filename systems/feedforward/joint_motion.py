@@ -25,10 +25,12 @@ class Drive:
 
 
 @dataclass(frozen=True)
-class Offsets:
-    """What the commands of a law lack to be those of the motors, and what the feedforward remembers."""
+class Answer:
+    """What motors are told, what of it a law's commands for the links lack, and what the model remembers."""
 
     position: np.ndarray  # rad
     velocity: np.ndarray  # rad/s
+    position_offset: np.ndarray  # rad
+    velocity_offset: np.ndarray  # rad/s
     torque: np.ndarray  # N m, joint side, beyond the drives' gravity compensation
     memory: np.ndarray

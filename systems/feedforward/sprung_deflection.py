@@ -5,7 +5,7 @@ import numpy as np
 from robots.drivetrain.stiffness import GearSpring
 
 _NEWTON_STEPS = 60  # at most; one or two if the load changes little in a tick
-_CONVERGED = 1e-12  # of a deflection
+_CONVERGED = 1e-7  # of a deflection: Newton's next step would be about its square
 
 
 class SprungDeflection:
@@ -26,7 +26,7 @@ class SprungDeflection:
             stiffness: in N m / rad, shape (n,); of a nonlinear spring, its stiffness at rest.
             damping: in N m s / rad, shape (n,).
             period: tick in s.
-            spring: one nonlinear characteristic for all joints in place of the linear ones.
+            spring: nonlinear characteristics in place of the linear ones: one for all joints, or a row of n.
 
         Raises:
             ValueError: if a stiffness is not positive or a damping is negative.
@@ -72,5 +72,5 @@ class SprungDeflection:
         retardation = self._damping / stiffness / self._period  # in ticks
         with np.errstate(divide="ignore", over="ignore"):
             decay = np.exp(-1.0 / retardation)  # no damping: no memory
-        lag = retardation * (1.0 - decay)
+            lag = -retardation * np.expm1(-1.0 / retardation)
         return decay, (lag - decay) / stiffness, (1.0 - lag) / stiffness

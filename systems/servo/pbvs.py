@@ -5,7 +5,7 @@ import math
 import numpy as np
 
 from robots.kinematics import robust_solve
-from robots.pose import angular_velocity, euler_difference, pose_error, zyx_from_rotation
+from robots.pose import angular_velocity, euler_difference, pose_error, zyx_angles
 from systems.servo.law import Moment, ServoLaw, Step, refuse_jump
 
 
@@ -37,8 +37,8 @@ class Pbvs(ServoLaw):
         return Step(moment.position + self.period * velocity, velocity, correction, q_d)
 
     def _feedback(self, wanted: np.ndarray, seen: np.ndarray) -> np.ndarray:
-        zyx = zyx_from_rotation(seen[:, :3])
-        twist = np.empty(6)
-        twist[:3] = angular_velocity(zyx, euler_difference(zyx_from_rotation(wanted[:, :3]), zyx))
-        twist[3:] = wanted[:, 3] - seen[:, 3]
-        return self._gains * twist
+        wanted_rows, rows = wanted.tolist(), seen.tolist()
+        zyx = zyx_angles(rows)
+        w = angular_velocity(zyx, euler_difference(zyx_angles(wanted_rows), zyx))
+        v = (wanted_row[3] - row[3] for wanted_row, row in zip(wanted_rows, rows, strict=True))
+        return self._gains * (*w, *v)

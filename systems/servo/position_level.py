@@ -5,7 +5,7 @@ import math
 import numpy as np
 
 from robots.kinematics import robust_solve
-from robots.pose import angular_velocity, euler_difference, euler_rates, rotation_from_zyx, zyx_from_rotation
+from robots.pose import angular_velocity, euler_difference, euler_rates, rotation_from_zyx, zyx_angles
 from systems.servo.law import Moment, ServoLaw, Step, followed_branch
 
 
@@ -28,32 +28,42 @@ class PositionLevel(ServoLaw):
         return np.concatenate([_euler_difference(X_WE, moment.X_WD), moment.position])
 
     def _step(self, moment: Moment, memory: np.ndarray) -> Step:
-        c, q = memory[:6], memory[6:]
         rate = np.zeros(6)
         if moment.measured is not None:
             rate = self._gains * _euler_difference(*moment.measured)
-        c = c + self.period * rate
-        for part, limit in ((c[:3], self._angle_limit), (c[3:], self.config.correction_limit)):
-            size_squared = part @ part
-            if size_squared > limit * limit:
-                part *= limit / math.sqrt(size_squared)
+        c = self._limited(memory[:6] + self.period * rate)
+        turn, shift = c[:3], c[3:]
 
-        wanted_zyx = zyx_from_rotation(moment.X_WD[:, :3])
-        zyx = wanted_zyx + c[:3]
+        rows = moment.X_WD.tolist()
+        wanted_zyx = zyx_angles(rows)
+        zyx = [a + b for a, b in zip(wanted_zyx, turn, strict=True)]
         X_WC = np.empty((3, 4))
-        X_WC[:, :3] = rotation_from_zyx(zyx)
-        X_WC[:, 3] = moment.X_WD[:, 3] + c[3:]
-        q = followed_branch(self._inverse, X_WC, q)
-        correction = np.concatenate([angular_velocity(zyx, c[:3]), c[3:]])
-        V = moment.V_WD + rate
-        V[:3] = angular_velocity(zyx, rate[:3] + euler_rates(wanted_zyx, moment.V_WD[:3]))
+        X_WC[:, :3] = rotation_from_zyx(np.array(zyx))
+        X_WC[:, 3] = [row[3] + way for row, way in zip(rows, shift, strict=True)]
+        q = followed_branch(self._inverse, X_WC, memory[6:])
+
+        *wanted_w, x, y, z = moment.V_WD.tolist()
+        *turning, dx, dy, dz = rate.tolist()
+        zyx_rates = [a + b for a, b in zip(turning, euler_rates(wanted_zyx, wanted_w), strict=True)]
+        V = np.array([*angular_velocity(zyx, zyx_rates), x + dx, y + dy, z + dz])
         velocity = robust_solve(self._kinematics.jacobian(q), V)
-        return Step(q, velocity, correction, np.concatenate([c, q]))
+        correction = np.array([*angular_velocity(zyx, turn), *shift])
+        return Step(q, velocity, correction, np.array([*c, *q.tolist()]))
+
+    def _limited(self, correction: np.ndarray) -> list[float]:
+        """A correction, angle and length cut to their limits."""
+        limited = []
+        for part, limit in (
+            (correction[:3].tolist(), self._angle_limit),
+            (correction[3:].tolist(), self.config.correction_limit),
+        ):
+            size = math.hypot(*part)
+            limited += part if size <= limit else [limit / size * value for value in part]
+        return limited
 
 
 def _euler_difference(X_WD: np.ndarray, X_WE: np.ndarray) -> np.ndarray:
     """z_d - z with wrapped angles (alpha, beta, gamma) in rad, then the position in m, eq. (5.10)."""
-    difference = np.empty(6)
-    difference[:3] = euler_difference(zyx_from_rotation(X_WD[:, :3]), zyx_from_rotation(X_WE[:, :3]))
-    difference[3:] = X_WD[:, 3] - X_WE[:, 3]
-    return difference
+    wanted, seen = X_WD.tolist(), X_WE.tolist()
+    angles = euler_difference(zyx_angles(wanted), zyx_angles(seen))
+    return np.array([*angles, *(a[3] - b[3] for a, b in zip(wanted, seen, strict=True))])

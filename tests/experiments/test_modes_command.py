@@ -8,7 +8,8 @@ import pytest
 import typer
 from typer.testing import CliRunner, Result
 
-from experiments.modes_command import SHOWN_MODES, modes_command
+from experiments.modes_command import modes_command
+from experiments.modes_study import SHOWN_MODES, TIP_MOTIONS
 from robots.model import load_robot
 from robots.modes import ModalAnalysis, stretched
 from tests.experiments.browser import open_page
@@ -41,6 +42,20 @@ def test_the_numbers_are_those_of_the_analysis(tmp_path: Path):
     lowest = np.array(space["lowest_frequency_hz"])
     spread = {"min": lowest.min(), "median": np.median(lowest), "max": lowest.max()}
     assert space["frequency_hz"][0] == pytest.approx(spread)
+    assert space["damping_ratio"][0]["min"] <= middle.damping_ratio[0] <= space["damping_ratio"][0]["max"]
+    for place in (found, space):
+        for motion, share in zip(place["tip_motion"], place["energy_share"], strict=True):
+            assert set(motion) == set(TIP_MOTIONS)
+            assert sum(motion.values()) == pytest.approx(sum(share.values()))
+
+
+def test_shapes_say_what_the_two_slowest_modes_of_an_arm_do(tmp_path: Path):
+    """Stretched ahead of the robot, it swings sideways by gear 1 and up and down by gear 2."""
+    numbers = json.loads(run(tmp_path, "--robot=kr16", "--json", "-").stdout)["stretched"]
+    for mode, motion, gear in ((0, "sideways", "deflection_1"), (1, "up/down", "deflection_2")):
+        assert numbers["tip_motion"][mode][motion] > 0.95
+        assert max(numbers["energy_share"][mode], key=numbers["energy_share"][mode].get) == gear
+        assert max(map(abs, numbers["shape"][mode].values())) == 1.0
 
 
 def test_the_table_names_frequencies_and_what_yields(tmp_path: Path):

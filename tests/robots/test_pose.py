@@ -141,7 +141,7 @@ def test_euler_rates_and_angular_velocity_are_the_rate_matrix_and_its_inverse():
 
 
 def test_euler_differences_take_the_short_way_round():
-    wanted, seen = (np.deg2rad([alpha, 10.0, 90.0]) for alpha in (179.0, -178.0))
+    wanted, seen = (np.deg2rad([alpha, 10.0, 90.0]).tolist() for alpha in (179.0, -178.0))
     assert np.rad2deg(euler_difference(wanted, seen)) == pytest.approx([-3.0, 0.0, 0.0], abs=1e-12)
 
 

@@ -94,6 +94,11 @@ def test_a_block_sticks_until_it_is_pushed_hard_enough_and_slips_then():
         (lambda: SigmoidFriction(-1.0, 1.0, 1.0), "viscous must not be negative, got -1.0"),
         (lambda: SigmoidFriction(1.0, 1.0, 0.0), "steepness must be positive"),
         (lambda: PolynomialFriction(0.5, 60.0, 1.5, 1.0, 0.3), "step must be below 1 rad/s, got 1.5"),
+        (
+            lambda: PolynomialFriction(0.5, 60.0, 0.1, 1.0, 9.0),
+            r"must not drive .* got -0\.\d+ N m at 0\.\d+",
+        ),
+        (lambda: PolynomialFriction(0.5, 60.0, 0.1, -1.0, 0.3), r"must not drive the motion, got -1"),
         (lambda: StribeckFriction(SIGMOID, 0.0, 1.0), "a must be positive"),
         (lambda: StickSlipFriction(0.0, 2.0, 1.0), "breakaway must be at least coulomb"),
     ],

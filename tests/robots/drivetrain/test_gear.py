@@ -89,6 +89,13 @@ def test_the_smooth_losses_can_be_undone(torque: float, speed: float):
     assert again == pytest.approx(torque, rel=1e-9, abs=1e-9)
 
 
+def test_the_smooth_losses_change_smoothly_with_the_torque():
+    """The slope with which the inverse is found, against differences across the change of direction."""
+    torque, speed, h = np.linspace(-3.0, 3.0, 201), np.array(0.3), 1e-6
+    difference = (SMOOTH.loss(torque + h, speed) - SMOOTH.loss(torque - h, speed)) / (2.0 * h)
+    np.testing.assert_allclose(SMOOTH._load_loss(torque, speed)[1], difference, atol=1e-7)
+
+
 def test_far_from_rest_the_smooth_losses_are_the_exact_ones():
     for torque, speed in ((50.0, 1.0), (-50.0, 1.0), (50.0, -1.0)):
         t, w = np.array(torque), np.array(speed)

@@ -66,12 +66,12 @@ def test_at_rest_the_sagging_robot_has_its_tip_where_it_shall_be(name: str):
     """The model's section torques are those of an arm that does not sag, wrong by a share of its angles."""
     robot = load_robot(name)
     q, inverse = working(robot), model(name)
-    offsets = inverse.offsets(still(q), inverse.fresh_memory())
+    answer = inverse.answer(still(q), inverse.fresh_memory())
     plant = MultibodyPlant(0.0)
     parts = add_robot(plant, robot, "structure", ROBOTS[name])
     plant.Finalize()
     context = plant.CreateDefaultContext()
-    parts.set_at_rest(context, q + offsets.position)
+    parts.set_at_rest(context, answer.position)
     X_WE, wanted = parts.tool.CalcPoseInWorld(context).GetAsMatrix4(), Kinematics(robot).forward(q)
     left = np.linalg.norm(pose_error(wanted, X_WE)[3:])
     parts.set_at_rest(context, q)
@@ -92,7 +92,7 @@ def test_a_stiff_structure_leaves_the_flexible_joint():
         s, rate = np.sin(12.0 * PERIOD * tick), 12.0 * np.cos(12.0 * PERIOD * tick)
         reference = JointReference(q + 0.05 * s, np.full(6, 0.05 * rate), np.full(6, -0.05 * 144.0 * s))
         a, b = (
-            each.offsets(reference, memory) for each, memory in zip((found, expected), memories, strict=True)
+            each.answer(reference, memory) for each, memory in zip((found, expected), memories, strict=True)
         )
         memories = [a.memory, b.memory]
     np.testing.assert_allclose(a.position, b.position, atol=1e-8)
@@ -110,14 +110,14 @@ def test_through_singular_positions_the_outputs_stay_bounded(method: str, pose: 
     for tick in range(200):
         s, c = np.sin(w * PERIOD * tick), np.cos(w * PERIOD * tick)
         reference = JointReference(q + size * s, np.full(6, size * w * c), np.full(6, -size * w * w * s))
-        offsets = inverse.offsets(reference, memory)
-        memory = offsets.memory
+        answer = inverse.answer(reference, memory)
+        memory = answer.memory
         if tick < 5:  # the velocity begins with a jump, which the differences remember so long
             continue
         rigid = max(rigid, np.abs(inverse._load(reference)).max())
-        assert np.abs(offsets.position).max() < 0.03
-        assert np.abs(offsets.velocity).max() < 1.0
-        assert np.abs(offsets.torque).max() < 2.0 * rigid + 3e3
+        assert np.abs(answer.position_offset).max() < 0.03
+        assert np.abs(answer.velocity_offset).max() < 1.0
+        assert np.abs(answer.torque).max() < 2.0 * rigid + 3e3
 
 
 def test_all_elastic_parameters_are_wrong_by_the_same_share():

@@ -129,5 +129,6 @@ def test_the_rigid_model_moves_motors_like_links_and_gives_the_torque_of_inverse
 @pytest.mark.parametrize("kind", FEEDFORWARDS)
 @pytest.mark.parametrize("label", ["stiffness_error", "inertia_error"])
 def test_a_model_without_springs_or_masses_is_refused(kind: str, label: str):
-    with pytest.raises(ValueError, match=f"{label} must be above -1"):
-        FEEDFORWARDS[kind](ROBOT, replace(FeedforwardConfig(kind), **{label: -1.0}), PERIOD)
+    for error in (-1.0, np.inf, np.nan):
+        with pytest.raises(ValueError, match=f"{label} must be above -1 and finite, got {error}"):
+            FEEDFORWARDS[kind](ROBOT, replace(FeedforwardConfig(kind), **{label: error}), PERIOD)

@@ -4,6 +4,7 @@ import numpy as np
 from scipy.linalg import expm
 
 from systems.feedforward.prefilter import Prefilter, PrefilterConfig
+from systems.feedforward.sprung_deflection import SprungDeflection
 
 MOTOR, LINK = 2.0, 5.0  # kg m^2
 STIFFNESS, DAMPING = 8e3, 6.0  # N m / rad, N m s / rad
@@ -65,6 +66,28 @@ def test_the_prefilter_gives_the_derivatives_that_the_inverse_takes():
         state = model.step(state, np.array([angle]), np.array([angle]))
         # Derivatives of a radian in thirty rad/s are of the size of 1, 30 and 1000.
         np.testing.assert_allclose(state[:, 0] / [1.0, 30.0, 1e3], expected[:3] / [1.0, 30.0, 1e3], atol=1e-9)
+
+
+def test_tick_by_tick_the_motor_angle_is_that_of_the_plant():
+    """`Prefilter` and `SprungDeflection`, of which the feedforwards consist; wrong by the square of the tick.
+
+    The load's curvature over K, which begins with 6e2 / s^2, times an eighth of the tick squared.
+    """
+    period = 2e-6
+    config = PrefilterConfig("critically_damped", 3, CUTOFF_HZ)
+    model = Prefilter(config, period, needed=3)
+    spring = SprungDeflection(np.array([STIFFNESS]), np.array([DAMPING]), period)
+    state, deflection, wanted = model.at_rest(np.zeros(1)), np.zeros(1), np.ones(1)
+    step, x = expm(chain() * period), np.eye(9)[8]
+    gaps = []
+    for _ in range(round(0.05 / period)):
+        load = LINK * state[2]
+        state = model.step(state, wanted, wanted)
+        deflection = spring.step(deflection, load, LINK * state[2])
+        x = step @ x
+        gaps.append(state[0, 0] - deflection[0] - x[6])
+    assert abs(x[6]) > 0.1
+    assert np.abs(gaps).max() < 1e-9
 
 
 def test_with_another_spring_in_the_plant_the_controller_has_something_to_do():
