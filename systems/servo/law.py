@@ -11,17 +11,21 @@ from pydrake.systems.framework import Context, DiscreteValues, LeafSystem
 
 from robots.compliant_kinematics import controller_kinematics
 from robots.inverse_kinematics import JointLimitError, UnreachableError
-from robots.kinematics import rotation_about
+from robots.kinematics import robust_solve, rotation_about
 from robots.model import NUM_JOINTS, RobotModel
 from robots.newton_inverse import InverseSolver, inverse_kinematics
+from robots.pose import pose_error
 from systems.guard import GuardConfig
 from systems.samples import JointSample, PoseSample
 
 _ENTRY = 19  # a moment of the path: time, the rows of the 3 x 4 pose matrix, the twist
 # rad in one tick: ten times what the fastest joint can do, far less than from branch to branch
 _LARGEST_STEP = 0.4
+_JOINTS_SIZE = 18  # positions, velocities, velocities of the tick before
+_NEWTON_STEP = 5e-5  # rad; what one such step leaves is its square, a few nanometres
+_DAMPED = 1e-10  # rad and m that a step leaves which was not damped
 _ROTATION, _TRANSLATION = slice(0, 3), slice(3, 6)
-_NO_DEVIATION = 1e-16  # rad^2
+_NO_DEVIATION = 1e-8  # rad
 _NO_COMMAND = np.full(NUM_JOINTS, np.nan)
 
 
@@ -106,6 +110,7 @@ class ServoLaw(LeafSystem):
         self.config, self.period = config, period
         self._kinematics = controller_kinematics(robot, payload)
         self._inverse = inverse_kinematics(robot, payload)
+        self._lower, self._upper = robot.lower.tolist(), robot.upper.tolist()
         self._gains = np.repeat([config.rotation, config.translation], 3)
         self._angle_limit = math.radians(config.correction_limit_deg)
         self._guard, self._preview = guard, preview
@@ -181,6 +186,42 @@ class ServoLaw(LeafSystem):
         discrete_state.set_value(3, np.array([last_used, refused, newest]))
         discrete_state.set_value(5, step.memory)
 
+    def _joints_at(self, X_WE: np.ndarray, V_WE: np.ndarray, last: np.ndarray) -> np.ndarray:
+        """The joints for a pose (3, 4) and a twist, next to those of the last tick.
+
+        The last velocities lead so close that one Newton step is enough; where they do not, or close to a
+        singularity, the inverse kinematics is asked.
+
+        Args:
+            X_WE, V_WE: where to be.
+            last: what this function returned a tick ago, or positions and twelve zeros.
+
+        Returns:
+            Positions in rad, velocities in rad/s, and velocities of the tick before, shape (18,).
+
+        Raises:
+            UnreachableError, JointLimitError: as `followed_branch`.
+        """
+        q, velocity, before = last[:6], last[6:12], last[12:]
+        predicted = q + self.period * (1.5 * velocity - 0.5 * before)
+        X, J = self._kinematics.forward_and_jacobian(predicted)
+        twists = np.empty((2, 6)).T  # columns that LAPACK need not copy
+        twists[:, 0], twists[:, 1] = pose_error(X_WE, X), V_WE
+        rates = robust_solve(J, twists)
+        step = rates[:, 0]
+        left = twists[:, 0] - J @ step
+        joints = np.empty(_JOINTS_SIZE)
+        joints[:6], joints[6:12], joints[12:] = predicted + step, rates[:, 1], velocity
+        inside = zip(self._lower, joints[:6].tolist(), self._upper, strict=True)
+        if (
+            step @ step > _NEWTON_STEP**2
+            or left @ left > _DAMPED**2
+            or not all(lower <= angle <= upper for lower, angle, upper in inside)
+        ):
+            joints[:6] = followed_branch(self._inverse, X_WE, q)
+            joints[6:12] = robust_solve(self._kinematics.jacobian(joints[:6]), V_WE)
+        return joints
+
     def _within_limits(self, twist: np.ndarray, correction: np.ndarray) -> np.ndarray:
         """The twist that a law adds; where the correction stands at its limit, it may only shrink."""
         for part, limit in ((_ROTATION, self._angle_limit), (_TRANSLATION, self.config.correction_limit)):
@@ -194,7 +235,7 @@ class ServoLaw(LeafSystem):
         if not self._deviation.HasValue(context):
             return None
         deviation = self._deviation.Eval(context)
-        if deviation @ deviation < _NO_DEVIATION:
+        if not any(abs(angle) > _NO_DEVIATION for angle in deviation.tolist()):
             return None
         commanded = context.get_discrete_state(self._outputs[0]).value()
         if math.isnan(commanded[0]):

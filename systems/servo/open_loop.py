@@ -2,17 +2,20 @@
 
 import numpy as np
 
-from robots.kinematics import robust_solve
-from systems.servo.law import Moment, ServoLaw, Step, followed_branch
+from systems.servo.law import Moment, ServoLaw, Step
 
 
 class OpenLoop(ServoLaw):
     """Commands the joint positions at which a perfect robot would be on the path.
 
-    The memory holds the last joint positions, which choose the branch.
+    The memory holds the joints of the last tick.
     """
 
+    memory_size = 18
+
+    def _start(self, moment: Moment) -> np.ndarray:
+        return np.concatenate([moment.position, np.zeros(12)])
+
     def _step(self, moment: Moment, memory: np.ndarray) -> Step:
-        q = followed_branch(self._inverse, moment.X_WD, memory)
-        velocity = robust_solve(self._kinematics.jacobian(q), moment.V_WD)
-        return Step(q, velocity, np.zeros(6), q)
+        joints = self._joints_at(moment.X_WD, moment.V_WD, memory)
+        return Step(joints[:6], joints[6:12], np.zeros(6), joints)

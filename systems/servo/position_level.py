@@ -4,9 +4,8 @@ import math
 
 import numpy as np
 
-from robots.kinematics import robust_solve
 from robots.pose import angular_velocity, euler_difference, euler_rates, rotation_from_zyx, zyx_angles
-from systems.servo.law import Moment, ServoLaw, Step, followed_branch
+from systems.servo.law import Moment, ServoLaw, Step
 
 
 class PositionLevel(ServoLaw):
@@ -17,15 +16,15 @@ class PositionLevel(ServoLaw):
     The initial error is taken from the nominal kinematics, because that is what makes the start smooth
     also for a robot whose geometry is wrong. The correction is limited.
 
-    The memory holds c (Euler angles alpha, beta, gamma in rad, then the position in m) and the last joint
-    positions, which choose the branch.
+    The memory holds c (Euler angles alpha, beta, gamma in rad, then the position in m) and the joints of the
+    last tick.
     """
 
-    memory_size = 12
+    memory_size = 24
 
     def _start(self, moment: Moment) -> np.ndarray:
         X_WE = self._kinematics.forward(moment.position)[:3]
-        return np.concatenate([_euler_difference(X_WE, moment.X_WD), moment.position])
+        return np.concatenate([_euler_difference(X_WE, moment.X_WD), moment.position, np.zeros(12)])
 
     def _step(self, moment: Moment, memory: np.ndarray) -> Step:
         rate = np.zeros(6)
@@ -40,15 +39,14 @@ class PositionLevel(ServoLaw):
         X_WC = np.empty((3, 4))
         X_WC[:, :3] = rotation_from_zyx(np.array(zyx))
         X_WC[:, 3] = [row[3] + way for row, way in zip(rows, shift, strict=True)]
-        q = followed_branch(self._inverse, X_WC, memory[6:])
 
         *wanted_w, x, y, z = moment.V_WD.tolist()
         *turning, dx, dy, dz = rate.tolist()
         zyx_rates = [a + b for a, b in zip(turning, euler_rates(wanted_zyx, wanted_w), strict=True)]
         V = np.array([*angular_velocity(zyx, zyx_rates), x + dx, y + dy, z + dz])
-        velocity = robust_solve(self._kinematics.jacobian(q), V)
+        joints = self._joints_at(X_WC, V, memory[6:])
         correction = np.array([*angular_velocity(zyx, turn), *shift])
-        return Step(q, velocity, correction, np.array([*c, *q.tolist()]))
+        return Step(joints[:6], joints[6:12], correction, np.concatenate([c, joints]))
 
     def _limited(self, correction: np.ndarray) -> list[float]:
         """A correction, angle and length cut to their limits."""
