@@ -17,21 +17,23 @@ from rich.markup import escape
 from diagrams.log import RunLog
 from diagrams.run import Experiment
 from diagrams.scenario import load_scenario, shipped_scenarios
-from experiments.calibrate_command import calibrate_command
-from experiments.cameras_command import cameras_app
-from experiments.cell_command import cell_command
-from experiments.compare import compare, simulating
-from experiments.console import count, print_list, progress_bar, refusing
-from experiments.design_command import design_command
-from experiments.diagram_view import write_diagram
-from experiments.drivetrain_command import drivetrain_command
-from experiments.feedforward_command import feedforward_command
-from experiments.frame_commands import align_command, chain_command, frame_command, tool_command
-from experiments.guided_command import ask_before_moving, guide, on_station
-from experiments.latency_command import latency_command
-from experiments.live import LiveView, advance_live
-from experiments.modes_command import modes_command
-from experiments.options import (
+from experiments.calibration.calibrate_command import calibrate_command
+from experiments.calibration.design_command import design_command
+from experiments.cameras.command import cameras_app
+from experiments.comparison.compare import compare, simulating
+from experiments.comparison.results import RESULTS, write_results
+from experiments.diagram.view import write_diagram
+from experiments.drivetrain.command import drivetrain_command
+from experiments.feedforward.command import feedforward_command
+from experiments.frames.commands import align_command, chain_command, frame_command, tool_command
+from experiments.modes.command import modes_command
+from experiments.replay.live import LiveView, advance_live
+from experiments.report.report import verdict
+from experiments.station.cell_command import cell_command
+from experiments.station.guided_command import ask_before_moving, guide, on_station
+from experiments.station.latency_command import latency_command
+from experiments.terminal.console import count, print_list, progress_bar, refusing
+from experiments.terminal.options import (
     AnyScenarioOption,
     CameraOption,
     FeedforwardOption,
@@ -43,12 +45,10 @@ from experiments.options import (
     WithCellOption,
     YesOption,
 )
-from experiments.prepare import Prepared, check, prepare
-from experiments.report import verdict
-from experiments.results import RESULTS, write_results
-from experiments.staging import staged_file, staged_folder
-from experiments.tables import print_summary
-from experiments.workers import usable_cores
+from experiments.terminal.prepare import Prepared, check, prepare
+from experiments.terminal.staging import staged_file, staged_folder
+from experiments.terminal.tables import print_summary
+from experiments.terminal.workers import usable_cores
 from robots.model import load_robot, shipped_robots
 from systems.servo import COMPARED_LAWS, LAWS
 

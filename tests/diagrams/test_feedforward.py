@@ -9,7 +9,7 @@ import pytest
 from diagrams.log import RunLog
 from diagrams.run import Experiment, run
 from diagrams.scenario import load_scenario
-from experiments.metrics import summary
+from experiments.comparison.metrics import summary
 from robots.drivetrain.stiffening import Stiffening
 from robots.model import RobotModel, load_robot
 from robots.robot_file import robot_text

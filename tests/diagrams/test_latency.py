@@ -5,8 +5,8 @@ import pytest
 
 from diagrams.latency_run import LatencyConfig, measure_latency, motion
 from diagrams.scenario import load_scenario
-from experiments.latency import Latency, delay_between, evaluate
-from experiments.latency_command import scenario_with
+from experiments.station.latency import Latency, delay_between, evaluate
+from experiments.station.latency_command import scenario_with
 from robots.model import load_robot
 from tests.diagrams.lockstep import Lockstep
 

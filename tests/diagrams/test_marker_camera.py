@@ -6,7 +6,7 @@ import pytest
 from diagrams.log import RunLog
 from diagrams.run import Experiment, run
 from diagrams.scenario import ScenarioError, load_scenario
-from experiments.metrics import error_metrics
+from experiments.comparison.metrics import error_metrics
 
 SETTLED = [
     "reference.path=circle",

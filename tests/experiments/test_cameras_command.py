@@ -8,8 +8,8 @@ import pytest
 import typer
 from typer.testing import CliRunner, Result
 
-from experiments.cameras_command import cameras_app
-from experiments.cameras_sweeps import SWEEPS
+from experiments.cameras.command import cameras_app
+from experiments.cameras.sweeps import SWEEPS
 from systems.tracking.measuring_cell import load_cell
 from tests.experiments.browser import open_page
 from tests.experiments.commands import SHORT, truetip

@@ -5,11 +5,11 @@ from functools import cache
 import numpy as np
 import pytest
 
-from experiments.cameras_accuracy import accuracy, centroid_errors, information, pose_covariance
-from experiments.cameras_study import covariances, study_setup
-from experiments.cameras_sweeps import SWEEPS, SweepPoint, SweepSetup
-from experiments.cameras_variations import best_subsets, ring, with_markers
-from experiments.prepare import prepare
+from experiments.cameras.accuracy import accuracy, centroid_errors, information, pose_covariance
+from experiments.cameras.study import covariances, study_setup
+from experiments.cameras.sweeps import SWEEPS, SweepPoint, SweepSetup
+from experiments.cameras.variations import best_subsets, ring, with_markers
+from experiments.terminal.prepare import prepare
 
 
 @cache

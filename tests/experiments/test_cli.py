@@ -10,7 +10,7 @@ import pytest
 
 from diagrams.scenario import shipped_scenarios
 from experiments import cli
-from experiments.prepare import check, prepare
+from experiments.terminal.prepare import check, prepare
 from robots.model import shipped_robots
 from tests.experiments.commands import RESULTS, SHORT, files, truetip
 

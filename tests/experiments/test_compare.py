@@ -9,9 +9,9 @@ import pytest
 
 from diagrams.run import run
 from diagrams.scenario import load_scenario
-from experiments.compare import compare
-from experiments.prepare import quick
-from experiments.workers import SimulationError
+from experiments.comparison.compare import compare
+from experiments.terminal.prepare import quick
+from experiments.terminal.workers import SimulationError
 from robots.model import load_robot
 from tests.experiments.commands import SHORT
 

@@ -9,10 +9,10 @@ from pydrake.systems.primitives import VectorLogSink
 
 from diagrams.run import Experiment
 from diagrams.scenario import load_scenario
-from experiments.diagram_graph import OUTSIDE, read_graph
-from experiments.diagram_layout import Layout
-from experiments.diagram_stack import stacked
-from experiments.diagram_view import svg
+from experiments.diagram.graph import OUTSIDE, read_graph
+from experiments.diagram.layout import Layout
+from experiments.diagram.stack import stacked
+from experiments.diagram.view import svg
 from tests.experiments.commands import truetip
 
 TEXT = "{http://www.w3.org/2000/svg}text"

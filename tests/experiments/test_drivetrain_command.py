@@ -6,7 +6,7 @@ from pathlib import Path
 from typer.testing import CliRunner
 
 from experiments.cli import app
-from experiments.drivetrain_figures import efficiency_run
+from experiments.drivetrain.figures import efficiency_run
 from tests.experiments.browser import open_page
 
 

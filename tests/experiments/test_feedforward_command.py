@@ -9,10 +9,10 @@ import pytest
 import typer
 from typer.testing import CliRunner, Result
 
-from experiments.feedforward_command import PAGE, feedforward_command
-from experiments.feedforward_rectangle import RectangleTrial, rectangle, working_position
-from experiments.feedforward_study import KINDS
-from experiments.feedforward_trial import (
+from experiments.feedforward.command import PAGE, feedforward_command
+from experiments.feedforward.rectangle import RectangleTrial, rectangle, working_position
+from experiments.feedforward.study import KINDS
+from experiments.feedforward.trial import (
     RINGING,
     SPEEDING_UP,
     Trial,

@@ -9,7 +9,7 @@ import typer
 from scipy.spatial.transform import Rotation
 from typer.testing import CliRunner, Result
 
-from experiments.frame_commands import align_command, chain_command, frame_command, tool_command
+from experiments.frames.commands import align_command, chain_command, frame_command, tool_command
 
 app = typer.Typer()
 for name, command in {

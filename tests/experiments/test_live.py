@@ -4,7 +4,7 @@ import numpy as np
 
 from diagrams.run import Experiment, run
 from diagrams.scenario import load_scenario
-from experiments.live import LiveView, advance_live
+from experiments.replay.live import LiveView, advance_live
 from robots.model import load_robot
 from tests.experiments.test_compare import SETTINGS, same
 

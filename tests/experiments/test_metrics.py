@@ -8,8 +8,15 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from experiments.metrics import best_law, error_metrics, summary, timing, transient_metrics, write_json
-from experiments.report_iso9283 import iso_9283, path_distance, repeatability
+from experiments.comparison.iso9283 import iso_9283, path_distance, repeatability
+from experiments.comparison.metrics import (
+    best_law,
+    error_metrics,
+    summary,
+    timing,
+    transient_metrics,
+    write_json,
+)
 from tests.experiments.synthetic import comparison, displaced, make_log, rectangle, straight
 
 TIME = np.arange(0.0, 6.002, 0.004)

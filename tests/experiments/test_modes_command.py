@@ -8,8 +8,8 @@ import pytest
 import typer
 from typer.testing import CliRunner, Result
 
-from experiments.modes_command import modes_command
-from experiments.modes_study import SHOWN_MODES, TIP_MOTIONS
+from experiments.modes.command import modes_command
+from experiments.modes.study import SHOWN_MODES, TIP_MOTIONS
 from robots.model import load_robot
 from robots.modes import ModalAnalysis, stretched
 from tests.experiments.browser import open_page

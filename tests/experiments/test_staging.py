@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from experiments.staging import staged_file, staged_folder
+from experiments.terminal.staging import staged_file, staged_folder
 from tests.experiments.commands import files
 
 

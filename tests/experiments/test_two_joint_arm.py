@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from experiments.two_joint_arm import (
+from experiments.feedforward.two_joint_arm import (
     ANGLE,
     DAMPING,
     FAR,

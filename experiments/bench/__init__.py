@@ -1,0 +1,1 @@
+"""Benchmarks: cost and accuracy as ratios, measured in one run."""

@@ -1,0 +1,188 @@
+"""How quickly the servo answers a controller, beside an echo: ``python -m experiments.bench.wire [MINUTES]``.
+
+A virtual cell and the servo run in real time; at the same time a metronome sends a controller's messages to
+two echoes on the same machine. One does what the smallest client of EGM does, written with a package of
+others (ABBRobotEGM): decode, answer with the joints that came. The other sends the bytes back as they are.
+All three are timed in the same way, from the moment at which a message can be read to the reply's departure.
+A cycle is missed when its message is not answered before the next one is there.
+"""
+
+import os
+import select
+import socket
+import subprocess
+import sys
+import time
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from diagrams.scenario import load_scenario
+from experiments.station.guided import compare_on_station
+from robots.model import load_robot
+from systems.egm.channel import UdpChannel, steady_time
+from systems.egm.controller import EgmRunConfig, VirtualController
+
+LAW = "numerical_ik"
+PERIOD = 4.032e-3  # s
+# A machine that stands still for a moment shall cost cycles, not end the run, and neither shall a robot that
+# waits at its start for minutes.
+PATIENT = [
+    "station.link.break_after=5",
+    "station.egm.run.timeout=5",
+    "station.egm.run.condition_time=3600",
+]
+ALLOWED, ALLOWED_LATE = 0.5, 4.032  # ms, median and 99 %
+ALLOWED_RATIO = 4.0
+
+Row = tuple[str, str, float, str, float, str]
+
+
+@dataclass(frozen=True)
+class TurnAround:
+    """How a client has answered."""
+
+    median: float  # ms
+    late: float  # ms, 99 %
+    missed: int  # messages that were not answered before the next one came
+
+
+def wire(minutes: float = 0.0) -> Iterator[Row]:
+    """The benchmark's rows: turn-around of the servo against the echoes and what is allowed."""
+    servo, echo, plain = turn_arounds(minutes)
+    text = f"{LAW} over EGM: turn-around"
+    yield "turn_around", text, servo.median, "ms", ALLOWED_RATIO * echo.median, "4 EGM echoes"
+    yield "turn_around_median", f"{text}, median", servo.median, "ms", ALLOWED, "allowed"
+    yield "turn_around_99", f"{text}, 99 %", servo.late, "ms", ALLOWED_LATE, "allowed"
+    yield "turn_around_plain", f"{text}", servo.median, "ms", plain.median, "plain echo"
+    yield "missed_cycles", f"{LAW} over EGM: missed", float(servo.missed), "", 1.0 + echo.missed, "echo + 1"
+
+
+def turn_arounds(minutes: float = 0.0) -> tuple[TurnAround, TurnAround, TurnAround]:
+    """Servo, EGM echo and plain echo over the same time: one path, or as many minutes as are wanted."""
+    settle = [f"reference.settle={60.0 * minutes}"] if minutes else []
+    scenario = load_scenario("cell", ["station.kind=egm", *PATIENT, *settle])
+    with ExitStack() as stack:
+        echoes = [stack.enter_context(_Echo(kind)) for kind in ("egm", "plain")]
+        comparison = compare_on_station(scenario, load_robot(scenario.robot), [LAW], with_cell=True)
+        found = [echo.finish() for echo in echoes]
+    record = comparison.records[LAW][0]
+    if record.ended != "path":
+        raise RuntimeError(f"the run did not come to its end: {record.ended}")
+    missed = record.counters["missing"] + record.counters["superseded"]
+    times = 1e3 * record.turn_around
+    servo = TurnAround(float(np.median(times)), float(np.percentile(times, 99)), missed)
+    return servo, found[0], found[1]
+
+
+class _Echo:
+    """An echo and its metronome, in processes of their own."""
+
+    def __init__(self, kind: str) -> None:
+        self._kind = kind
+
+    def __enter__(self) -> "_Echo":
+        def start(*words: str) -> subprocess.Popen:
+            command = [sys.executable, "-m", "experiments.bench.wire", *words]
+            return subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True)
+
+        self._echo = start("echo", self._kind)
+        assert self._echo.stdout is not None
+        port = self._echo.stdout.readline().strip()
+        self._metronome = start("metronome", port)
+        return self
+
+    def finish(self) -> TurnAround:
+        """Ends it and says how it was."""
+        self._metronome.communicate("")
+        output, _ = self._echo.communicate(timeout=30.0)
+        median, late, missed = output.split()
+        return TurnAround(float(median), float(late), int(missed))
+
+    def __exit__(self, *_: object) -> None:
+        for process in (self._metronome, self._echo):
+            process.kill()
+
+
+def _echo(kind: str) -> None:
+    """Answers until it is told to stop, then prints median and 99 % in ms, and what it has missed."""
+    answer, channel = _egm_answer() if kind == "egm" else _plain_answer()
+    print(channel.getsockname()[1], flush=True)
+    times, missed = [], 0
+    while (started := answer()) is not None:
+        times.append(steady_time() - started)
+        missed += bool(select.select([channel], [], [], 0.0)[0])
+    quantiles = 1e3 * np.percentile(times[20:], [50, 99])
+    print(f"{quantiles[0]} {quantiles[1]} {missed}")
+
+
+def _egm_answer() -> tuple[Callable[[], float | None], Any]:
+    from ABBRobotEGM import EGM
+
+    client = EGM(port=0)
+    channel = client.socket
+    assert channel is not None
+
+    def answer() -> float | None:
+        select.select([channel], [], [])
+        started = steady_time()
+        ok, state = client.receive_from_robot(0.0)
+        if not ok or state is None or state.header.tm == 0:
+            return None
+        client.send_to_robot(state.joint_angles)
+        return started
+
+    return answer, channel
+
+
+def _plain_answer() -> tuple[Callable[[], float | None], Any]:
+    channel = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+    channel.bind(("127.0.0.1", 0))
+
+    def answer() -> float | None:
+        select.select([channel], [], [])
+        started = steady_time()
+        data, sender = channel.recvfrom(65536)
+        if len(data) < 10:
+            return None
+        channel.sendto(data, sender)
+        return started
+
+    return answer, channel
+
+
+def _metronome(port: int) -> None:
+    """Sends messages of a robot that stands until its input ends, then one that says stop."""
+    robot = load_robot("irb1200")
+    controller, still = VirtualController(robot, EgmRunConfig()), np.zeros(6)
+    os.set_blocking(sys.stdin.fileno(), False)
+    with UdpChannel() as channel:
+        start, cycle = steady_time(), 0
+        while sys.stdin.buffer.read() is None:
+            cycle += 1
+            data = controller.report(1.0 + cycle * PERIOD, still, still, still)
+            time.sleep(max(0.0, start + cycle * PERIOD - steady_time()))
+            channel.send(data, ("127.0.0.1", port))
+            channel.receive()
+        # A message at the controller's time zero ends the echoes: none of its own has that.
+        time.sleep(0.1)
+        channel.send(b"", ("127.0.0.1", port))
+
+
+def main() -> None:
+    """Prints the rows, or plays one of the parts."""
+    words = sys.argv[1:]
+    if words[:1] == ["echo"]:
+        _echo(words[1])
+    elif words[:1] == ["metronome"]:
+        _metronome(int(words[1]))
+    else:
+        for name, text, value, unit, yardstick, against in wire(float(words[0]) if words else 0.0):
+            print(f"{name:20s} {text:40s} {value:8.3f} {unit:3s} {against} {yardstick:.3f} {unit}")
+
+
+if __name__ == "__main__":
+    main()

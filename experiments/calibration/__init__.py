@@ -1,0 +1,1 @@
+"""From measurement configurations to a calibrated robot: ``truetip design`` and ``truetip calibrate``."""

@@ -1,0 +1,180 @@
+"""The chain of a calibration: design, measurement, identification, validation, path."""
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from diagrams.log import RunLog
+from diagrams.measurement_run import MeasurementRecord, MeasurementRun
+from diagrams.scenario import Scenario
+from experiments.comparison.compare import RunJob, run_job
+from experiments.terminal.workers import Progress, SimulationError, in_processes
+from robots.calibration.admissible import AdmissibleConfigurations
+from robots.calibration.candidate_grid import SOURCE_RANGES
+from robots.calibration.design import MeasurementDesign
+from robots.calibration.identification import IdentificationConfig, Identified
+from robots.calibration.measurements import SOURCE_NOISE, MeasurementNoise, Measurements
+from robots.calibration.ordering import visiting_order
+from robots.calibration.validation import ErrorStatistics, prediction_errors, statistics
+from robots.error_parameters import NUM_PARAMETERS
+from robots.identifiability import identifiable_parameters
+from robots.model import NUM_JOINTS, RobotModel
+
+# The source's validation set has 125 configurations, Probst (2024) section 4.3.
+VALIDATION_COUNT = 125
+NOISES = {"none": MeasurementNoise(), "source": SOURCE_NOISE}
+_STRETCHES = 8  # into which a set is divided to be measured side by side; part of the result
+
+
+@dataclass(frozen=True)
+class MeasuredSets:
+    """Tables to identify from and to validate with; the truth only where it was simulated."""
+
+    calibration: Measurements
+    validation: Measurements | None
+    validation_truth: Measurements | None
+
+
+@dataclass(frozen=True)
+class CalibrationStudy:
+    """All that a calibration has found."""
+
+    nominal: RobotModel
+    calibrated: RobotModel
+    design: MeasurementDesign | None
+    design_seconds: float
+    sets: MeasuredSets
+    identified: Identified
+    truth: np.ndarray | None  # (48,) base parameters, where they are known
+    before: ErrorStatistics | None
+    after: ErrorStatistics | None
+    geometry_only: ErrorStatistics | None  # what is left without the compliances, where these were identified
+    after_noise_free: ErrorStatistics | None
+
+
+@dataclass(frozen=True)
+class _Stretch:
+    scenario: Scenario
+    q: np.ndarray
+    seed: int
+
+
+def validation_configurations(robot: RobotModel, count: int, seed: int) -> np.ndarray:
+    """Admissible configurations spread over the source's ranges, in a short order, (count, 6) in rad.
+
+    The first three joints stand on a grid, 5 by 5 by 5 for the source's 125 configurations, the wrist
+    anywhere. What is not admissible is replaced by random configurations.
+    """
+    rng = np.random.default_rng([seed, 1])
+    lower, upper = np.deg2rad([(axis.lower_deg, axis.upper_deg) for axis in SOURCE_RANGES]).T
+    cells = max(1, round(count ** (1.0 / 3.0)))
+    centres = (np.arange(cells) + 0.5) / cells
+    arm = np.stack(np.meshgrid(centres, centres, centres, indexing="ij"), -1).reshape(-1, 3)
+    shares = np.hstack([rng.permutation(arm), rng.uniform(size=(len(arm), 3))])
+    admissible, found = AdmissibleConfigurations(robot), np.empty((0, NUM_JOINTS))
+    while True:
+        q = lower + shares * (upper - lower)
+        found = np.vstack([found, q[admissible(q)]])[:count]
+        if len(found) == count:
+            return found[visiting_order(found, np.zeros(NUM_JOINTS))]
+        shares = rng.uniform(size=(count, NUM_JOINTS))
+
+
+def measure_sets(
+    scenario: Scenario,
+    calibration: np.ndarray,
+    validation: np.ndarray,
+    payloads: list[float],
+    noise: MeasurementNoise,
+    processes: int | None = None,
+    progress: Callable[[float], None] | None = None,
+) -> MeasuredSets:
+    """Measures both sets through the station of a scenario.
+
+    Args:
+        scenario: the station and its camera.
+        calibration: configurations in rad, measured with every payload, (n, 6).
+        validation: configurations in rad, measured with the first payload, (m, 6).
+        payloads: masses at the flange in kg.
+        noise: of every row, on top of what the camera does.
+        processes: how many work at a time; None for one per core.
+        progress: is called now and then with the share that is done.
+
+    Raises:
+        SimulationError: if a simulation broke off.
+    """
+    jobs, owners = [], []
+    for number, (q, payload) in enumerate(
+        [*((calibration, load) for load in payloads), (validation, payloads[0])]
+    ):
+        loaded = replace(scenario, station=replace(scenario.station, payload=payload))
+        for stretch in np.array_split(q, min(_STRETCHES, len(q))):
+            jobs.append(_Stretch(loaded, stretch, scenario.seed + len(jobs)))
+            owners.append(number)
+    records = in_processes(_measure, jobs, processes, progress)
+    measured: list[list[Measurements]] = [[] for _ in range(len(payloads) + 1)]
+    truth: list[Measurements] = []
+    for owner, record in zip(owners, records, strict=True):
+        measured[owner].append(record.measured)
+        if owner == len(payloads):
+            truth.append(record.truth)
+    tables = [_joined(parts) for parts in measured]
+    rng = np.random.default_rng([scenario.seed, 2])
+    return MeasuredSets(_joined(tables[:-1]).noisy(noise, rng), tables[-1].noisy(noise, rng), _joined(truth))
+
+
+def _measure(job: _Stretch, progress: Progress) -> MeasurementRecord:
+    try:
+        return MeasurementRun(job.scenario).measure(job.q, job.seed, progress)
+    except RuntimeError as error:
+        raise SimulationError(f"measurement run: {' '.join(str(error).split())}") from error
+
+
+def _joined(tables: list[Measurements]) -> Measurements:
+    table = tables[0]
+    for other in tables[1:]:
+        table = table.joined(other)
+    return table
+
+
+def validated(
+    robot: RobotModel, measurements: Measurements | None, position_only: bool
+) -> ErrorStatistics | None:
+    """Statistics of a robot's prediction errors; None without measurements."""
+    if measurements is None:
+        return None
+    return statistics(
+        prediction_errors(robot, measurements.without_rotation() if position_only else measurements)
+    )
+
+
+def true_base_parameters(scenario: Scenario, robot: RobotModel, position_only: bool) -> np.ndarray:
+    """The station's errors in base parameters, to first order, (48,)."""
+    found = identifiable_parameters(robot, position_only)
+    errors = scenario.station.errors
+    return found.reduce(errors.vector(robot) if errors else np.zeros(NUM_PARAMETERS))
+
+
+def path_runs(
+    scenario: Scenario,
+    nominal: RobotModel,
+    calibrated: RobotModel,
+    processes: int | None = None,
+    progress: Callable[[float], None] | None = None,
+) -> dict[str, RunLog]:
+    """The path without a camera, planned with the nominal and with the calibrated robot.
+
+    Raises:
+        SimulationError: if a simulation broke off.
+    """
+    jobs = [RunJob(scenario, robot, "open_loop", scenario.seed) for robot in (nominal, calibrated)]
+    logs = in_processes(run_job, jobs, processes, progress)
+    return dict(zip(("before", "after"), logs, strict=True))
+
+
+def identification_config(
+    compliance: bool, fixed: list[str], noise: MeasurementNoise
+) -> IdentificationConfig:
+    """What to identify; residuals are whitened where the noise is known."""
+    return IdentificationConfig(compliance=compliance, fixed=tuple(fixed), noise=noise)

@@ -1,0 +1,148 @@
+"""``truetip design``: where to measure, and how good that is."""
+
+import resource
+import sys
+import time
+from contextlib import ExitStack
+from pathlib import Path
+from typing import Annotated
+
+import typer
+from rich.console import Console
+from rich.markup import escape
+
+from experiments.comparison.metrics import json_text, write_json
+from experiments.report.files import write_text
+from experiments.report.plot_page import Section, write_plot_page
+from experiments.report.robot_plot import joints_figure, tips_figure
+from experiments.terminal.console import progress_bar, refusing
+from experiments.terminal.staging import staged_file
+from robots.calibration.admissible import AdmissibleConfig, AdmissibleConfigurations, View
+from robots.calibration.criteria import NAMES
+from robots.calibration.design import MeasurementDesign, design_measurements
+from robots.model import RobotModel, load_robot
+
+_MEASURES = {
+    "b3": "smallest eigenvalue of the information matrix, in m and rad",
+    "d": "root of its determinant: volume of the confidence ellipsoid of the parameters",
+    "i": "inverse of the mean variance of the pose over the workspace",
+}
+
+
+def design_command(
+    robot: Annotated[
+        str, typer.Option("--robot", metavar="NAME|FILE", help="The robot that will be measured.")
+    ] = "irb1200",
+    count: Annotated[int, typer.Option(metavar="N", help="Configurations.")] = 75,
+    criterion: Annotated[str, typer.Option(metavar="NAME", help=f"One of {', '.join(NAMES)}.")] = "b3",
+    position_only: Annotated[
+        bool, typer.Option("--position-only", help="Only the position of the tool will be measured.")
+    ] = False,
+    anywhere: Annotated[
+        bool, typer.Option("--anywhere", help="Do not mind the floor, the base and the joint limits.")
+    ] = False,
+    camera: Annotated[
+        str | None,
+        typer.Option(
+            metavar="X,Y,Z",
+            help="Place of a camera in m that must see the tool; without it they stand all around.",
+        ),
+    ] = None,
+    seed: Annotated[int, typer.Option(metavar="N", help="Another seed, another design as good.")] = 0,
+    out: Annotated[
+        str | None, typer.Option(metavar="FILE.csv", help="The configurations, in the order of the visits.")
+    ] = None,
+    report: Annotated[Path, typer.Option(metavar="FILE.html", help="The picture.")] = Path("out/design.html"),
+    json_file: Annotated[
+        str | None,
+        typer.Option("--json", metavar="FILE", help="The numbers; - prints them, and nothing else."),
+    ] = None,
+) -> None:
+    """Choose the configurations at which measurements say most about the robot's errors."""
+    human = Console(stderr=json_file == "-")
+    with refusing(ValueError, OSError), ExitStack() as stack:
+        page = stack.enter_context(staged_file(report))
+        table = stack.enter_context(staged_file(out)) if out else None
+        copy = stack.enter_context(staged_file(json_file)) if json_file not in (None, "-") else None
+        model = load_robot(robot)
+        before, started = _peak_mb(), time.perf_counter()
+        view = None if camera is None else View(_place(camera))
+        admissible = None if anywhere else AdmissibleConfigurations(model, AdmissibleConfig(view=view))
+        with progress_bar(f"{count} configurations") as progress:
+            design = design_measurements(
+                model, count, criterion, position_only, admissible=admissible, seed=seed, progress=progress
+            )
+        seconds = time.perf_counter() - started
+        result = {
+            "criterion": criterion,
+            "count": count,
+            "b3": design.b3,
+            "bound": design.bound,
+            "value": design.value,
+            "seconds": seconds,
+            "peak_mb": _peak_mb() - before,
+        }
+        if table:
+            write_text(table, configuration_text(design))
+        if copy:
+            write_json(copy, result)
+        write_design_page(page, model, design)
+    if json_file == "-":
+        sys.stdout.write(json_text(result))
+    human.print(escape(design_verdict(design)))
+    human.print(f"{seconds:.1f} s, {result['peak_mb']:.0f} MB beside the program itself")
+    for path in filter(None, (str(report), out)):
+        human.print(escape(path), soft_wrap=True)
+
+
+def _place(text: str) -> tuple[float, float, float]:
+    try:
+        x, y, z = (float(part) for part in text.split(","))
+    except ValueError:
+        raise ValueError(f"--camera must be three numbers in m such as 1.5,0,1.2, got '{text}'") from None
+    return x, y, z
+
+
+def design_verdict(design: MeasurementDesign) -> str:
+    """What was reached, in two sentences."""
+    name = design.criterion.upper()
+    restricted = (
+        f", {design.num_refused} of those that came into question refused" if design.num_refused else ""
+    )
+    text = (
+        f"{len(design.configurations)} configurations with {name} = {design.value:.5g}; no choice from the "
+        f"{design.num_candidates} candidates of the grid{restricted} has more than {design.bound:.5g}, so "
+        f"this one is at least {100.0 * design.value / design.bound:.2f} % of the best."
+    )
+    return text if design.criterion == "b3" else f"{text} B3 = {design.b3:.4g}."
+
+
+def configuration_text(design: MeasurementDesign) -> str:
+    """The configurations as a table, in the order of the visits."""
+    header = ",".join(f"q{number}_rad" for number in range(1, 7))
+    lines = [",".join(map(repr, row)) for row in design.configurations.tolist()]
+    return "\n".join([header, *lines]) + "\n"
+
+
+def write_design_page(path: Path, robot: RobotModel, design: MeasurementDesign) -> None:
+    """The picture of a design as a page that opens offline."""
+    sections = [
+        Section(
+            "Where the tool is measured",
+            "Colour and line show the order of the visits; the robot stands at zero.",
+            tips_figure(robot, design.configurations),
+            620,
+        ),
+        Section(
+            "Positions of the joints",
+            f"The criterion {design.criterion.upper()}: {_MEASURES[design.criterion]}.",
+            joints_figure(design.configurations, robot.lower, robot.upper),
+            380,
+        ),
+    ]
+    write_plot_page(path, f"Measurement design, {robot.name}", design_verdict(design), sections)
+
+
+def _peak_mb() -> float:
+    """The most memory that this process has had; before the work it is the code, most of it Drake's."""
+    return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / (1024.0 if sys.platform != "darwin" else 1e6)

@@ -1,0 +1,208 @@
+"""What a calibration tells: JSON, tables on the terminal, and a page."""
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import plotly.graph_objects as go
+from rich import box
+from rich.console import Console
+from rich.markup import escape
+from rich.table import Table
+
+from experiments.calibration.calibrate import CalibrationStudy
+from experiments.comparison.metrics import path_window, pose_errors
+from experiments.report.plot_page import Section, html_table, write_plot_page
+from experiments.report.robot_plot import tips_figure
+from robots.calibration.measurement_file import RowProblem
+from robots.calibration.validation import ErrorStatistics, prediction_errors
+from robots.error_parameters import parameter_names
+
+Problems = Sequence[tuple[str, RowProblem]]
+_AXES = ("Δx mm", "Δy mm", "Δz mm", "ρx °", "ρy °", "ρz °")
+_COLORS = {"before": "#9aa5b4", "after": "#0f7cc0"}
+_CONFIDENCE = 1.96  # standard deviations to either side hold 95 %
+
+
+def calibration_json(study: CalibrationStudy, path: Mapping[str, Any] | None) -> dict[str, Any]:
+    """The numbers of a calibration; what was not done is None."""
+    design = study.design
+    errors = None
+    if study.truth is not None:
+        errors = {"max_abs_error": float(np.abs(study.identified.p - study.truth).max())}
+    return {
+        "identifiable": int(np.sum([name.startswith("p") for name in study.identified.names])),
+        "design": design and {"b3": design.b3, "bound": design.bound, "seconds": study.design_seconds},
+        "parameters": errors,
+        "compliance_rad_per_Nm": study.identified.compliance.tolist(),
+        "iterations": study.identified.iterations,
+        "outliers": list(study.identified.outliers),
+        "validation": {
+            name: found and found.as_dict()
+            for name, found in (
+                ("before", study.before),
+                ("after", study.after),
+                ("after_geometry_only", study.geometry_only),
+                ("after_noise_free", study.after_noise_free),
+            )
+        },
+        "path": path and {name: path[name]["errors"] for name in ("before", "after")},
+    }
+
+
+def print_calibration(
+    console: Console, study: CalibrationStudy, path: Mapping[str, Any] | None, problems: Problems
+) -> None:
+    """Tables 6.3 and 6.4 of Probst (2024) for this calibration."""
+    for name, problem in problems:
+        console.print(
+            f"[yellow]{escape(name)}, line {problem.row}: {escape(problem.what)}; left out[/yellow]"
+        )
+    if study.identified.outliers:
+        rows = ", ".join(map(str, study.identified.outliers))
+        console.print(f"[yellow]Outliers, left out of the identification: rows {rows}[/yellow]")
+    _print(console, "Validation: errors on fresh configurations", _validation_rows(study))
+    if path:
+        _print(console, "Path without a camera: true errors", _path_rows(path))
+    console.print(escape(calibration_verdict(study, path)))
+    console.print()
+
+
+def calibration_verdict(study: CalibrationStudy, path: Mapping[str, Any] | None) -> str:
+    """What was reached, in words."""
+    identified = study.identified
+    text = f"{len(identified.names)} parameters from {len(identified.residuals)} measurements"
+    text += f" in {identified.iterations} iterations."
+    if study.before and study.after:
+        before, after = (float(np.linalg.norm(each.mean_mm)) for each in (study.before, study.after))
+        text += f" On fresh configurations the mean error falls from {before:.3f} to {after:.3f} mm"
+        if study.after_noise_free:
+            text += f" ({np.linalg.norm(study.after_noise_free.mean_mm):.4f} mm without noise)"
+        text += "."
+    if path:
+        before, after = (path[name]["errors"] for name in ("before", "after"))
+        rest = [float(np.linalg.norm(each["static_mm"])) for each in (before, after)]
+        text += (
+            f" On the path the largest true error falls from {before['max_norm_mm']:.2f} to "
+            f"{after['max_norm_mm']:.2f} mm, at rest from {rest[0]:.3f} to {rest[1]:.3f} mm."
+        )
+    return text
+
+
+def _print(console: Console, title: str, rows: Sequence[Sequence[str]]) -> None:
+    table = Table(
+        box=box.SIMPLE_HEAD, title=title, title_justify="left", title_style="italic", pad_edge=False
+    )
+    for head in ("", "", *_AXES):
+        table.add_column(head, justify="right" if head else "left", no_wrap=True)
+    for row in rows:
+        table.add_row(*row)
+    console.print(table)
+
+
+def _validation_rows(study: CalibrationStudy) -> list[list[str]]:
+    rows = []
+    stages = {
+        "uncalibrated": study.before,
+        "geometry only": study.geometry_only,
+        "calibrated": study.after,
+        "without noise": study.after_noise_free,
+    }
+    for stage, found in stages.items():
+        if found is not None:
+            for kind in ("mean", "max", "p90"):
+                rows.append([stage if kind == "mean" else "", kind, *_numbers(found, kind)])
+    return rows
+
+
+def _numbers(found: ErrorStatistics, kind: str) -> list[str]:
+    millimetres, degrees = getattr(found, f"{kind}_mm"), getattr(found, f"{kind}_deg")
+    return [*_digits(millimetres, degrees), *[""] * (3 - len(degrees))]
+
+
+def _digits(millimetres: Sequence[float], degrees: Sequence[float]) -> list[str]:
+    return [f"{value:.4f}" for value in millimetres] + [f"{value:.3f}" for value in degrees]
+
+
+def _path_rows(path: Mapping[str, Any]) -> list[list[str]]:
+    rows = []
+    for stage, name in (("uncalibrated", "before"), ("calibrated", "after")):
+        errors = path[name]["errors"]
+        for kind in ("max", "static"):
+            numbers = _digits(errors[f"{kind}_mm"], errors[f"{kind}_deg"])
+            rows.append([stage if kind == "max" else "", kind, *numbers])
+    return rows
+
+
+def write_calibration_page(
+    page: Path, title: str, study: CalibrationStudy, path: Mapping[str, Any] | None, problems: Problems
+) -> None:
+    """The page of a calibration; opens offline."""
+    head = ["", "", *_AXES]
+    sections = [
+        Section(
+            "Validation", "Mean, largest and 90 % absolute errors.", html_table(head, _validation_rows(study))
+        )
+    ]
+    if study.sets.validation is not None:
+        note = "Distances between measured and predicted positions on the validation set."
+        sections.append(Section("How the errors are spread", note, _histogram(study), 320))
+    if path:
+        note = "No camera: the path is planned with the nominal and with the calibrated robot. True errors."
+        sections.append(Section("Path", note, html_table(head, _path_rows(path))))
+        sections.append(Section("Distance from the path", "", _path_figure(path), 360))
+    note = "With 95 % confidence; a dependent parameter is zero, its effect is in the ones shown."
+    sections.append(Section("Parameters", note, html_table(*_parameter_table(study))))
+    q, rows = study.sets.calibration.q, study.sets.calibration.rows
+    names = [f"row {row}" for row in rows]
+    sections.append(Section("Measured configurations", "", tips_figure(study.nominal, q, names), 560))
+    left_out = [[name, str(problem.row), problem.what] for name, problem in problems]
+    left_out += [
+        ["", str(row), "outlier, left out of the identification"] for row in study.identified.outliers
+    ]
+    if left_out:
+        sections.append(Section("Rows left out", "", html_table(["file", "row", "why"], left_out)))
+    write_plot_page(page, f"Calibration, {title}", calibration_verdict(study, path), sections)
+
+
+def _histogram(study: CalibrationStudy) -> go.Figure:
+    assert study.sets.validation is not None
+    figure = go.Figure()
+    for name, robot in (("before", study.nominal), ("after", study.calibrated)):
+        distance = np.linalg.norm(prediction_errors(robot, study.sets.validation)[:, -3:], axis=1)
+        trace = go.Histogram(x=np.log10(1e3 * distance), name=name, opacity=0.7, marker_color=_COLORS[name])
+        figure.add_trace(trace)
+    ticks = list(range(-4, 3))
+    axis = {"title": "error in mm", "tickvals": ticks, "ticktext": [f"{10.0**tick:g}" for tick in ticks]}
+    figure.update_layout(barmode="overlay", xaxis=axis, yaxis={"title": "configurations"})
+    return figure
+
+
+def _path_figure(path: Mapping[str, Any]) -> go.Figure:
+    figure = go.Figure()
+    for name in ("before", "after"):
+        log = path[name]["log"]
+        keep = path_window(log)
+        distance = 1e3 * np.linalg.norm(pose_errors(log, "true")[keep, 3:], axis=1)
+        time = log.time[keep] - log.path_start
+        figure.add_trace(go.Scatter(x=time, y=distance, name=name, line={"color": _COLORS[name]}))
+    figure.update_layout(xaxis={"title": "time in s"}, yaxis={"title": "mm", "type": "log"})
+    return figure
+
+
+def _parameter_table(study: CalibrationStudy) -> tuple[list[str], list[list[str]]]:
+    """Each parameter in mm, degrees or rad per N m, with its confidence, and with the truth where known."""
+    identified, truth = study.identified, study.truth
+    names = parameter_names(study.nominal)
+    rows = []
+    for number, name in enumerate(identified.names):
+        unit, factor = ("rad / N m", 1.0) if name.startswith("c_") else ("deg", 180.0 / np.pi)
+        if name.startswith("pl_"):
+            unit, factor = "mm", 1e3
+        value, sigma = factor * identified.values[number], factor * identified.sigmas[number]
+        row = [name, unit, f"{value:.6g}", f"{_CONFIDENCE * sigma:.2g}"]
+        if truth is not None:
+            row.append(f"{factor * truth[names.index(name)]:.6g}" if name in names else "")
+        rows.append(row)
+    return ["parameter", "unit", "value", "±", *(["truth"] if truth is not None else [])], rows

@@ -1,0 +1,176 @@
+"""``truetip cameras``: calibrate the cameras of a cell, and study what limits accuracy."""
+
+import sys
+import time
+from contextlib import ExitStack
+from dataclasses import replace
+from pathlib import Path
+from typing import Annotated
+
+import numpy as np
+import typer
+from rich.console import Console
+from rich.markup import escape
+
+from experiments.cameras.calibration import (
+    CamerasFound,
+    calibration_json,
+    print_calibration,
+    write_calibration_page,
+)
+from experiments.cameras.laws import study_laws
+from experiments.cameras.report import print_study, write_study_page
+from experiments.cameras.study import CamerasStudy, covariances, study_json, study_setup
+from experiments.cameras.sweeps import study_sweeps
+from experiments.comparison.metrics import json_text
+from experiments.report.files import write_text
+from experiments.terminal.console import progress_bar, refusing
+from experiments.terminal.options import ScenarioOption, SetOption
+from experiments.terminal.prepare import prepare
+from experiments.terminal.staging import staged_file
+from systems.tracking.calibration.observation_file import observation_text, read_observations
+from systems.tracking.calibration.wand import CalibrationKit, SimulatedWandRun, WandRun, simulate_wand_run
+from systems.tracking.calibration.wand_calibration import calibrate_with_wand
+from systems.tracking.camera_model import Cameras
+from systems.tracking.cell_file import cell_text, with_cameras
+from systems.tracking.measuring_cell import MeasuringCell, load_cell
+
+SIMULATED = "simulated"
+
+cameras_app = typer.Typer(
+    help="Calibrate the cameras of a cell, and study what limits the accuracy of a pose.",
+    no_args_is_help=True,
+)
+
+CellOption = Annotated[
+    str, typer.Option("--cell", metavar="NAME|FILE", help="A shipped measuring cell or a YAML file.")
+]
+JsonOption = Annotated[
+    str | None,
+    typer.Option("--json", metavar="FILE", help="The numbers; - prints them, and nothing else."),
+]
+
+
+@cameras_app.command("calibrate")
+def calibrate_cameras_command(
+    images: Annotated[
+        str,
+        typer.Option(
+            metavar="FILE.csv",
+            help="What the cameras saw of wand and frame, or simulated.",
+        ),
+    ] = SIMULATED,
+    cell: CellOption = "probst",
+    wand_length: Annotated[
+        float, typer.Option("--wand-length", metavar="MM", help="Between the two ends of the wand.")
+    ] = CalibrationKit.wand_length_mm,
+    places: Annotated[
+        int, typer.Option(metavar="N", help="Of the wand that are simulated.")
+    ] = SimulatedWandRun.places,
+    pixel_sigma: Annotated[
+        float, typer.Option("--pixel-sigma", metavar="PX", help="Standard deviation of a pixel, expected.")
+    ] = SimulatedWandRun.pixel_sigma,
+    seed: Annotated[int, typer.Option(metavar="N", help="Of the simulated noise and motion.")] = 0,
+    observations: Annotated[
+        str | None, typer.Option(metavar="FILE.csv", help="Write down what was seen, for --images.")
+    ] = None,
+    write: Annotated[
+        str | None, typer.Option(metavar="FILE.yaml", help="The cell with the calibrated cameras.")
+    ] = None,
+    out: Annotated[Path, typer.Option(metavar="FILE.html", help="The report.")] = Path("out/cameras.html"),
+    json_file: JsonOption = None,
+) -> None:
+    """Find where the cameras stand and how their lenses bend, from a wand and an L-frame."""
+    human = Console(stderr=json_file == "-")
+    with refusing(ValueError, OSError), ExitStack() as stack:
+        _positive("--wand-length", wand_length)
+        _positive("--pixel-sigma", pixel_sigma)
+        nominal, kit = load_cell(cell), CalibrationKit(wand_length_mm=wand_length)
+        names = [camera.name for camera in nominal.cameras]
+        page = stack.enter_context(staged_file(out))
+        files = {
+            name: stack.enter_context(staged_file(name))
+            for name in (observations, write, json_file)
+            if name and name != "-"
+        }
+        # The camera system's own frame is that of the L-frame.
+        start, truth = nominal.camera_model(nominal.base.pose()), None
+        if images == SIMULATED:
+            truth = start
+            run = _simulated(nominal, kit, truth, SimulatedWandRun(places, pixel_sigma=pixel_sigma), seed)
+            start = replace(start, radial=0.0 * start.radial, tangential=0.0 * start.tangential)
+        else:
+            run = read_observations(images, names, len(kit.p_Q))
+        started = time.perf_counter()
+        calibration = calibrate_with_wand(run, kit, start, names, pixel_sigma)
+        found = CamerasFound(calibration, names, kit, time.perf_counter() - started, truth)
+        title = f"{nominal.name}, {'simulated' if truth else Path(images).name}"
+        write_calibration_page(page, title, found)
+        if write:
+            source = f"truetip cameras calibrate, {len(calibration.wand_lengths)} places of the wand"
+            write_text(files[write], cell_text(with_cameras(nominal, calibration.cameras, source)))
+        if observations:
+            write_text(files[observations], observation_text(run, names))
+        result = calibration_json(found)
+        if json_file and json_file != "-":
+            write_text(files[json_file], json_text(result))
+    if json_file == "-":
+        sys.stdout.write(json_text(result))
+    print_calibration(human, found)
+    for name in (str(out), write, observations):
+        if name:
+            human.print(escape(name), soft_wrap=True)
+
+
+def _simulated(
+    cell: MeasuringCell, kit: CalibrationKit, truth: Cameras, run: SimulatedWandRun, seed: int
+) -> WandRun:
+    return simulate_wand_run(truth, cell.sensor_px, kit, run, np.random.default_rng(seed))[0]
+
+
+def _positive(name: str, value: float) -> None:
+    if not 0.0 < value < np.inf:
+        raise ValueError(f"{name} must be positive, got {value:g}")
+
+
+@cameras_app.command("study")
+def study_cameras_command(
+    scenario: ScenarioOption = "misaligned",
+    settings: SetOption = None,
+    is_quick: Annotated[
+        bool, typer.Option("--quick", help="A faster path and less settling for the laws.")
+    ] = False,
+    without_laws: Annotated[
+        bool, typer.Option("--without-laws", help="Geometry and images only; a few seconds.")
+    ] = False,
+    jobs: Annotated[
+        int | None, typer.Option(metavar="N", help="Processes at a time.", show_default="one per core")
+    ] = None,
+    out: Annotated[Path, typer.Option(metavar="FILE.html", help="The report.")] = Path("out/study.html"),
+    json_file: JsonOption = None,
+) -> None:
+    """Find out what limits the accuracy of a pose: cameras, light, markers; and what the laws make of it."""
+    human = Console(stderr=json_file == "-")
+    with refusing(ValueError, OSError), ExitStack() as stack:
+        if jobs is not None and jobs < 1:
+            raise ValueError(f"--jobs must be at least 1, got {jobs}")
+        prepared = prepare(scenario, settings or [])
+        page = stack.enter_context(staged_file(out))
+        copy = stack.enter_context(staged_file(json_file)) if json_file not in (None, "-") else None
+        setup = study_setup(prepared)
+        covariance_on_path, covariance_in_workspace = covariances(setup)
+        with progress_bar("Geometry and images") as progress:
+            sweeps = study_sweeps(setup, jobs, progress)
+        laws = []
+        if not without_laws:
+            with progress_bar("Servo laws") as progress:
+                laws = study_laws(scenario, settings or [], is_quick, jobs, progress)
+        study = CamerasStudy(setup, covariance_on_path, covariance_in_workspace, sweeps, laws)
+        write_study_page(page, prepared.title, study)
+        result = study_json(study)
+        if copy:
+            write_text(copy, json_text(result))
+    if json_file == "-":
+        sys.stdout.write(json_text(result))
+    print_study(human, study)
+    human.print(escape(str(out)), soft_wrap=True)

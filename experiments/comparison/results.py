@@ -1,0 +1,46 @@
+"""The files that a comparison or a single run leaves in its folder."""
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+from diagrams.log import RunLog
+from experiments.comparison.figure import write_figure
+from experiments.comparison.metrics import summary, timing, write_json
+from experiments.replay.replay import write_replay
+from experiments.report.report import write_report
+from experiments.terminal.prepare import Prepared
+
+RESULTS = {
+    "report.html": "errors, plots and guard events; opens offline",
+    "replay.html": "the robot in motion; opens offline",
+    "figure.svg": "distance of the tip over time",
+    "summary.json": "the numbers; a simulation with the same seed repeats them byte for byte",
+    "timing.json": "wall times and real-time factors",
+}
+
+
+def write_results(folder: Path, prepared: Prepared, logs: Mapping[str, Sequence[RunLog]]) -> dict[str, Any]:
+    """Writes `RESULTS` into a folder that exists.
+
+    Args:
+        folder: where to.
+        prepared: what was run.
+        logs: law -> one log per cycle; the first cycle is the one that is drawn.
+
+    Returns:
+        The summary.
+
+    Raises:
+        OSError: if the folder cannot be written.
+    """
+    result, times = summary(prepared.title, logs), timing(logs)
+    first_cycles = {law: cycles[0] for law, cycles in logs.items()}
+    write_json(folder / "summary.json", result)
+    write_json(folder / "timing.json", times)
+    write_report(folder / "report.html", prepared.text, result, times, logs)
+    write_replay(
+        folder / "replay.html", prepared.drawn_robot, first_cycles, errors=prepared.scenario.station.errors
+    )
+    write_figure(folder / "figure.svg", prepared.title, first_cycles)
+    return result

@@ -1,0 +1,1 @@
+"""``truetip diagram``: the wiring as a picture."""

@@ -1,0 +1,1 @@
+"""``truetip drivetrain``: what drive trains are made of, as figures."""

@@ -1,0 +1,108 @@
+"""``truetip drivetrain``: pictures of the models that drive trains are made of."""
+
+import sys
+from contextlib import ExitStack
+from pathlib import Path
+from typing import Annotated
+
+import numpy as np
+import typer
+from rich.console import Console
+from rich.markup import escape
+
+from experiments.comparison.metrics import json_text
+from experiments.drivetrain.figures import (
+    PLAY_APPROXIMATIONS,
+    THRESHOLDS,
+    WEIGHTS,
+    backlash_figure,
+    efficiency_figure,
+    friction_figure,
+    hysteresis_figure,
+    hysteresis_signal,
+)
+from experiments.report.files import write_text
+from experiments.report.plot_page import Section, html_table, write_plot_page
+from experiments.terminal.console import refusing
+from experiments.terminal.staging import staged_file
+from robots.drivetrain.hysteresis import PrandtlIshlinskii
+from robots.drivetrain.parts import PARTS
+
+
+def drivetrain_command(
+    out: Annotated[Path, typer.Option(metavar="FILE.html", help="The pictures.")] = Path(
+        "out/drivetrain.html"
+    ),
+    json_file: Annotated[
+        str | None,
+        typer.Option("--json", metavar="FILE", help="The numbers; - prints them, and nothing else."),
+    ] = None,
+) -> None:
+    """Draw friction, efficiency, play and hysteresis as in Reiner (2010), figures 2.3 to 2.6."""
+    human = Console(stderr=json_file == "-")
+    x, _ = hysteresis_signal()
+    operator = PrandtlIshlinskii(WEIGHTS, THRESHOLDS)
+    inverse, starts = operator.inverse()
+    residual = float(np.abs(operator.response(inverse.response(x, starts)) - x).max())
+    result = {
+        "parts": {name: {"invertible": part.invertible} for name, part in PARTS.items()},
+        "hysteresis": {
+            "weights": list(WEIGHTS),
+            "thresholds": list(THRESHOLDS),
+            "inverse_weights": list(inverse.weights),
+            "inverse_thresholds": list(inverse.thresholds),
+            "residual": residual,
+        },
+    }
+    rows = [[name, "yes" if part.invertible else "no"] for name, part in PARTS.items()]
+    parameters = [
+        *([name, f"T = {T} s, psi = {psi}, n = {n}"] for name, (T, psi, n) in PLAY_APPROXIMATIONS.items()),
+        ["hysteresis and its exact inverse", f"w = {WEIGHTS}, r = {THRESHOLDS}"],
+    ]
+    with refusing(OSError), ExitStack() as stack:
+        page = stack.enter_context(staged_file(out))
+        copy = stack.enter_context(staged_file(json_file)) if json_file not in (None, "-") else None
+        sections = [
+            Section(
+                "Friction",
+                "Figure 2.3: the torque of a joint over its velocity, in three parts that join smoothly. Its "
+                "numbers are assumed, the source shows none.",
+                friction_figure(),
+                360,
+            ),
+            Section(
+                "Efficiency",
+                "Figure 2.4: a ramp of torque drives two inertias through a gear with losses. Friction holds "
+                "it at first; later the direction in which power flows decides what is lost.",
+                efficiency_figure(),
+                360,
+            ),
+            Section(
+                "Play",
+                "Figure 2.5: a gap between teeth, in which nothing is transmitted, and a smooth substitute "
+                "that an inverse model can follow; it yields more when it is slow. On the right, near zero.",
+                backlash_figure(),
+                380,
+            ),
+            Section(
+                "Hysteresis",
+                "Figure 2.6. On the left the play operator, which moves only when it is pushed, and three "
+                "smooth approximations of the table below. On the right a hysteresis, and what is left of it "
+                "behind its inverse: a straight line.",
+                hysteresis_figure(),
+                420,
+            ),
+            Section(
+                "Parameters of table 2.1",
+                "Corrected: thresholds begin with zero, and psi is meant where the table says s.",
+                html_table(["approximation", "parameters"], parameters),
+            ),
+            Section("Parts by their names in YAML", "", html_table(["kind", "can be inverted"], rows)),
+        ]
+        verdict = f"The inverse operator compensates the hysteresis to {residual:.1e}."
+        write_plot_page(page, "Drive trains", verdict, sections)
+        if copy:
+            write_text(copy, json_text(result))
+    if json_file == "-":
+        sys.stdout.write(json_text(result))
+    human.print(escape(str(out)), soft_wrap=True)

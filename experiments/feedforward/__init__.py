@@ -1,0 +1,1 @@
+"""``truetip feedforward``: inverse models compared on an elastic robot."""

@@ -1,0 +1,110 @@
+"""A rectangle in space under a feedforward, and how far the tip is from it; as Reiner (2010), table 6.1."""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy.integrate import trapezoid
+
+from diagrams.run import run
+from diagrams.scenario import Scenario, load_scenario
+from experiments.terminal.workers import Progress
+from robots.inverse_kinematics import seen_from_base
+from robots.kinematics import Kinematics
+from robots.model import NUM_JOINTS, RobotModel
+from robots.pose import zyx_from_rotation
+from systems.feedforward import FeedforwardConfig
+from systems.feedforward.arm_correction import reach
+from systems.paths import ReferenceConfig, Waypoint
+
+LAW = "open_loop"  # no camera: the feedforward has to do it alone
+PACE = 8.0  # 1/s^2, k_a: an edge takes a second
+DEPTH, WIDTH = 0.2, 0.4  # of the reach, the edges away from the robot and across
+SETTLE, DWELL = 1.0, 0.5  # s at rest: the arm is first wound up, at the end it rings
+_LEANING = np.deg2rad(30.0)  # of the upper arm from the vertical
+
+
+@dataclass(frozen=True)
+class RectangleTrial:
+    """A rectangle with the tool pointing down, driven with one feedforward."""
+
+    robot: RobotModel
+    payload: float  # kg
+    config: FeedforwardConfig
+
+    def run(self, progress: Progress | None = None) -> "Deviation":
+        """Simulates it with an elastic structure.
+
+        Raises:
+            ValueError: if the robot cannot follow the rectangle.
+        """
+        log = run(rectangle_scenario(self), LAW, self.robot, progress=progress)
+        on_path = log.time >= log.path_start
+        gap = log.X_WE_true[:, :3, 3] - log.X_WE_desired[:, :3, 3]
+        distance = np.linalg.norm(gap, axis=1)
+        return Deviation(log.time[on_path] - log.path_start, distance[on_path])
+
+
+@dataclass(frozen=True)
+class Deviation:
+    """How far the tip is from where it shall be."""
+
+    time: np.ndarray  # (n,) s
+    distance: np.ndarray  # (n,) m
+
+    @property
+    def integral(self) -> float:
+        """Over the time, in m s."""
+        return float(trapezoid(self.distance, self.time))
+
+    @property
+    def max(self) -> float:
+        """The largest one in m."""
+        return float(self.distance.max())
+
+
+def rectangle_scenario(trial: RectangleTrial) -> Scenario:
+    """The scenario of a trial."""
+    scenario = load_scenario(
+        "nominal",
+        [
+            "initial_error_mm=[0, 0, 0]",
+            f"station.payload={trial.payload}",
+            "station.elasticity=structure",
+            f"servo.laws.{LAW}.drive=cascade",
+        ],
+    )
+    home = working_position(trial.robot)
+    drive = scenario.station.drive
+    reference = ReferenceConfig(
+        "rectangle",
+        acceleration=PACE,
+        settle=SETTLE,
+        dwell=DWELL,
+        preview=drive.command_delay + drive.dead_time,
+        waypoints=rectangle(trial.robot, home),
+    )
+    servo = replace(scenario.servo, feedforward=trial.config)
+    return replace(scenario, home_deg=np.rad2deg(home), reference=reference, servo=servo)
+
+
+def working_position(robot: RobotModel) -> np.ndarray:
+    """Upper arm leaning forward, forearm level, tool down; rad, shape (6,)."""
+    axes, offsets, _ = seen_from_base(robot)
+    upper_arm = np.arctan2(offsets[2, 0], offsets[2, 2])  # from z towards x, at zero joint angles
+    wrist = offsets[3] + offsets[4]
+    forearm = np.arctan2(wrist[0], wrist[2])
+    sign_2, sign_3, sign_5 = np.sign(axes[[1, 2, 4], 1])
+    q = np.zeros(NUM_JOINTS)
+    q[1] = sign_2 * (_LEANING - upper_arm)
+    q[2] = sign_3 * (0.5 * np.pi - forearm - (_LEANING - upper_arm))
+    q[4] = sign_5 * forearm  # the tool points along the forearm at zero
+    return np.clip(q, robot.lower, robot.upper)
+
+
+def rectangle(robot: RobotModel, home: np.ndarray) -> list[Waypoint]:
+    """A level rectangle around the tip's place at a configuration (rad, shape (6,)), closed."""
+    X_WE = Kinematics(robot).forward(home)
+    zyx_deg = np.rad2deg(zyx_from_rotation(X_WE[:3, :3]))
+    half = 0.5e3 * reach(robot) * np.array([DEPTH, WIDTH, 0.0])
+    signs = [(-1, -1), (1, -1), (1, 1), (-1, 1), (-1, -1)]
+    return [Waypoint(1e3 * X_WE[:3, 3] + half * np.array([x, y, 0.0]), zyx_deg) for x, y in signs]

@@ -1,0 +1,115 @@
+"""Three feedforwards on one robot: a rectangle in space, and motions from a grid of positions."""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from diagrams.scenario import StationConfig
+from experiments.feedforward.rectangle import Deviation, RectangleTrial
+from experiments.feedforward.tick import tick_time
+from experiments.feedforward.trial import Trial
+from experiments.terminal.workers import Progress, SimulationError, in_processes
+from robots.model import RobotModel
+from systems.feedforward import FEEDFORWARDS, FeedforwardConfig
+
+KINDS: tuple[str, ...] = ("rigid", "flexible_joint", "elastic_structure")
+ANGLES_DEG = (5, 20)  # of the motions
+
+
+@dataclass(frozen=True)
+class FeedforwardStudy:
+    """What came of it; a grid has n positions of axis 2 and of axis 3, the other axes stand at zero."""
+
+    robot: RobotModel
+    payload: float  # kg
+    config: FeedforwardConfig  # how wrong the models are
+    axis_2: np.ndarray  # (n,) rad, where the motions begin
+    axis_3: np.ndarray  # (n,) rad
+    criterion: Mapping[int, Mapping[str, np.ndarray]]  # by angle in degrees and feedforward, (n, n) in m/s
+    path: Mapping[str, Deviation]  # of the rectangle, by feedforward
+    tick: Mapping[str, float]  # s, the median time of a tick with inverse kinematics, by feedforward
+
+    def ratio(self, angle_deg: int) -> np.ndarray:
+        """The criterion with an elastic structure in the model over the one without, (n, n)."""
+        of_kind = self.criterion[angle_deg]
+        return of_kind["elastic_structure"] / of_kind["flexible_joint"]
+
+
+def study_feedforward(
+    robot: RobotModel,
+    payload: float,
+    config: FeedforwardConfig,
+    grid: int,
+    processes: int | None = None,
+    progress: Callable[[float], None] | None = None,
+) -> FeedforwardStudy:
+    """Simulates all of it.
+
+    Args:
+        robot: which robot.
+        payload: mass at the flange in kg.
+        config: how wrong the models are; the kinds take turns.
+        grid: positions of axis 2, and of axis 3, at least 2.
+        processes: how many work at a time; None for one per core.
+        progress: is called now and then with the share that is done, 0 to 1.
+
+    Raises:
+        ValueError: if the grid is too small, or the robot or a model refuses.
+        SimulationError: if a run broke off.
+    """
+    if grid < 2:
+        raise ValueError(f"--grid must be at least 2, got {grid}")
+    configs = {kind: replace(config, kind=kind) for kind in KINDS}
+    for each in configs.values():  # what is impossible is refused here and not in a process
+        FEEDFORWARDS[each.kind](robot, each, StationConfig().period, payload)
+    # From everywhere there is room for the largest motion.
+    axis_2, axis_3 = np.linspace(robot.lower[1:3], robot.upper[1:3] - np.deg2rad(max(ANGLES_DEG)), grid).T
+    starts = [np.array([0.0, q2, q3, 0.0, 0.0, 0.0]) for q2 in axis_2 for q3 in axis_3]
+    jobs: list[RectangleTrial | Trial] = [RectangleTrial(robot, payload, configs[kind]) for kind in KINDS]
+    for angle in ANGLES_DEG:
+        for kind in KINDS:
+            jobs += [Trial(robot, payload, start, np.deg2rad(angle), configs[kind]) for start in starts]
+    results = in_processes(_work, jobs, processes, progress)
+    path: dict[str, Any] = dict(zip(KINDS, results[: len(KINDS)], strict=True))
+    values = np.array(results[len(KINDS) :], dtype=float).reshape(len(ANGLES_DEG), len(KINDS), grid, grid)
+    criterion = {
+        angle: dict(zip(KINDS, of_angle, strict=True))
+        for angle, of_angle in zip(ANGLES_DEG, values, strict=True)
+    }
+    # Alone on a core, after the rest is done.
+    tick = {kind: tick_time(RectangleTrial(robot, payload, configs[kind])) for kind in KINDS}
+    return FeedforwardStudy(robot, payload, config, axis_2, axis_3, criterion, path, tick)
+
+
+def _work(job: RectangleTrial | Trial, progress: Progress) -> Deviation | float:
+    try:
+        return job.run(progress)
+    except RuntimeError as error:
+        raise SimulationError(f"{job.config.kind}: {' '.join(str(error).split())}") from error
+
+
+def study_json(study: FeedforwardStudy) -> dict[str, Any]:
+    """The numbers, with the units in their names; deviations relative to the rigid model."""
+    rigid = study.path["rigid"]
+    return {
+        "robot": study.robot.name,
+        "payload_kg": study.payload,
+        "stiffness_error": study.config.stiffness_error,
+        "path": {
+            "integral": {kind: one.integral / rigid.integral for kind, one in study.path.items()},
+            "max": {kind: one.max / rigid.max for kind, one in study.path.items()},
+            "max_mm": {kind: 1e3 * one.max for kind, one in study.path.items()},
+        },
+        "criterion": {
+            str(angle): {
+                "median_ratio": float(np.median(study.ratio(angle))),
+                "worst_ratio": float(study.ratio(angle).max()),
+                "positions": study.ratio(angle).size,
+                "median_m_s": {kind: float(np.median(c)) for kind, c in study.criterion[angle].items()},
+            }
+            for angle in study.criterion
+        },
+        "tick_us": {kind: 1e6 * tick for kind, tick in study.tick.items()},
+    }

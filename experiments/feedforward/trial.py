@@ -1,0 +1,140 @@
+"""One motion of axes 1 to 3 under a feedforward, and how the wrist rings after it.
+
+The criterion of Reiner (2010), section 6.2.1: how much the wrist still accelerates once it should be at rest.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from pydrake.systems.analysis import Simulator
+from pydrake.systems.framework import Context, DiagramBuilder, DiscreteValues, EventStatus, LeafSystem
+from scipy.integrate import trapezoid
+
+from diagrams.integration import Integration, IntegratorConfig
+from diagrams.scenario import StationConfig
+from diagrams.station import SimulatedStation
+from experiments.terminal.workers import Progress
+from robots.model import NUM_JOINTS, RobotModel
+from systems.feedforward import FEEDFORWARDS, FeedforwardConfig, JointReference
+from systems.paths import SineSquaredProfile
+
+SETTLE = 0.1  # s at rest before the motion
+RINGING = 0.9  # s after the motion, T of (6.1)
+SPEEDING_UP = 0.5  # s, from rest to the largest speed with the acceleration of the motions
+_AXES = 3  # that move
+_WRIST = 5  # the origin of this link is the point where axes 4, 5 and 6 meet
+_MAX_STEP = 2e-3  # s; the ringing of the best feedforward is then right to some percent
+
+
+@dataclass(frozen=True)
+class Trial:
+    """A motion from rest to rest, all three axes by the same angle at the same time."""
+
+    robot: RobotModel
+    payload: float  # kg
+    start: np.ndarray  # rad, shape (6,)
+    angle: float  # rad, signed
+    config: FeedforwardConfig
+
+    def run(self, progress: Progress | None = None) -> float:
+        """Simulates it with the drives of the station and an elastic structure; returns C of (6.1) in m/s."""
+        config = StationConfig(elasticity="structure", payload=self.payload)
+        period, ahead = config.period, config.drive.command_delay + config.drive.dead_time
+        stop = SETTLE + motion_profile(self.robot, self.angle).duration
+        told = commands(self, np.arange(0.0, stop + RINGING, period) + ahead, period)
+        builder = DiagramBuilder()
+        station = builder.AddNamedSystem(
+            "station", SimulatedStation(self.robot, config, "cascade", with_log=False, takes_torque=True)
+        )
+        player = builder.AddNamedSystem("commands", CommandPlayer(told, period))
+        for index in range(player.num_output_ports()):
+            port = player.get_output_port(index)
+            builder.Connect(port, station.GetInputPort(port.get_name()))
+        simulator = Simulator(builder.Build())
+        context = simulator.get_mutable_context()
+        station.set_at_rest(context, told[0, 0], seed=0)
+        rate = station.fastest_rate(context)
+        integration = Integration(IntegratorConfig(max_step=_MAX_STEP), period, rate)
+        integration.initialize(simulator)
+        integration.advance(simulator, stop)
+        times, accelerations = _watched(simulator, station, integration, stop + RINGING)
+        if progress:
+            progress(1.0)
+        return criterion(times, accelerations)
+
+
+class CommandPlayer(LeafSystem):
+    """Issues commands from a table, one row a tick; after its end the last row.
+
+    Ports:
+        out ``position_command``    vector 6 in rad
+        out ``velocity_command``    vector 6 in rad/s
+        out ``torque_feedforward``  vector 6 in N m
+    """
+
+    def __init__(self, commands: np.ndarray, period: float) -> None:
+        """Takes commands, shape (n, 3, 6), and the tick in s."""
+        super().__init__()
+        self._commands, self._period = commands, period
+        for index, name in enumerate(("position_command", "velocity_command", "torque_feedforward")):
+            self.DeclareStateOutputPort(name, self.DeclareDiscreteState(commands[0, index]))
+        self.DeclarePeriodicDiscreteUpdateEvent(period, 0.0, self._play)
+
+    def _play(self, context: Context, discrete_state: DiscreteValues) -> None:
+        tick = min(round(context.get_time() / self._period), len(self._commands) - 1)
+        for index, command in enumerate(self._commands[tick]):
+            discrete_state.set_value(index, command)
+
+
+def motion_profile(robot: RobotModel, angle: float) -> SineSquaredProfile:
+    """How far the axes have turned, in rad: the slowest of them could reach its largest speed in 0.5 s."""
+    # On the average of a hump the acceleration is half of its peak.
+    acceleration = 2.0 * float(robot.speed[:_AXES].min()) / SPEEDING_UP
+    return SineSquaredProfile(acceleration, abs(angle))
+
+
+def references(trial: Trial, times: np.ndarray) -> list[JointReference]:
+    """Where the links shall be."""
+    s, rate, acceleration = motion_profile(trial.robot, trial.angle).at_times(times - SETTLE)
+    direction = np.zeros(NUM_JOINTS)
+    direction[:_AXES] = np.sign(trial.angle)
+    return [
+        JointReference(trial.start + direction * x, direction * v, direction * a)
+        for x, v, a in zip(s, rate, acceleration, strict=True)
+    ]
+
+
+def commands(trial: Trial, times: np.ndarray, period: float) -> np.ndarray:
+    """What the drives are told: positions, velocities and torques, shape (n, 3, 6)."""
+    model = FEEDFORWARDS[trial.config.kind](trial.robot, trial.config, period, trial.payload)
+    memory, rows = model.fresh_memory(), []
+    for reference in references(trial, times):
+        answer = model.answer(reference, memory)
+        memory = answer.memory
+        rows.append((answer.position, answer.velocity, answer.torque))
+    return np.array(rows)
+
+
+def criterion(times: np.ndarray, accelerations: np.ndarray) -> float:
+    """C in m/s of accelerations in m/s^2, shape (n, 3), at times in s, Reiner (2010) eq. (6.1)."""
+    mean = trapezoid(accelerations, times, axis=0) / (times[-1] - times[0])
+    return float(trapezoid(np.abs(accelerations - mean), times, axis=0).sum())
+
+
+def _watched(
+    simulator: Simulator, station: SimulatedStation, integration: Integration, end: float
+) -> tuple[np.ndarray, np.ndarray]:
+    """Goes on to a time in s; the times of all steps and how the wrist accelerated, in m/s^2, (n, 3)."""
+    plant, wrist = station.plant, station.plant.GetBodyByName(f"link_{_WRIST}")
+    times, accelerations = [], []
+
+    def record(root_context: Context) -> EventStatus:
+        own = plant.GetMyContextFromRoot(root_context)
+        times.append(root_context.get_time())
+        accelerations.append(plant.EvalBodySpatialAccelerationInWorld(own, wrist).translational())
+        return EventStatus.DidNothing()
+
+    record(simulator.get_context())
+    simulator.set_monitor(record)
+    integration.advance(simulator, end)
+    return np.array(times), np.array(accelerations)

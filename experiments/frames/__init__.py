@@ -1,0 +1,1 @@
+"""``truetip frame``, ``chain``, ``tool`` and ``align``: frames and tools from text files."""

@@ -1,0 +1,1 @@
+"""``truetip modes``: natural frequencies and shapes."""

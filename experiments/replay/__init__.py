@@ -1,0 +1,1 @@
+"""The robot in motion, live or recorded, in meshcat."""

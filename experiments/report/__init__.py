@@ -1,0 +1,1 @@
+"""Pages that open offline: the report of a comparison, and what all pages share."""

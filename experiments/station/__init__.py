@@ -1,0 +1,1 @@
+"""A real station or a virtual cell: runs, latency, and ``truetip cell``."""

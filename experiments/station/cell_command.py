@@ -1,0 +1,145 @@
+"""``truetip cell``: a robot cell that exists only in this process, for any client of EGM and Qualisys."""
+
+import json
+import signal
+import sys
+from contextlib import ExitStack
+from dataclasses import fields, replace
+from types import FrameType
+from typing import Annotated
+
+import typer
+from rich.console import Console
+
+from diagrams.cell_loop import CellLoop, CellStatistics
+from diagrams.scenario import Scenario
+from experiments.comparison.metrics import json_text
+from experiments.report.files import write_text
+from experiments.terminal.console import count, refusing
+from experiments.terminal.options import RobotOption, SetOption
+from experiments.terminal.prepare import prepare
+from experiments.terminal.staging import staged_file
+from systems.faulty_link import FaultConfig
+from systems.mocap.server import CameraServerConfig, VirtualCameraServer
+
+
+def cell_command(
+    scenario: Annotated[
+        str, typer.Option(metavar="NAME|FILE", help="A shipped scenario or a YAML file.")
+    ] = "cell",
+    settings: SetOption = None,
+    robot: RobotOption = None,
+    faults: Annotated[
+        str | None,
+        typer.Option(
+            metavar="NAME=VALUE,...",
+            help=f"What goes wrong: {', '.join(entry.name for entry in fields(FaultConfig))}.",
+        ),
+    ] = None,
+    duration: Annotated[
+        float | None, typer.Option(metavar="S", help="Ends after so many seconds; without it, at Ctrl-C.")
+    ] = None,
+    truth: Annotated[
+        str | None,
+        typer.Option(metavar="FILE.npz", help="The true motion by the controller's time stamps."),
+    ] = None,
+    json_file: Annotated[
+        str | None, typer.Option("--json", metavar="FILE", help="How it ran, at the end.")
+    ] = None,
+    announce: Annotated[
+        bool, typer.Option("--announce", help="First print one line of JSON with the ports, for a program.")
+    ] = False,
+) -> None:
+    """Run a virtual robot cell in real time: a controller under EGM and a camera server."""
+    human = Console(stderr=announce)
+    with refusing(ValueError, OSError), ExitStack() as stack:
+        if duration is not None and not duration > 0.0:
+            raise ValueError(f"--duration must be positive, got {duration:g} s")
+        prepared = prepare(scenario, [*(settings or []), *fault_settings(faults)], robot)
+        files = [stack.enter_context(staged_file(name)) if name else None for name in (truth, json_file)]
+        link = prepared.scenario.station.link
+        camera = stack.enter_context(VirtualCameraServer(_camera_config(prepared.scenario)))
+        loop = CellLoop(
+            prepared.scenario,
+            prepared.drawn_robot,
+            (link.address, link.port),
+            camera,
+            (link.address, link.signal_port) if link.signal_port else None,
+            with_log=truth is not None,
+        )
+        stack.callback(loop.close)
+        stop = _Stop(duration)
+        if announce:
+            sys.stdout.write(json.dumps({"camera_port": camera.port}) + "\n")
+            sys.stdout.flush()
+        human.print(
+            f"{prepared.drawn_robot.name}: speaks EGM to UDP {link.address}:{link.port} every "
+            f"{1e3 * prepared.scenario.station.period:g} ms; its camera listens on TCP "
+            f"{link.camera.server.address}:{camera.port}"
+        )
+        if duration is None and not announce:
+            human.print("Ctrl-C ends it")
+        statistics = loop.run(stop.is_reached)
+        camera.finish()
+        if files[0]:
+            loop.cell.record().save(files[0])
+        if files[1]:
+            write_text(files[1], json_text(statistics.as_dict()))
+    print_statistics(human, statistics)
+
+
+def fault_settings(faults: str | None) -> list[str]:
+    """``loss=0.05,jitter=0.003`` as settings of a scenario.
+
+    Raises:
+        ValueError: if a part is no NAME=VALUE with a known name.
+    """
+    known = [entry.name for entry in fields(FaultConfig)]
+    parts = [part.strip() for part in (faults or "").split(",") if part.strip()]
+    for part in parts:
+        name, equals, _ = part.partition("=")
+        if not equals or name.strip() not in known:
+            raise ValueError(f"--faults takes NAME=VALUE with names {', '.join(known)}, got '{part}'")
+    return [f"station.faults.{part}" for part in parts]
+
+
+def print_statistics(console: Console, statistics: CellStatistics) -> None:
+    """Says how a cell has run."""
+    lateness = 1e3 * statistics.worst_lateness
+    console.print(
+        f"{count(statistics.cycles, 'cycle')}, {statistics.late} of them more than 1 ms late (worst "
+        f"{lateness:.1f} ms); {count(statistics.commands, 'datagram')} came in, "
+        f"{count(statistics.camera_frames, 'camera frame')} went out"
+    )
+    for link, counts in statistics.faults.items():
+        happened = ", ".join(f"{number} {name}" for name, number in counts.items() if number)
+        if happened:
+            console.print(f"Faults {link}: {happened}")
+
+
+def _camera_config(scenario: Scenario) -> CameraServerConfig:
+    server = scenario.station.link.camera.server
+    frequency = round(1.0 / scenario.station.camera.period)
+    return replace(
+        CameraServerConfig(),
+        bodies=[server.body],
+        address=server.address,
+        port=server.port,
+        frequency=frequency,
+    )
+
+
+class _Stop:
+    """The end of a cell: a duration, Ctrl-C or a signal."""
+
+    def __init__(self, duration: float | None) -> None:
+        self._duration, self._is_asked = duration, False
+        for number in (signal.SIGINT, signal.SIGTERM):
+            signal.signal(number, self._ask)
+
+    def _ask(self, number: int, frame: FrameType | None) -> None:
+        self._is_asked = True
+
+    def is_reached(self, time: float) -> bool:
+        """Whether to stop at the cell's time in s."""
+        return self._is_asked or (self._duration is not None and time >= self._duration)

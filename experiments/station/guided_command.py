@@ -1,0 +1,143 @@
+"""What ``truetip compare`` and ``truetip run`` do on a real station."""
+
+import ipaddress
+import shutil
+import sys
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import typer
+from rich.console import Console
+
+from diagrams.guided_run import GuidedRecord
+from diagrams.log import RunLog
+from experiments.comparison.metrics import write_json
+from experiments.station.guided import compare_on_station
+from experiments.terminal.console import count, progress_bar
+from experiments.terminal.prepare import Prepared
+from experiments.terminal.workers import SimulationError
+
+
+def on_station(
+    scenario: str | None, settings: list[str], station: str | None, with_cell: bool
+) -> tuple[str, list[str]]:
+    """The scenario and its settings with the options that choose a station.
+
+    Raises:
+        ValueError: if a virtual cell is wanted for a simulated station.
+    """
+    if with_cell and station not in (None, "egm"):
+        raise ValueError(f"--with-cell needs --station egm, got '{station}'")
+    kind = "egm" if with_cell else station
+    name = scenario or ("cell" if kind == "egm" else "misaligned")
+    return name, [*settings, *([f"station.kind={kind}"] if kind else [])]
+
+
+def ask_before_moving(console: Console, prepared: Prepared, is_agreed: bool) -> None:
+    """Asks whether a robot that is not on this machine may move.
+
+    Raises:
+        typer.Exit: if it may not.
+        ValueError: if nobody can be asked.
+    """
+    address = prepared.scenario.station.link.address
+    try:
+        is_here = ipaddress.ip_address(address).is_loopback
+    except ValueError:
+        is_here = address == "localhost"
+    if is_here or is_agreed:
+        return
+    if not sys.stdin.isatty():
+        raise ValueError("a real robot would move: say --yes if it may")
+    if not typer.confirm(f"The robot that speaks to {address} will move to the start of the path. Go on?"):
+        raise typer.Exit
+
+
+def guide(
+    console: Console,
+    folders: tuple[Path, Path],
+    prepared: Prepared,
+    laws: Sequence[str],
+    cycles: int,
+    with_cell: bool,
+) -> Mapping[str, Sequence[RunLog]]:
+    """Runs laws on a station, writes ``link.json`` and the whole logs, and says what happened on the wire.
+
+    Args:
+        console: where to say it.
+        folders: where the results are staged, and where they go in the end. If a run breaks off before its
+            path has begun there is nothing to report on, but what was recorded goes there all the same.
+        prepared: what to run.
+        laws: which laws.
+        cycles: runs of each law.
+        with_cell: whether to start a virtual cell.
+
+    Raises:
+        SimulationError: if the station is not there or a run has not come as far as its path.
+    """
+    stage, out = folders
+    where = "a virtual cell" if with_cell else f"UDP port {prepared.scenario.station.link.port}"
+    with progress_bar(f"{count(cycles * len(laws), 'run')} on {where}") as progress:
+        comparison = compare_on_station(prepared.scenario, prepared.robot, laws, cycles, with_cell, progress)
+    link = comparison.link_json()
+    write_json(stage / "link.json", link)
+    records = [
+        (law, n, record) for law, all_ in comparison.records.items() for n, record in enumerate(all_, 1)
+    ]
+    for law, number, record in records:
+        write_log(stage / f"{law}-{number}.npz", record)
+    print_link(console, link)
+    console.print("Counts, delays and clocks of the wire are in link.json, whole logs in *.npz")
+    for law, _, record in records:
+        if not len(record.log.time) or record.log.time[-1] <= record.log.path_start:
+            shutil.copytree(stage, out, dirs_exist_ok=True)
+            raise SimulationError(
+                f"law {law}: {record.ended} before the path had begun; see {out / 'link.json'}"
+            )
+    return comparison.logs
+
+
+def write_log(path: Path, record: GuidedRecord) -> None:
+    """Everything that a run on a station has recorded, tick by tick, as arrays with the names of `RunLog`."""
+    arrays: dict[str, Any] = {
+        name: value for name, value in vars(record.log).items() if isinstance(value, np.ndarray)
+    }
+    np.savez_compressed(path, **arrays, stamps=record.stamps, turn_around=record.turn_around)
+
+
+def print_link(console: Console, link: dict[str, Any]) -> None:
+    """Says how the wire and the run were, a line for each run."""
+    for law, runs in link["runs"].items():
+        for run in runs:
+            turn = run["turn_around_ms"]
+            events = {
+                name: number
+                for name, number in {**run["controller"], **run["camera"]}.items()
+                if number and name in _WORTH_SAYING
+            }
+            said = ", ".join(f"{number} {name.replace('_', ' ')}" for name, number in events.items())
+            pauses = "".join(
+                f"; stood still for {pause:.2f} s at {at:.2f} s" for at, pause in run["pauses_s"]
+            )
+            end = "" if run["ended"] == "path" else f"; ended early: {run['ended']}"
+            times = (
+                f"{turn['median']:.2f} ms (99 %: {turn['99%']:.2f}, largest {turn['largest']:.2f})"
+                if turn["median"] is not None
+                else "never"
+            )
+            console.print(f"{law}: answered after {times}{'; ' + said if said else ''}{pauses}{end}")
+    if link["cell"]:
+        cell = link["cell"]
+        console.print(
+            f"cell: {cell['late']} of {cell['cycles']} messages more than 1 ms late, "
+            f"worst {1e3 * cell['worst_lateness']:.1f} ms"
+        )
+
+
+_WORTH_SAYING = (
+    *("duplicates", "late", "undecodable", "foreign", "implausible", "missing"),
+    *("breaks", "stops", "withheld", "lost_body", "wrong_sender", "garbage"),
+    *("disconnections", "impossible", "wrong_time"),
+)

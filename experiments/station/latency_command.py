@@ -1,0 +1,179 @@
+"""``truetip latency``: how late a station is, and where."""
+
+import sys
+from contextlib import ExitStack
+from pathlib import Path
+from typing import Annotated
+
+import numpy as np
+import plotly.graph_objects as go
+import typer
+from rich import box
+from rich.console import Console
+from rich.markup import escape
+from rich.table import Table
+
+from diagrams.latency_run import LatencyConfig, LatencyRecord, measure_latency
+from diagrams.scenario import Scenario
+from experiments.comparison.metrics import json_text
+from experiments.report.files import write_text
+from experiments.report.plot_page import Section, write_plot_page
+from experiments.station.clients import station_clients
+from experiments.station.guided_command import ask_before_moving, on_station
+from experiments.station.latency import Latency, evaluate
+from experiments.terminal.console import progress_bar, refusing
+from experiments.terminal.options import SetOption, WithCellOption, YesOption
+from experiments.terminal.prepare import Prepared, prepare
+from experiments.terminal.staging import staged_file
+
+
+def latency_command(
+    scenario: Annotated[
+        str, typer.Option(metavar="NAME|FILE", help="A shipped scenario or a YAML file.")
+    ] = "cell",
+    settings: SetOption = None,
+    with_cell: WithCellOption = False,
+    yes: YesOption = False,
+    joint: Annotated[int, typer.Option(metavar="N", help="The joint that is moved.")] = 1,
+    amplitude: Annotated[float, typer.Option(metavar="DEG", help="By how much, to each side.")] = 4.0,
+    duration: Annotated[float, typer.Option(metavar="S", help="For how long.")] = 20.0,
+    report: Annotated[Path, typer.Option(metavar="FILE.html", help="The picture.")] = Path(
+        "out/latency.html"
+    ),
+    write: Annotated[
+        str | None,
+        typer.Option(metavar="FILE.yaml", help="A scenario with the delays that were found."),
+    ] = None,
+    json_file: Annotated[
+        str | None,
+        typer.Option("--json", metavar="FILE", help="The numbers; - prints them, and nothing else."),
+    ] = None,
+) -> None:
+    """Measure the delays and clocks of a real station by moving one joint back and forth."""
+    human = Console(stderr=json_file == "-")
+    with refusing(ValueError, OSError), ExitStack() as stack:
+        name, changes = on_station(scenario, list(settings or []), "egm", with_cell)
+        prepared = prepare(name, changes)
+        ask_before_moving(human, prepared, with_cell or yes)
+        page = stack.enter_context(staged_file(report))
+        written = stack.enter_context(staged_file(write)) if write else None
+        copy = stack.enter_context(staged_file(json_file)) if json_file not in (None, "-") else None
+        record = _measured(prepared, LatencyConfig(joint, amplitude, duration), with_cell)
+        found = evaluate(record)
+        write_latency_page(page, found, record)
+        if written:
+            write_text(written, scenario_with(scenario, found))
+        if copy:
+            write_text(copy, json_text(found.as_dict()))
+    if json_file == "-":
+        sys.stdout.write(json_text(found.as_dict()))
+    human.print(latency_table(found))
+    for path in filter(None, (str(report), write)):
+        human.print(escape(path), soft_wrap=True)
+
+
+def _measured(prepared: Prepared, config: LatencyConfig, with_cell: bool) -> LatencyRecord:
+    scenario: Scenario = prepared.scenario
+    with (
+        station_clients(scenario, prepared.robot, with_cell, True, camera_delay=0.0) as station,
+        progress_bar(f"moving joint {config.joint}") as progress,
+    ):
+        return measure_latency(
+            scenario, prepared.robot, config, station.client, station.camera, progress=progress
+        )
+
+
+def latency_table(found: Latency) -> Table:
+    """What was found, for people."""
+    table = Table(box=box.SIMPLE_HEAD, title="Delays of the station", title_justify="left")
+    table.add_column("what", no_wrap=True)
+    table.add_column("value", justify="right", no_wrap=True)
+    table.add_column("which is")
+    rows: list[tuple[str, float | None, str, str]] = [
+        ("controller: cycle", 1e3 * found.cycle, "ms", "between two messages"),
+        ("controller: loop", 1e3 * found.loop, "ms", "from a command to the joint at it, by its own stamps"),
+        (
+            "controller: dead time",
+            1e3 * found.dead_time,
+            "ms",
+            "the loop less one cycle, in which it is heard",
+        ),
+        (
+            "camera: delay",
+            None if found.camera is None else 1e3 * found.camera,
+            "ms",
+            "from exposure to arrival",
+        ),
+        (
+            "camera: drift",
+            found.drift_ppm,
+            "ppm",
+            f"its clock gains it on the controller's, ± {found.drift_sigma_ppm or 0.0:.1f}",
+        ),
+        (
+            "own turn-around",
+            1e3 * found.turn_around["50%"],
+            "ms",
+            "median, from a message in to its reply out",
+        ),
+        ("own turn-around, 99 %", 1e3 * found.turn_around["99%"], "ms", ""),
+    ]
+    for line, levels in found.jitter.items():
+        late = levels.get("99%", float("nan"))
+        rows.append(
+            (f"transport: jitter, {line}", 1e3 * late, "ms", "99 % arrive no later than the quickest + this")
+        )
+    for name, value, unit, text in rows:
+        if value is not None and np.isfinite(value):
+            table.add_row(name, f"{value:.2f} {unit}", text)
+    return table
+
+
+def scenario_with(name: str, found: Latency) -> str:
+    """A scenario file that extends another by the delays that were found."""
+    lines = ["# Delays as `truetip latency` found them.", f"extends: {name}", "station:"]
+    lines += [f"  period: {found.cycle:.6f}"]
+    # One cycle is the least: a command is interpolated over it.
+    lines += [f"  drive: {{command_delay: {found.cycle:.6f}, dead_time: {max(0.0, found.dead_time):.6f}}}"]
+    if found.camera is not None:
+        lines += [f"  camera: {{delay: {max(0.0, found.camera):.6f}}}"]
+    return "\n".join(lines) + "\n"
+
+
+def write_latency_page(path: Path, found: Latency, record: LatencyRecord) -> None:
+    """The motions over each other and the clocks against each other, as Probst (2024), figs. 6.6 and 6.7."""
+    time = record.stamp - record.stamp[0]
+    moved = go.Figure()
+    for name, values, shift in (
+        ("commanded", record.commanded, 0.0),
+        ("measured", record.measured, 0.0),
+        ("measured, moved back by the loop", record.measured, found.loop),
+    ):
+        moved.add_scatter(x=time - shift, y=np.rad2deg(values), name=name, mode="lines")
+    moved.update_layout(xaxis_title="time, s", yaxis_title="joint, degrees")
+    clocks = go.Figure()
+    difference = 1e3 * (record.reported - record.reported[0] - time)
+    clocks.add_scatter(x=time, y=difference, name="own clock less the controller's", mode="lines")
+    clocks.update_layout(xaxis_title="time, s", yaxis_title="difference, ms")
+    spread = go.Figure(go.Histogram(x=1e3 * record.turn_around, nbinsx=100))
+    spread.update_layout(xaxis_title="turn-around, ms", yaxis_title="replies")
+    verdict = (
+        f"A command takes {1e3 * found.loop:.1f} ms to the joint, {1e3 * found.dead_time:.1f} ms more than "
+        "the cycle in which it is heard."
+    )
+    if found.camera is not None:
+        verdict += f" A picture is {1e3 * found.camera:.1f} ms old when it arrives."
+    write_plot_page(
+        path,
+        "Delays of a station",
+        verdict,
+        [
+            Section("The joint follows its command", "Both over the controller's own stamps.", moved),
+            Section(
+                "The clocks",
+                "A line that rises or falls is a drift; steps would be a clock set anew.",
+                clocks,
+            ),
+            Section("Our own turn-around", "From a message in to its reply out.", spread, 320),
+        ],
+    )

@@ -1,0 +1,59 @@
+"""What all commands share: refusals in one line, progress bars, lists."""
+
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import contextmanager
+
+import typer
+from rich import box
+from rich.console import Console
+from rich.markup import escape
+from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeRemainingColumn
+from rich.table import Table
+
+from experiments.terminal.workers import SimulationError
+
+BAD_INPUT, BROKEN_OFF, INTERRUPTED = 2, 1, 130  # exit codes
+
+
+@contextmanager
+def refusing(*refusals: type[Exception]) -> Iterator[None]:
+    """Turns what the user can mend into one line and an exit code; a defect still shows itself."""
+    try:
+        yield
+    except refusals as error:
+        fail(str(error), BAD_INPUT)
+    except SimulationError as error:
+        fail(str(error), BROKEN_OFF)
+    except KeyboardInterrupt:
+        fail("interrupted, nothing was written", INTERRUPTED)
+
+
+def fail(message: str, code: int) -> None:
+    """Says why in one line on stderr and ends the command."""
+    typer.echo(f"truetip: {' '.join(message.split())}", err=True)
+    raise typer.Exit(code)
+
+
+@contextmanager
+def progress_bar(label: str) -> Iterator[Callable[[float], None]]:
+    """A progress bar on stderr, where that is a terminal; gives the function that tells it the share done."""
+    console = Console(stderr=True)
+    columns = (TextColumn("{task.description}"), BarColumn(), TaskProgressColumn(), TimeRemainingColumn())
+    with Progress(*columns, console=console, transient=True, disable=not console.is_terminal) as bar:
+        task = bar.add_task(label, total=1.0)
+        yield lambda share: bar.update(task, completed=share)
+
+
+def print_list(rows: Iterable[tuple[str, str]]) -> None:
+    """Names with a line of text each."""
+    table = Table(box=box.SIMPLE, show_header=False)
+    table.add_column(no_wrap=True, style="bold")
+    table.add_column()
+    for name, text in rows:
+        table.add_row(escape(name), escape(text))
+    Console().print(table)
+
+
+def count(number: int, one: str, many: str = "") -> str:
+    """A number with its noun: 1 run, 12 runs."""
+    return f"{number} {one if number == 1 else many or one + 's'}"

@@ -1,0 +1,88 @@
+"""The table of Probst (2024), 6.7, on a terminal: largest and static error per axis, for every law."""
+
+from collections.abc import Mapping
+from typing import Any
+
+from rich import box
+from rich.console import Console
+from rich.markup import escape
+from rich.table import Table
+
+from experiments.report.style import law_colors, law_title
+
+SOURCES = {"true": "true, what a perfect instrument would see", "measured": "measured, what the camera says"}
+AXES = ("Δx mm", "Δy mm", "Δz mm", "ρx °", "ρy °", "ρz °")
+KINDS = {"max": "largest", "static": "static"}
+
+
+def print_summary(console: Console, result: Mapping[str, Any]) -> None:
+    """Prints the true and the measured errors of a `metrics.summary`, and what the guard did."""
+    console.print()
+    console.print(f"[bold]Scenario {escape(result['scenario'])}[/bold]")
+    for source in SOURCES:
+        console.print(error_table(result, source))
+    if any(count for run in result["runs"].values() for count in run["guard"].values()):
+        console.print(guard_table(result))
+    else:
+        console.print("[italic]Guard: no intervention[/italic]\n")
+
+
+def error_table(result: Mapping[str, Any], source: str) -> Table:
+    """The errors of one source; the smallest number of each column and kind is bold."""
+    table = Table(
+        box=box.SIMPLE_HEAD, title=f"Errors, {SOURCES[source]}", title_justify="left", title_style="italic"
+    )
+    table.add_column("error", no_wrap=True)
+    table.add_column("law", no_wrap=True)
+    for axis in AXES:
+        table.add_column(axis, justify="right", no_wrap=True)
+    colors = law_colors(result["runs"])
+    for kind, kind_title in KINDS.items():
+        rows = {law: error_row(run[source], kind) for law, run in result["runs"].items()}
+        smallest = smallest_of_columns(list(rows.values()))
+        for number, (law, row) in enumerate(rows.items()):
+            cells = [
+                f"[bold]{format_cell(value)}[/bold]" if is_best(value, best) else format_cell(value)
+                for value, best in zip(row, smallest, strict=True)
+            ]
+            name = f"[{colors[law]}]{escape(law_title(law))}[/]"
+            table.add_row(
+                kind_title if number == 0 else "", name, *cells, end_section=number == len(rows) - 1
+            )
+    return table
+
+
+def guard_table(result: Mapping[str, Any]) -> Table:
+    """How often the guard intervened, by kind."""
+    kinds = sorted({kind for run in result["runs"].values() for kind, count in run["guard"].items() if count})
+    title = "Guard, ticks with an intervention"
+    table = Table(box=box.SIMPLE_HEAD, title=title, title_justify="left", title_style="italic")
+    table.add_column("law", no_wrap=True)
+    for kind in kinds:
+        table.add_column(escape(kind.replace("_", " ")), justify="right")
+    for law, run in result["runs"].items():
+        table.add_row(escape(law_title(law)), *(str(run["guard"].get(kind, 0)) for kind in kinds))
+    return table
+
+
+def error_row(numbers: Mapping[str, Any], kind: str) -> list[float | None]:
+    """Six numbers, mm then degrees; ``kind`` is "max" or "static"."""
+    return [*numbers[f"{kind}_mm"], *numbers[f"{kind}_deg"]]
+
+
+def smallest_of_columns(rows: list[list[float | None]]) -> list[float | None]:
+    """The smallest number of each column, None where a single row leaves nothing to compare."""
+    if len(rows) < 2:
+        return [None] * len(rows[0])
+    columns = ([value for value in column if value is not None] for column in zip(*rows, strict=True))
+    return [min(column, default=None) for column in columns]
+
+
+def is_best(value: float | None, best: float | None) -> bool:
+    """Whether a number shows as the smallest of its column: equal digits are equally good."""
+    return value is not None and best is not None and format_cell(value) == format_cell(best)
+
+
+def format_cell(value: float | None) -> str:
+    """Three digits after the point, a dash where there is no number."""
+    return "–" if value is None else f"{value:.3f}"
