@@ -8,7 +8,6 @@ from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
-from pydrake.systems.analysis import Simulator
 from pydrake.systems.framework import Context, Diagram, DiagramBuilder
 
 from diagrams.egm_station import EgmStation
@@ -87,10 +86,9 @@ class GuidedRun:
         self.path: CartesianPath = self.servo.reference.path
         self.start = start_position(self.robot, scenario, self.path)
         self._warm_up()
-        self._simulator = Simulator(self.diagram)
-        self._context: Context = self._simulator.get_mutable_context()
+        self._context: Context = self.diagram.CreateDefaultContext()
         self._scratch = self.diagram.CreateDefaultContext()
-        self._heard = JointSample(), PoseSample()
+        self._next = 0  # the tick that the context stands before
         self._joint_rows: list[tuple[int, float, np.ndarray, np.ndarray]] = []
         self._exposures: list[tuple[float, np.ndarray]] = []
         self._pauses: list[tuple[float, float]] = []
@@ -168,50 +166,57 @@ class GuidedRun:
 
     def _tick(self, wire: StationWire, report: RobotReport, tick: int, is_running: bool) -> None:
         """One message in, one tick, one reply out."""
+        for _ in range(self._next, tick):  # those whose message did not come
+            self._update(self._context)
+            self._stand_before_next()
         time = tick * self.period
         sample = wire.pose_at(time)
         joints = JointSample(time, report.position, wire.velocity, wire.effort, is_running)
-        if time > self._context.get_time():
-            self._simulator.AdvanceTo(time)
         self.station.hear(self._context, joints, sample)
         if not self._joint_rows:
-            self._simulator.Initialize()  # here, where the log finds samples to begin with
-        self._simulator.AdvancePendingEvents()
-        position, velocity = self.station.command(self._context)
-        wire.say(position, velocity)
-        # Nothing happens until the next tick, so its time may begin now.
-        self._simulator.AdvanceTo(time + self.period)
-        self._heard = joints, sample
+            self.diagram.ForcedPublish(self._context)  # here, where the log finds samples to begin with
+        self._update(self._context)
+        wire.say(*self.station.command(self._context))
+        self._stand_before_next()
         self._joint_rows.append((tick, report.time, report.position, wire.effort))
         if sample.valid and (not self._exposures or sample.time > self._exposures[-1][0]):
             self._exposures.append((sample.time, sample.X_WE.GetAsMatrix4()))
 
+    def _update(self, context: Context) -> None:
+        """Everything that the servo does at a tick."""
+        context.SetDiscreteState(self.diagram.EvalUniquePeriodicDiscreteUpdate(context))
+
+    def _stand_before_next(self) -> None:
+        """Nothing happens between two ticks, so the time of the next one may begin right after the reply."""
+        self._next += 1
+        self._context.SetTime(self._next * self.period)
+        self.diagram.ForcedPublish(self._context)  # logs what stands before the tick, as a simulation does
+
     def _warm_up(self) -> None:
         """Computes ticks on a context that is thrown away, so that the first reply is no slower."""
-        simulator = Simulator(self.diagram)
-        simulator.Initialize()
-        context = simulator.get_mutable_context()
+        context = self.diagram.CreateDefaultContext()
         X_WE = self.servo.reference.GetOutputPort("X_WE_desired").Eval(
             self.servo.reference.GetMyContextFromRoot(context)
         )
         zero = np.zeros(NUM_JOINTS)
         for tick in range(_WARM_UP):
             time = tick * self.period
-            if tick > 0:
-                simulator.AdvanceTo(time)
+            context.SetTime(time)
             self.station.hear(
                 context, JointSample(time, self.start, zero, zero, True), PoseSample(time, X_WE, True)
             )
-            simulator.AdvancePendingEvents()
+            self._update(context)
             self.station.command(context)
+            self.diagram.ForcedPublish(context)
 
     def _rehearse(self) -> None:
-        """Computes the next tick beforehand with the last samples, and forgets it."""
-        scratch = self._scratch
-        scratch.SetTimeStateAndParametersFrom(self._context)
-        self.station.hear(scratch, *self._heard)
-        scratch.SetDiscreteState(self.diagram.EvalUniquePeriodicDiscreteUpdate(scratch))
-        self.station.command(scratch)
+        """Computes the next tick beforehand with the last samples, and forgets it.
+
+        What it needs is then in the caches of the processor, and what depends on time alone in those of the
+        context.
+        """
+        self._scratch.SetDiscreteState(self.diagram.EvalUniquePeriodicDiscreteUpdate(self._context))
+        self.station.command(self._scratch)
 
     def _record(
         self, counters: dict[str, int], camera: MocapReceiver | None, wire: StationWire, ended: str

@@ -138,13 +138,14 @@ class CommandGuard(LeafSystem):
         counts = self.DeclareDiscreteState(len(KINDS))
         self.DeclareStateOutputPort("guard_status", counts)
         self.DeclareStateOutputPort("deviation", self.DeclareDiscreteState(NUM_JOINTS))
-        inputs = {port.ticket() for port in self._inputs}
-        # One entry computes everything; the ports are slices of it. Joints that are read again later do not
-        # take back what has been issued at a tick, so it does not depend on their port.
+        decided_by = {port.ticket() for port in self._inputs} | {self.discrete_state_ticket(state)}
+        # While the robot runs, its joints do not matter for what is issued: they need not be waited for.
+        self._next_in_motion = self.DeclareCacheEntry(
+            "next_in_motion", ValueProducer(Value[object], self._calc_next_in_motion), decided_by
+        )
+        # This one computes everything; the ports are slices of it.
         self._next = self.DeclareCacheEntry(
-            "next",
-            ValueProducer(Value[object], self._calc_next),
-            inputs | {self.discrete_state_ticket(state)},
+            "next", ValueProducer(Value[object], self._calc_next), decided_by | {self._joints.ticket()}
         )
         for name, part in (("position_command", _POSITIONS), ("velocity_command", _VELOCITIES)):
             self.DeclareVectorOutputPort(name, NUM_JOINTS, self._slice(part), {self._next.ticket()})
@@ -169,18 +170,32 @@ class CommandGuard(LeafSystem):
 
     def _calc_next(self, context: Context, value) -> None:
         """The next state, which kinds of intervention it takes, and when the last sample arrived."""
+        joints: JointSample = self._joints.Eval(context)
+        has_issued = not math.isnan(context.get_discrete_state(0).value()[0])
+        if not (joints.running and has_issued):
+            value.set_value(self._decided(context, joints))
+            return
+        state, kinds, last_sample = self._next_in_motion.Eval(context)
+        state = state.copy()
+        state[_WERE_AT] = joints.position
+        value.set_value((state, kinds, last_sample))
+
+    def _calc_next_in_motion(self, context: Context, value) -> None:
+        value.set_value(self._decided(context, None))
+
+    def _decided(self, context: Context, joints: JointSample | None) -> tuple[np.ndarray, list[int], float]:
+        """What `_calc_next` says; no joints stand for a robot that runs and has been commanded before."""
         state = context.get_discrete_state(0).value().copy()
         position, velocity, correction, measurement = (port.Eval(context).tolist() for port in self._inputs)
         kinds = []
-        joints: JointSample = self._joints.Eval(context)
-        if math.isnan(state[0]) or not joints.running:
+        if joints is not None:
             if state[_MODE] in (_GOING, _HOLDING):
                 state[_ASIDE] = 0.0
             if not math.isnan(state[0]):
                 state[_ASIDE] += joints.position - state[_WERE_AT]
             state[_POSITIONS], state[_VELOCITIES] = joints.position, 0.0
-        state[_WERE_AT] = joints.position
-        if not joints.running and state[_LAST_COMMAND] > -math.inf:
+            state[_WERE_AT] = joints.position
+        if joints is not None and not joints.running and state[_LAST_COMMAND] > -math.inf:
             kinds.append(_STOPPED)
             state[_BRAKING_FROM] = 0.0
             state[_MODE] = _IDLE
@@ -211,7 +226,7 @@ class CommandGuard(LeafSystem):
             or x * x + y * y + z * z > self._correction_limit**2
         ):
             kinds.append(_CORRECTION)
-        value.set_value((state, kinds, measurement[0]))
+        return state, kinds, measurement[0]
 
     def _follow(
         self, state: np.ndarray, position: list[float], velocity: list[float], kinds: list[int]

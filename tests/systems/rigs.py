@@ -64,6 +64,11 @@ class GuardRig:
         """The time of the next tick in s."""
         return self.ticks * PERIOD
 
+    def hear(self, joints: np.ndarray) -> None:
+        """Where the joints are, in rad, shape (6,)."""
+        sample = JointSample(self.time, joints, np.zeros(6), np.zeros(6), self.running)
+        self.guard.GetInputPort("joint_sample").FixValue(self.context, Value(sample))
+
     def tick(self, position, velocity=None, seen: float = np.inf, refused: int = 0, correction=None):
         """Issues one command; ``seen`` is the time of the last sample in s, by default the present.
 
@@ -79,8 +84,7 @@ class GuardRig:
         }
         for name, value in values.items():
             self.guard.GetInputPort(name).FixValue(self.context, value)
-        sample = JointSample(self.time, self.start, np.zeros(6), np.zeros(6), self.running)
-        self.guard.GetInputPort("joint_sample").FixValue(self.context, Value(sample))
+        self.hear(self.start)
         ports = ("position_command", "velocity_command")
         issued, speed = (self.guard.GetOutputPort(name).Eval(self.context).copy() for name in ports)
         self.context.SetDiscreteState(self.guard.EvalUniquePeriodicDiscreteUpdate(self.context))

@@ -53,6 +53,18 @@ def test_after_the_last_command_the_robot_comes_to_rest_where_it_is(commands):
     np.testing.assert_array_equal(tail[-1][0], tail[-2][0])
 
 
+@pytest.mark.parametrize("is_commanded", [False, True])
+def test_a_robot_that_does_not_follow_is_commanded_where_it_was_read_last(is_commanded: bool):
+    """Also if its joints are read anew when the command has been worked out already."""
+    rig = GuardRig(ROBOT)
+    rig.running = False
+    rig.tick(np.full(6, 0.01) if is_commanded else NOTHING)
+    for joints in (np.full(6, 0.1), np.full(6, -0.2)):
+        rig.hear(joints)
+        issued = rig.guard.GetOutputPort("position_command").Eval(rig.context)
+        np.testing.assert_array_equal(issued, joints)
+
+
 def test_a_command_within_the_limits_passes_unchanged_and_counts_nothing():
     rig = GuardRig(ROBOT)
     for k in range(50):
