@@ -25,7 +25,6 @@ _JOINTS_SIZE = 18  # positions, velocities, velocities of the tick before
 _NEWTON_STEP = 5e-5  # rad; what one such step leaves is its square, a few nanometres
 _DAMPED = 1e-10  # rad and m that a step leaves which was not damped
 _ROTATION, _TRANSLATION = slice(0, 3), slice(3, 6)
-_NO_DEVIATION = 1e-8  # rad
 _NO_COMMAND = np.full(NUM_JOINTS, np.nan)
 
 
@@ -235,7 +234,7 @@ class ServoLaw(LeafSystem):
         if not self._deviation.HasValue(context):
             return None
         deviation = self._deviation.Eval(context)
-        if not any(abs(angle) > _NO_DEVIATION for angle in deviation.tolist()):
+        if not any(deviation.tolist()):
             return None
         commanded = context.get_discrete_state(self._outputs[0]).value()
         if math.isnan(commanded[0]):
