@@ -32,7 +32,7 @@ from experiments.report.report import verdict
 from experiments.station.cell_command import cell_command
 from experiments.station.guided_command import ask_before_moving, guide, on_station
 from experiments.station.latency_command import latency_command
-from experiments.terminal.console import count, print_list, progress_bar, refusing
+from experiments.terminal.console import count, print_list, print_note, progress_bar, refusing
 from experiments.terminal.options import (
     AnyScenarioOption,
     CameraOption,
@@ -126,6 +126,7 @@ def compare_command(
         name, changes = on_station(scenario, changes, station, with_cell)
         prepared = prepare(name, changes, robot, is_quick)
         check(prepared, list(COMPARED_LAWS))
+        print_note(human, prepared.note)
         is_guided = prepared.scenario.station.kind == "egm"
         if is_guided:
             ask_before_moving(human, prepared, with_cell or yes)
@@ -178,6 +179,7 @@ def run_command(
         prepared = prepare(name, changes, robot)
         law = prepared.scenario.law
         check(prepared, [law])
+        print_note(console, prepared.note)
         is_guided = prepared.scenario.station.kind == "egm"
         if is_guided:
             if meshcat or realtime is not None:

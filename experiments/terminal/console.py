@@ -44,6 +44,12 @@ def progress_bar(label: str) -> Iterator[Callable[[float], None]]:
         yield lambda share: bar.update(task, completed=share)
 
 
+def print_note(console: Console, note: str) -> None:
+    """What a person should know before they wait for it, if there is anything."""
+    if note:
+        console.print(f"Note: {note}", style="yellow", highlight=False)
+
+
 def print_list(rows: Iterable[tuple[str, str]]) -> None:
     """Names with a line of text each."""
     table = Table(box=box.SIMPLE, show_header=False)

@@ -26,6 +26,17 @@ class Prepared:
         return drawn_robot(self.scenario, self.robot)
 
     @property
+    def note(self) -> str:
+        """What a person should know before it runs, in a line; empty if there is nothing."""
+        model, true = self.scenario.servo.feedforward.kind, self.scenario.station.elasticity
+        if model == "elastic_structure" and true != "structure":
+            return (
+                f"the feedforward compensates an elastic structure that the robot does not have with "
+                f"station.elasticity={true}"
+            )
+        return ""
+
+    @property
     def text(self) -> str:
         """The whole scenario as YAML under its title."""
         return f"# {self.title}\n{scenario_text(self.scenario)}"

@@ -158,3 +158,10 @@ def test_scenarios_and_robots_are_listed(capsys):
     assert "Probst" in scenarios.out
     assert all(name in robots.out for name in shipped_robots())
     assert truetip(capsys, "--version").out.startswith("truetip")
+
+
+def test_a_model_of_what_the_robot_does_not_have_is_remarked():
+    settings = ["servo.feedforward.kind=elastic_structure"]
+    assert "station.elasticity=joints" in prepare("misaligned", settings).note
+    assert not prepare("misaligned", [*settings, "station.elasticity=structure"]).note
+    assert not prepare("misaligned").note
