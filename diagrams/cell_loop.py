@@ -32,6 +32,7 @@ class CellStatistics:
     cycles: int = 0
     late: int = 0  # messages of the robot that left more than a millisecond late
     worst_lateness: float = 0.0  # s
+    crowded: int = 0  # messages less than half a cycle after the one before, to catch up
     schedule_moves: int = 0  # times at which the machine was gone for so long that the schedule moved
     commands: int = 0  # datagrams that came in
     camera_frames: int = 0
@@ -121,6 +122,7 @@ class CellLoop:
     def _run(self, until: Callable[[float], bool]) -> None:
         cell, statistics = self.cell, self.statistics
         start = steady_time() - cell.time
+        began = start
         self._post_report()
         while not until(cell.time):
             now = cell.time
@@ -129,7 +131,9 @@ class CellLoop:
             # A controller hears before it speaks: a reply to this cycle's message belongs to the next one.
             self._hear(now)
             self._hand_out(start, now)
-            lateness = steady_time() - start - now
+            before, began = began, steady_time()
+            statistics.crowded += began - before < 0.5 * cell.period
+            lateness = began - start - now
             if lateness > _LOST_TRACK:
                 start += lateness
                 statistics.schedule_moves += 1
