@@ -49,7 +49,7 @@ class MeasurementRun:
         robot = load_robot(scenario.robot)
         builder = DiagramBuilder()
         self._station = builder.AddNamedSystem(
-            "station", SimulatedStation(robot, scenario.station, "cascade", with_log=False)
+            "station", SimulatedStation(robot, scenario.station, "cascade")
         )
         mover = JointMover(self._procedure.speed_share * robot.speed)
         self._mover = builder.AddNamedSystem("mover", mover)

@@ -72,10 +72,11 @@ class Experiment:
                 builder.Connect(self.servo.GetOutputPort(name), self.station.GetInputPort(name))
         for name in ("joint_sample", "pose_sample"):
             builder.Connect(self.station.GetOutputPort(name), self.servo.GetInputPort(name))
-        ports = ("position_command", "velocity_command", "correction", "guard_status")
-        self._log = PackedLog(
-            builder, {name: self.servo.GetOutputPort(name) for name in ports}, scenario.station.period
-        )
+        shown = ("position_command", "velocity_command", "correction", "guard_status")
+        ports = {name: self.servo.GetOutputPort(name) for name in shown}
+        ports |= {name: self.station.GetOutputPort(name) for name in self.station.LOGGED}
+        # In one log: what stands in a diagram costs time at every step of the integrator.
+        self._log = PackedLog(builder, ports, scenario.station.period)
         self.diagram = builder.Build()
         self.diagram.set_name("truetip")
         self.path = self.servo.reference.path
@@ -113,8 +114,8 @@ class Experiment:
 
     def log(self) -> RunLog:
         """The record of what has happened so far."""
-        _, data = self._log.read(self.context)
-        record = self.station.record(self.context)
+        times, data = self._log.read(self.context)
+        record = self.station.record(times, data)
         counts = np.round(data["guard_status"]).astype(int)
         return RunLog(
             law=self.law,

@@ -14,7 +14,6 @@ from pydrake.systems.primitives import (
     SelectorParams,
 )
 
-from diagrams.packed_log import PackedLog
 from diagrams.scenario import StationConfig
 from robots.model import NUM_JOINTS, RobotModel
 from robots.plant import PlantRobot, add_robot
@@ -57,14 +56,18 @@ class SimulatedStation(Diagram):
         out ``truth.X_WE``          RigidTransform
         out ``truth.state``         state of the plant
         out ``truth.motor_torque``  vector 6 in N m, joint side
+        out ``truth.exposure``      vector 14, what the camera saw last, before it says so: time, validity,
+                                    rows of X_WE
     """
+
+    # What `record` is made of.
+    LOGGED = ("truth.state", "truth.motor_torque", "truth.exposure")
 
     def __init__(
         self,
         robot: RobotModel,
         config: StationConfig,
         drive: str,
-        with_log: bool = True,
         takes_torque: bool = False,
     ) -> None:
         """Builds the cell.
@@ -74,7 +77,6 @@ class SimulatedStation(Diagram):
             config: the station part of a scenario.
             drive: ``"position"``, ``"velocity"`` or ``"cascade"``; under EGM, where ``"velocity"``
                 follows speeds alone, there is no other difference.
-            with_log: whether `record` will be asked for what has happened.
             takes_torque: whether the drives take a torque feedforward; EGM has none.
 
         Raises:
@@ -136,13 +138,12 @@ class SimulatedStation(Diagram):
             if motion:
                 builder.Connect(motion.GetOutputPort(name), self.drive.GetInputPort(name))
             builder.ExportInput((motion or self.drive).GetInputPort(name), name)
-        logged = {"state": state, "motor_torque": torque, "exposure": camera.GetOutputPort("exposure")}
-        self._log = PackedLog(builder, logged, config.period) if with_log else None
         builder.ExportOutput(sensor.GetOutputPort("joint_sample"), "joint_sample")
         builder.ExportOutput(camera.GetOutputPort("pose_sample"), "pose_sample")
         builder.ExportOutput(tip.GetOutputPort("X_WE"), "truth.X_WE")
         builder.ExportOutput(state, "truth.state")
         builder.ExportOutput(torque, "truth.motor_torque")
+        builder.ExportOutput(camera.GetOutputPort("exposure"), "truth.exposure")
         builder.BuildInto(self)
         self.set_name("station")
 
@@ -184,21 +185,19 @@ class SimulatedStation(Diagram):
         A = np.block([[np.zeros((n, n)), np.eye(n)], [-M_inverse * K, -M_inverse * D]])
         return float(np.abs(np.linalg.eigvals(A)).max())
 
-    def record(self, root_context: Context) -> StationRecord:
-        """What the station has measured, and the truth beside it, since the start.
+    def record(self, times: np.ndarray, logged: dict[str, np.ndarray]) -> StationRecord:
+        """What the station has measured, and the truth beside it.
 
-        Raises:
-            RuntimeError: if the station was built without a log.
+        Args:
+            times: of the log in s, shape (n,).
+            logged: what the ports in `LOGGED` said then, shape (n, size) each.
         """
-        if self._log is None:
-            raise RuntimeError("the station was built without a log")
-        times, data = self._log.read(root_context)
-        state = data["state"]
-        exposure_time, X_WE_measured = _exposures(data["exposure"])
+        state = logged["truth.state"]
+        exposure_time, X_WE_measured = _exposures(logged["truth.exposure"])
         return StationRecord(
             time=times,
             joint_position=state[:, self.robot.motor_indices()[:NUM_JOINTS]],
-            joint_effort=data["motor_torque"],
+            joint_effort=logged["truth.motor_torque"],
             exposure_time=exposure_time,
             X_WE_measured=X_WE_measured,
             X_WE_true=self.robot.tool_poses(state),

@@ -6,8 +6,10 @@ from typing import NamedTuple
 
 import numpy as np
 from pydrake.systems.analysis import Simulator
+from pydrake.systems.framework import DiagramBuilder
 
 from diagrams.integration import Integration
+from diagrams.packed_log import PackedLog
 from diagrams.run import start_position
 from diagrams.scenario import Scenario
 from diagrams.station import SimulatedStation
@@ -74,14 +76,19 @@ class VirtualCell:
         config = replace(scenario.station, interface="egm")
         self.period = config.period
         self._camera = config.camera
-        self._station = SimulatedStation(robot, config, "cascade", with_log)
-        self._simulator = Simulator(self._station)
+        builder = DiagramBuilder()
+        self._station = builder.AddNamedSystem("station", SimulatedStation(robot, config, "cascade"))
+        ports = {name: self._station.GetOutputPort(name) for name in self._station.LOGGED}
+        self._log = PackedLog(builder, ports, config.period) if with_log else None
+        self._simulator = Simulator(builder.Build())
         self._context = self._simulator.get_mutable_context()
+        self._station_context = self._station.GetMyContextFromRoot(self._context)
         start = start_position(robot, scenario, make_path(scenario.reference))
         self._station.set_at_rest(self._context, start, scenario.seed)
         standing = np.full(len(start), np.nan)
+        inputs = self._station.GetMyMutableContextFromRoot(self._context)
         self._inputs = [
-            self._station.GetInputPort(name).FixValue(self._context, standing)
+            self._station.GetInputPort(name).FixValue(inputs, standing)
             for name in ("position_command", "velocity_command")
         ]
         self._integration = Integration(
@@ -107,7 +114,7 @@ class VirtualCell:
     @property
     def joints(self) -> JointSample:
         """What the joints say at `time`."""
-        return self._joints.Eval(self._context)
+        return self._joints.Eval(self._station_context)
 
     def advance(self, controller: VirtualController) -> list[Exposure]:
         """Computes the next cycle with the controller's references; returns what the camera saw in it."""
@@ -118,7 +125,7 @@ class VirtualCell:
         while (published := self._exposure * self._camera.period + self._camera.delay) <= end:
             if published > self._context.get_time():
                 self._integration.advance(self._simulator, published)
-            exposures.append(Exposure(published, self._poses.Eval(self._context)))
+            exposures.append(Exposure(published, self._poses.Eval(self._station_context)))
             self._exposure += 1
         self._integration.advance(self._simulator, end)
         self.planned = self._station.planned_position(self._context)
@@ -126,5 +133,7 @@ class VirtualCell:
 
     def record(self) -> CellRecord:
         """The truth since the start. Raises RuntimeError if the cell was built without a log."""
-        record = self._station.record(self._context)
+        if self._log is None:
+            raise RuntimeError("the cell was built without a log")
+        record = self._station.record(*self._log.read(self._context))
         return CellRecord(CLOCK_START + record.time, record.X_WE_true, record.link_position)
