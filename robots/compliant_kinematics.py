@@ -6,6 +6,7 @@ from pydrake.multibody.plant import MultibodyPlant
 from robots.kinematics import Kinematics
 from robots.model import NUM_JOINTS, RobotModel
 from robots.plant import add_robot
+from robots.pose import Rows
 
 # A joint yields by a thousandth of a radian and its torque changes by a thousandth of that: three rounds
 # leave less than 1e-11 rad.
@@ -66,6 +67,11 @@ class CompliantKinematics:
     def jacobian(self, q: np.ndarray) -> np.ndarray:
         """Geometric Jacobians at motor positions q."""
         return self.forward_and_jacobian(q)[1]
+
+    def rows_and_jacobian(self, q: np.ndarray) -> tuple[Rows, np.ndarray]:
+        """`forward_and_jacobian` at one q (6,), with the first three rows of the pose as floats."""
+        X, J = self.forward_and_jacobian(q)
+        return X[:3].tolist(), J
 
     def forward_and_jacobian(self, q: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Tool poses and geometric Jacobians at motor positions q."""

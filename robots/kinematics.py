@@ -10,6 +10,7 @@ import numpy as np
 from scipy.linalg import get_lapack_funcs
 
 from robots.model import NUM_JOINTS, RobotModel
+from robots.pose import Rows
 from robots.straight_line import kinematics_code
 
 DAMPING = 1e-4  # alpha_0 of Probst (2024) eq. (2.33)
@@ -59,17 +60,21 @@ class Kinematics:
         """Geometric Jacobians, shape (..., 6, 6); see `forward_and_jacobian`."""
         return self.forward_and_jacobian(q)[1]
 
+    def rows_and_jacobian(self, q: np.ndarray) -> tuple[Rows, np.ndarray]:
+        """`forward_and_jacobian` of one configuration (6,), the pose as its first three rows."""
+        a, b, c, d, e, f = q.tolist()
+        sines = math.sin(a), math.sin(b), math.sin(c), math.sin(d), math.sin(e), math.sin(f)
+        cosines = math.cos(a), math.cos(b), math.cos(c), math.cos(d), math.cos(e), math.cos(f)
+        rows, jacobian = self._entries(*sines, *cosines)
+        return rows, np.array(jacobian).reshape(NUM_JOINTS, 6).T
+
     def _evaluate(self, q: np.ndarray, with_jacobian: bool) -> tuple[np.ndarray, np.ndarray | None]:
         q = np.asarray(q, dtype=float)
         if q.shape[-1:] != (NUM_JOINTS,):
             raise ValueError(f"joint positions must have the shape (..., {NUM_JOINTS}), got {q.shape}")
         if q.ndim == 1:
-            a, b, c, d, e, f = q.tolist()
-            sines = math.sin(a), math.sin(b), math.sin(c), math.sin(d), math.sin(e), math.sin(f)
-            cosines = math.cos(a), math.cos(b), math.cos(c), math.cos(d), math.cos(e), math.cos(f)
-            pose, jacobian = self._entries(*sines, *cosines)
-            X = np.array((*pose, 0.0, 0.0, 0.0, 1.0)).reshape(4, 4)
-            return X, np.array(jacobian).reshape(NUM_JOINTS, 6).T if with_jacobian else None
+            rows, J = self.rows_and_jacobian(q)
+            return np.array((*rows, (0.0, 0.0, 0.0, 1.0))), J if with_jacobian else None
         flat = q.reshape(-1, NUM_JOINTS)
         X = np.zeros((len(flat), 4, 4))
         X[:, 3, 3] = 1.0
@@ -78,8 +83,9 @@ class Kinematics:
             block = slice(start, start + _BLOCK)
             angles = np.ascontiguousarray(flat[block].T)
             pose, jacobian = self._entries(*np.sin(angles), *np.cos(angles))
-            for entry, value in enumerate(pose):
-                X[block, entry // 4, entry % 4] = value
+            for row, entries in enumerate(pose):
+                for column, value in enumerate(entries):
+                    X[block, row, column] = value
             if J is not None:
                 for entry, value in enumerate(jacobian):
                     J[block, entry % 6, entry // 6] = value

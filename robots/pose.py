@@ -13,6 +13,8 @@ from collections.abc import Sequence
 import numpy as np
 
 Floats = tuple[float, float, float]
+# A rotation or a pose as lists of floats: its first three rows, of which the pose's have a fourth column.
+Rows = Sequence[Sequence[float]]
 
 # Below this cosine of beta the ZYX angles alpha and gamma cannot be told apart.
 _GIMBAL_LOCK = 1e-9
@@ -39,16 +41,7 @@ def rotation_from_zyx(zyx: np.ndarray) -> np.ndarray:
     """
     zyx = np.asarray(zyx, dtype=float)
     if zyx.ndim == 1:
-        alpha, beta, gamma = zyx.tolist()
-        ca, cb, cg = math.cos(alpha), math.cos(beta), math.cos(gamma)
-        sa, sb, sg = math.sin(alpha), math.sin(beta), math.sin(gamma)
-        return np.array(
-            [
-                [ca * cb, ca * sb * sg - sa * cg, ca * sb * cg + sa * sg],
-                [sa * cb, sa * sb * sg + ca * cg, sa * sb * cg - ca * sg],
-                [-sb, cb * sg, cb * cg],
-            ]
-        )
+        return np.array(rotation_rows(zyx.tolist()))
     ca, cb, cg = np.moveaxis(np.cos(zyx), -1, 0)
     sa, sb, sg = np.moveaxis(np.sin(zyx), -1, 0)
     return np.stack(
@@ -58,6 +51,18 @@ def rotation_from_zyx(zyx: np.ndarray) -> np.ndarray:
             np.stack([-sb, cb * sg, cb * cg], -1),
         ],
         -2,
+    )
+
+
+def rotation_rows(zyx: Sequence[float]) -> tuple[Floats, Floats, Floats]:
+    """`rotation_from_zyx` of one orientation, as rows."""
+    alpha, beta, gamma = zyx
+    ca, cb, cg = math.cos(alpha), math.cos(beta), math.cos(gamma)
+    sa, sb, sg = math.sin(alpha), math.sin(beta), math.sin(gamma)
+    return (
+        (ca * cb, ca * sb * sg - sa * cg, ca * sb * cg + sa * sg),
+        (sa * cb, sa * sb * sg + ca * cg, sa * sb * cg - ca * sg),
+        (-sb, cb * sg, cb * cg),
     )
 
 
@@ -84,7 +89,7 @@ def zyx_from_rotation(rotation: np.ndarray) -> np.ndarray:
     return np.stack([alpha, np.arctan2(-r[..., 2, 0], cos_beta), gamma], -1)
 
 
-def zyx_angles(rows: Sequence[Sequence[float]]) -> Floats:
+def zyx_angles(rows: Rows) -> Floats:
     """`zyx_from_rotation` of one rotation given as rows; what follows in a row, as in a pose, is ignored."""
     (r00, r01, r02, *_), (r10, r11, r12, *_), (r20, *_), *_ = rows
     cos_beta = math.hypot(r00, r10)
@@ -204,10 +209,10 @@ def _relative_rotation(X_WD: np.ndarray, X_WE: np.ndarray) -> np.ndarray:
     return X_WD[..., :3, :3] @ np.swapaxes(X_WE[..., :3, :3], -1, -2)
 
 
-def _single_sine_error(X_WD: np.ndarray, X_WE: np.ndarray) -> tuple[list[float], float]:
-    """e-bar of one pair of poses as floats, and the cosine of the angle between them."""
-    (a0, a1, a2, ax), (b0, b1, b2, bx), (c0, c1, c2, cx), *_ = X_WD.tolist()
-    (d0, d1, d2, dx), (e0, e1, e2, ex), (f0, f1, f2, fx), *_ = X_WE.tolist()
+def sine_error_of_rows(X_WD: Rows, X_WE: Rows) -> tuple[list[float], float]:
+    """`sine_pose_error` of one pair of poses given as rows, and the cosine of the angle between them."""
+    (a0, a1, a2, ax), (b0, b1, b2, bx), (c0, c1, c2, cx), *_ = X_WD
+    (d0, d1, d2, dx), (e0, e1, e2, ex), (f0, f1, f2, fx), *_ = X_WE
     error = [
         0.5 * (c0 * e0 + c1 * e1 + c2 * e2 - b0 * f0 - b1 * f1 - b2 * f2),
         0.5 * (a0 * f0 + a1 * f1 + a2 * f2 - c0 * d0 - c1 * d1 - c2 * d2),
@@ -230,13 +235,19 @@ def pose_error(X_WD: np.ndarray, X_WE: np.ndarray) -> np.ndarray:
         (rotation vector in rad, translation in m) in the world, shape (..., 6).
     """
     if X_WD.ndim == 2 and X_WE.ndim == 2:
-        error, cosine = _single_sine_error(X_WD, X_WE)
-        x, y, z = error[:3]
-        scale = _angle_over_sine(x, y, z, cosine)
-        if scale is not None:
-            return np.array([scale * x, scale * y, scale * z, *error[3:]])
+        return np.array(error_of_rows(X_WD.tolist(), X_WE.tolist()))
     R_error = _relative_rotation(X_WD, X_WE)
     return np.concatenate([rotation_vector(R_error), X_WD[..., :3, 3] - X_WE[..., :3, 3]], -1)
+
+
+def error_of_rows(X_WD: Rows, X_WE: Rows) -> list[float]:
+    """`pose_error` of one pair of poses given as rows."""
+    (x, y, z, *way), cosine = sine_error_of_rows(X_WD, X_WE)
+    scale = _angle_over_sine(x, y, z, cosine)
+    if scale is None:
+        turn = rotation_vector(_relative_rotation(np.array(X_WD), np.array(X_WE)))
+        return [*turn.tolist(), *way]
+    return [scale * x, scale * y, scale * z, *way]
 
 
 def sine_pose_error(X_WD: np.ndarray, X_WE: np.ndarray) -> np.ndarray:
@@ -249,7 +260,7 @@ def sine_pose_error(X_WD: np.ndarray, X_WE: np.ndarray) -> np.ndarray:
         (axis times sine of the angle, translation in m) in the world, shape (..., 6).
     """
     if X_WD.ndim == 2 and X_WE.ndim == 2:
-        return np.array(_single_sine_error(X_WD, X_WE)[0])
+        return np.array(sine_error_of_rows(X_WD.tolist(), X_WE.tolist())[0])
     R_error = _relative_rotation(X_WD, X_WE)
     return np.concatenate([_skew_part(R_error), X_WD[..., :3, 3] - X_WE[..., :3, 3]], -1)
 

@@ -73,9 +73,8 @@ def kinematics_code(robot: RobotModel) -> Callable[..., tuple[tuple, tuple]]:
     a frame of its own, turned so that its axis becomes z.
 
     Returns:
-        A function of the six sines and then the six cosines of the joint positions. It returns the entries
-        of X_WE, row by row and without the last row (12), and those of the geometric Jacobian, column by
-        column, rotation first (36).
+        A function of the six sines and then the six cosines of the joint positions. It returns the first
+        three rows of X_WE, and the entries of the geometric Jacobian, column by column, rotation first (36).
     """
     lines = _Lines()
     X_WB = robot.base.pose()
@@ -106,7 +105,7 @@ def kinematics_code(robot: RobotModel) -> Callable[..., tuple[tuple, tuple]]:
     X_FE, R_SF = robot.tool.pose(), R_BS.T @ R_BL
     p = lines.plus(p, lines.times(columns, _constants(R_SF @ X_FE.translation())))
     columns = [lines.times(columns, _constants(column)) for column in (R_SF @ X_FE.rotation().matrix()).T]
-    pose = [column[row] for row in range(3) for column in (*columns, p)]
+    pose = [f"({', '.join(str(column[row]) for column in (*columns, p))})" for row in range(3)]
     jacobian = [entry for a, o in zip(axes, origins, strict=True) for entry in _twist(lines, a, o, p)]
     return _compiled(lines, pose, jacobian, robot.name)
 
@@ -146,7 +145,7 @@ def _twist(lines: _Lines, axis: Vector, origin: Vector, p: Vector) -> tuple[Term
 
 
 def _compiled(
-    lines: _Lines, pose: list[Term], jacobian: list[Term], name: str
+    lines: _Lines, pose: list[str], jacobian: list[Term], name: str
 ) -> Callable[..., tuple[tuple, tuple]]:
     arguments = ", ".join(f"{letter}{number}" for letter in "sc" for number in range(NUM_JOINTS))
     results = (", ".join(map(str, entries)) for entries in (pose, jacobian))

@@ -1,6 +1,7 @@
 """What all visual-servo laws share: ports, the comparison with the camera, and what is never trusted."""
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -14,7 +15,7 @@ from robots.inverse_kinematics import JointLimitError, UnreachableError
 from robots.kinematics import robust_solve, rotation_about
 from robots.model import NUM_JOINTS, RobotModel
 from robots.newton_inverse import InverseSolver, inverse_kinematics
-from robots.pose import pose_error
+from robots.pose import Rows, error_of_rows
 from systems.guard import GuardConfig
 from systems.samples import JointSample, PoseSample
 
@@ -24,7 +25,6 @@ _LARGEST_STEP = 0.4
 _JOINTS_SIZE = 18  # positions, velocities, velocities of the tick before
 _NEWTON_STEP = 5e-5  # rad; what one such step leaves is its square, a few nanometres
 _DAMPED = 1e-10  # rad and m that a step leaves which was not damped
-_ROTATION, _TRANSLATION = slice(0, 3), slice(3, 6)
 _NO_COMMAND = np.full(NUM_JOINTS, np.nan)
 
 
@@ -41,12 +41,15 @@ class LawConfig:
 
 
 class Moment(NamedTuple):
-    """What a law sees at one tick. Poses are the upper three rows of homogeneous matrices, shape (3, 4)."""
+    """What a law sees at one tick. Poses are the first three rows of homogeneous matrices.
 
-    X_WD: np.ndarray  # wanted pose
-    V_WD: np.ndarray  # wanted twist
+    They are lists of floats, for which Python is quicker than numpy in so small a thing as a pose.
+    """
+
+    X_WD: Rows  # wanted pose
+    V_WD: Sequence[float]  # wanted twist
     position: np.ndarray  # measured joint positions, rad
-    measured: tuple[np.ndarray, np.ndarray] | None  # wanted and seen pose at an exposure, if it may be used
+    measured: tuple[Rows, Rows] | None  # wanted and seen pose at an exposure, if it may be used
 
 
 class Step(NamedTuple):
@@ -110,7 +113,9 @@ class ServoLaw(LeafSystem):
         self._kinematics = controller_kinematics(robot, payload)
         self._inverse = inverse_kinematics(robot, payload)
         self._lower, self._upper = robot.lower.tolist(), robot.upper.tolist()
-        self._gains = np.repeat([config.rotation, config.translation], 3)
+        self._gains = [config.rotation] * 3 + [config.translation] * 3
+        # From the joints of the last tick, as `_joints_at` has them, to their positions at this one.
+        self._prediction = np.kron([1.0, 1.5 * period, -0.5 * period], np.eye(NUM_JOINTS))
         self._angle_limit = math.radians(config.correction_limit_deg)
         self._guard, self._preview = guard, preview
         self._smallest_trace = 1.0 + 2.0 * math.cos(math.radians(guard.largest_deviation_deg))
@@ -170,7 +175,7 @@ class ServoLaw(LeafSystem):
                 else:
                     last_used = time
 
-        moment = Moment(X_WD, V_WD, joints.position, measured)
+        moment = Moment(X_WD.tolist(), V_WD.tolist(), joints.position, measured)
         first_tick = math.isnan(path[(tick - 1) % len(path), 0])
         memory = self._start(moment) if first_tick else context.get_discrete_state(self._memory).value()
         try:
@@ -185,8 +190,8 @@ class ServoLaw(LeafSystem):
         discrete_state.set_value(3, np.array([last_used, refused, newest]))
         discrete_state.set_value(5, step.memory)
 
-    def _joints_at(self, X_WE: np.ndarray, V_WE: np.ndarray, last: np.ndarray) -> np.ndarray:
-        """The joints for a pose (3, 4) and a twist, next to those of the last tick.
+    def _joints_at(self, X_WE: Rows, V_WE: Sequence[float], last: np.ndarray) -> np.ndarray:
+        """The joints for a pose and a twist, next to those of the last tick.
 
         The last velocities lead so close that one Newton step is enough; where they do not, or close to a
         singularity, the inverse kinematics is asked.
@@ -201,32 +206,35 @@ class ServoLaw(LeafSystem):
         Raises:
             UnreachableError, JointLimitError: as `followed_branch`.
         """
-        q, velocity, before = last[:6], last[6:12], last[12:]
-        predicted = q + self.period * (1.5 * velocity - 0.5 * before)
-        X, J = self._kinematics.forward_and_jacobian(predicted)
-        twists = np.empty((2, 6)).T  # columns that LAPACK need not copy
-        twists[:, 0], twists[:, 1] = pose_error(X_WE, X), V_WE
+        predicted = self._prediction.dot(last)
+        rows, J = self._kinematics.rows_and_jacobian(predicted)
+        twists = np.array((error_of_rows(X_WE, rows), V_WE)).T  # columns that LAPACK need not copy
         rates = robust_solve(J, twists)
         step = rates[:, 0]
-        left = twists[:, 0] - J @ step
+        left = twists[:, 0] - J.dot(step)
         joints = np.empty(_JOINTS_SIZE)
-        joints[:6], joints[6:12], joints[12:] = predicted + step, rates[:, 1], velocity
+        joints[:6], joints[6:12], joints[12:] = predicted + step, rates[:, 1], last[6:12]
         inside = zip(self._lower, joints[:6].tolist(), self._upper, strict=True)
         if (
             step @ step > _NEWTON_STEP**2
             or left @ left > _DAMPED**2
             or not all(lower <= angle <= upper for lower, angle, upper in inside)
         ):
-            joints[:6] = followed_branch(self._inverse, X_WE, q)
-            joints[6:12] = robust_solve(self._kinematics.jacobian(joints[:6]), V_WE)
+            joints[:6] = followed_branch(self._inverse, np.array(X_WE), last[:6])
+            joints[6:12] = robust_solve(self._kinematics.jacobian(joints[:6]), twists[:, 1])
         return joints
 
-    def _within_limits(self, twist: np.ndarray, correction: np.ndarray) -> np.ndarray:
+    def _within_limits(self, twist: list[float], correction: Sequence[float]) -> list[float]:
         """The twist that a law adds; where the correction stands at its limit, it may only shrink."""
-        for part, limit in ((_ROTATION, self._angle_limit), (_TRANSLATION, self.config.correction_limit)):
-            x, y, z = correction[part].tolist()
-            if x * x + y * y + z * z >= limit * limit and correction[part] @ twist[part] > 0.0:
-                twist[part] = 0.0
+        a, b, c, x, y, z = correction
+        if a * a + b * b + c * c >= self._angle_limit**2:
+            u, v, w = twist[:3]
+            if a * u + b * v + c * w > 0.0:
+                twist[:3] = 0.0, 0.0, 0.0
+        if x * x + y * y + z * z >= self.config.correction_limit**2:
+            u, v, w = twist[3:]
+            if x * u + y * v + z * w > 0.0:
+                twist[3:] = 0.0, 0.0, 0.0
         return twist
 
     def _led_aside(self, context: Context) -> tuple[np.ndarray, np.ndarray] | None:
@@ -250,7 +258,7 @@ class ServoLaw(LeafSystem):
         tick: int,
         sample: PoseSample,
         led_aside: tuple[np.ndarray, np.ndarray] | None,
-    ) -> tuple[np.ndarray, np.ndarray] | None:
+    ) -> tuple[Rows, Rows] | None:
         """The pose that was wanted when a sample was exposed, and the pose that was seen.
 
         Args:
@@ -275,15 +283,16 @@ class ServoLaw(LeafSystem):
             wanted = moved_pose(wanted, passed * entry[13:])
         if led_aside is not None:
             wanted = _as_led(wanted, *led_aside)
-        seen = sample.X_WE.GetAsMatrix34()
-        (a0, a1, a2, ax), (b0, b1, b2, bx), (c0, c1, c2, cx) = wanted.tolist()
-        (d0, d1, d2, dx), (e0, e1, e2, ex), (f0, f1, f2, fx) = seen.tolist()
+        wanted_rows: Rows = wanted.tolist()
+        seen: Rows = sample.X_WE.GetAsMatrix34().tolist()
+        (a0, a1, a2, ax), (b0, b1, b2, bx), (c0, c1, c2, cx) = wanted_rows
+        (d0, d1, d2, dx), (e0, e1, e2, ex), (f0, f1, f2, fx) = seen
         gap_squared = (ax - dx) ** 2 + (bx - ex) ** 2 + (cx - fx) ** 2
         # The trace of the rotation between them is the product of all their entries.
         trace = a0 * d0 + a1 * d1 + a2 * d2 + b0 * e0 + b1 * e1 + b2 * e2 + c0 * f0 + c1 * f1 + c2 * f2
         if gap_squared > self._guard.largest_deviation**2 or trace < self._smallest_trace:
             return None
-        return wanted, seen
+        return wanted_rows, seen
 
 
 def _as_led(X: np.ndarray, led: np.ndarray, wished: np.ndarray) -> np.ndarray:

@@ -5,7 +5,7 @@ import math
 import numpy as np
 
 from robots.kinematics import robust_solve
-from robots.pose import angular_velocity, euler_difference, pose_error, zyx_angles
+from robots.pose import Rows, angular_velocity, error_of_rows, euler_difference, zyx_angles
 from systems.servo.law import Moment, ServoLaw, Step, refuse_jump
 
 
@@ -20,25 +20,24 @@ class Pbvs(ServoLaw):
     """
 
     def _step(self, moment: Moment, memory: np.ndarray) -> Step:
-        X_Wd, J = self._kinematics.forward_and_jacobian(memory)
-        twists = np.empty((2, 6)).T  # columns that LAPACK need not copy
-        twists[:, 0], twists[:, 1] = pose_error(moment.X_WD, X_Wd), moment.V_WD
-        rates = robust_solve(J, twists)
+        rows, J = self._kinematics.rows_and_jacobian(memory)
+        # Columns that LAPACK need not copy.
+        rates = robust_solve(J, np.array((error_of_rows(moment.X_WD, rows), moment.V_WD)).T)
         refuse_jump(rates[:, 0])
         velocity = rates[:, 1]
         q_d = memory + rates[:, 0] + self.period * velocity
-        X_WE, J = self._kinematics.forward_and_jacobian(moment.position)
-        correction = pose_error(X_WE, moment.X_WD)
+        rows, J = self._kinematics.rows_and_jacobian(moment.position)
+        correction = error_of_rows(rows, moment.X_WD)
         if moment.measured is not None:
-            added = robust_solve(J, self._within_limits(self._feedback(*moment.measured), correction))
+            twist = self._within_limits(self._feedback(*moment.measured), correction)
+            added = robust_solve(J, np.array(twist))
             fastest = math.radians(self.config.correction_speed_limit_deg_s)
             largest = max(map(abs, added.tolist()))
             velocity = velocity + added * min(1.0, fastest / max(largest, 1e-12))
-        return Step(moment.position + self.period * velocity, velocity, correction, q_d)
+        return Step(moment.position + self.period * velocity, velocity, np.array(correction), q_d)
 
-    def _feedback(self, wanted: np.ndarray, seen: np.ndarray) -> np.ndarray:
-        wanted_rows, rows = wanted.tolist(), seen.tolist()
-        zyx = zyx_angles(rows)
-        w = angular_velocity(zyx, euler_difference(zyx_angles(wanted_rows), zyx))
-        v = (wanted_row[3] - row[3] for wanted_row, row in zip(wanted_rows, rows, strict=True))
-        return self._gains * (*w, *v)
+    def _feedback(self, wanted: Rows, seen: Rows) -> list[float]:
+        zyx = zyx_angles(seen)
+        w = angular_velocity(zyx, euler_difference(zyx_angles(wanted), zyx))
+        v = (wanted_row[3] - row[3] for wanted_row, row in zip(wanted, seen, strict=True))
+        return [gain * part for gain, part in zip(self._gains, (*w, *v), strict=True)]

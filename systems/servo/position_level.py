@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 
-from robots.pose import angular_velocity, euler_difference, euler_rates, rotation_from_zyx, zyx_angles
+from robots.pose import Rows, angular_velocity, euler_difference, euler_rates, rotation_rows, zyx_angles
 from systems.servo.law import Moment, ServoLaw, Step
 
 
@@ -23,45 +23,44 @@ class PositionLevel(ServoLaw):
     memory_size = 24
 
     def _start(self, moment: Moment) -> np.ndarray:
-        X_WE = self._kinematics.forward(moment.position)[:3]
-        return np.concatenate([_euler_difference(X_WE, moment.X_WD), moment.position, np.zeros(12)])
+        rows, _ = self._kinematics.rows_and_jacobian(moment.position)
+        return np.concatenate([_euler_difference(rows, moment.X_WD), moment.position, np.zeros(12)])
 
     def _step(self, moment: Moment, memory: np.ndarray) -> Step:
-        rate = np.zeros(6)
+        c, rate = memory[:6].tolist(), [0.0] * 6
         if moment.measured is not None:
-            rate = self._gains * _euler_difference(*moment.measured)
-        c = self._limited(memory[:6] + self.period * rate)
+            difference = _euler_difference(*moment.measured)
+            rate = [gain * part for gain, part in zip(self._gains, difference, strict=True)]
+        c = self._limited([part + self.period * speed for part, speed in zip(c, rate, strict=True)])
         turn, shift = c[:3], c[3:]
 
-        rows = moment.X_WD.tolist()
-        wanted_zyx = zyx_angles(rows)
+        wanted_zyx = zyx_angles(moment.X_WD)
         zyx = [a + b for a, b in zip(wanted_zyx, turn, strict=True)]
-        X_WC = np.empty((3, 4))
-        X_WC[:, :3] = rotation_from_zyx(np.array(zyx))
-        X_WC[:, 3] = [row[3] + way for row, way in zip(rows, shift, strict=True)]
-
-        *wanted_w, x, y, z = moment.V_WD.tolist()
-        *turning, dx, dy, dz = rate.tolist()
+        X_WC = [
+            (*axes, row[3] + way)
+            for axes, row, way in zip(rotation_rows(zyx), moment.X_WD, shift, strict=True)
+        ]
+        *wanted_w, x, y, z = moment.V_WD
+        *turning, dx, dy, dz = rate
         zyx_rates = [a + b for a, b in zip(turning, euler_rates(wanted_zyx, wanted_w), strict=True)]
-        V = np.array([*angular_velocity(zyx, zyx_rates), x + dx, y + dy, z + dz])
-        joints = self._joints_at(X_WC, V, memory[6:])
+        V_WC = (*angular_velocity(zyx, zyx_rates), x + dx, y + dy, z + dz)
+        joints = self._joints_at(X_WC, V_WC, memory[6:])
         correction = np.array([*angular_velocity(zyx, turn), *shift])
         return Step(joints[:6], joints[6:12], correction, np.concatenate([c, joints]))
 
-    def _limited(self, correction: np.ndarray) -> list[float]:
+    def _limited(self, correction: list[float]) -> list[float]:
         """A correction, angle and length cut to their limits."""
         limited = []
         for part, limit in (
-            (correction[:3].tolist(), self._angle_limit),
-            (correction[3:].tolist(), self.config.correction_limit),
+            (correction[:3], self._angle_limit),
+            (correction[3:], self.config.correction_limit),
         ):
             size = math.hypot(*part)
             limited += part if size <= limit else [limit / size * value for value in part]
         return limited
 
 
-def _euler_difference(X_WD: np.ndarray, X_WE: np.ndarray) -> np.ndarray:
+def _euler_difference(X_WD: Rows, X_WE: Rows) -> list[float]:
     """z_d - z with wrapped angles (alpha, beta, gamma) in rad, then the position in m, eq. (5.10)."""
-    wanted, seen = X_WD.tolist(), X_WE.tolist()
-    angles = euler_difference(zyx_angles(wanted), zyx_angles(seen))
-    return np.array([*angles, *(a[3] - b[3] for a, b in zip(wanted, seen, strict=True))])
+    angles = euler_difference(zyx_angles(X_WD), zyx_angles(X_WE))
+    return [*angles, *(wanted[3] - seen[3] for wanted, seen in zip(X_WD, X_WE, strict=True))]

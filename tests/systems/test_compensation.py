@@ -32,7 +32,7 @@ def commanded(law: str, robot: RobotModel, offset: float = 0.0, gain: float = 5.
     start = inverse_kinematics(robot).nearest(X[0], HOME) + offset
     memory, positions = None, []
     for X_WD, V_WD in zip(X, V, strict=True):
-        moment = Moment(X_WD[:3], V_WD, start, None)
+        moment = Moment(X_WD[:3].tolist(), V_WD.tolist(), start, None)
         memory = system._start(moment) if memory is None else memory
         step = system._step(moment, memory)
         memory = step.memory

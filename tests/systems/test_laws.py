@@ -14,7 +14,8 @@ from robots.pose import pose_error, rotation_from_zyx, sine_error_rate_matrix, s
 from systems.guard import GuardConfig
 from systems.paths import ReferenceConfig, make_path
 from systems.samples import PoseSample
-from systems.servo import LAWS, LawConfig, NumericalIk
+from systems.servo import LAWS, LawConfig
+from systems.servo.sine_feedback import sine_feedback
 from tests.systems.rigs import PERIOD, LawRig, pose
 
 ROBOT = load_robot("irb1200")
@@ -71,15 +72,14 @@ def decay_rate(errors: np.ndarray) -> float:
     return -np.polyfit(PERIOD * np.flatnonzero(part), np.log(size[part]), 1)[0]
 
 
-def test_the_closed_form_of_numerical_ik_is_the_corrected_law():
+def test_the_closed_form_of_the_feedback_is_the_corrected_law():
     """L^-1 (L^T w + K e-bar) of Probst (2024) eq. (5.8), whose solution the law writes down directly."""
-    law = NumericalIk(ROBOT, LawConfig(rotation=7.0), GuardConfig(), PERIOD)
     rng = np.random.default_rng(3)
     for _ in range(50):
         seen, V = displaced(0.4 * rng.uniform(-1.0, 1.0, 6))[:3], rng.normal(size=6)
         L = sine_error_rate_matrix(HOME[:3, :3], seen[:, :3])
         expected = np.linalg.solve(L, L.T @ V[:3] + 7.0 * sine_pose_error(HOME[:3], seen)[:3])
-        feedback = law._feedback(HOME[:3], seen, V)
+        feedback = sine_feedback(HOME[:3].tolist(), seen.tolist(), V.tolist(), 7.0, 1.0)
         assert V[:3] + feedback[:3] == pytest.approx(expected, abs=1e-12)
 
 
