@@ -7,9 +7,11 @@ from pydrake.systems.analysis import ApplySimulatorConfig, Simulator, SimulatorC
 # Beyond this rate the explicit runge_kutta3 with its tiny steps takes longer than the implicit radau3.
 _EXPLICIT_RATE_LIMIT = 4000.0  # 1/s
 # Of each scheme the accuracy that is needed, and the fewest steps in a tick while the robot is pulled onto
-# the path and after that. The loose accuracy of radau3 stops it only where it goes astray: in a stiff loop
-# its estimate of the error takes the camera's noise for one and would make steps ten times too small.
-_MEASURED = {"runge_kutta3": (5e-4, 1, 1), "radau3": (1e-2, 2, 1)}
+# the path and after that. Loops that runge_kutta3 is for would let it make about four steps; it would try
+# fewer after each tick and make them again. The loose accuracy of radau3 stops it only where it goes astray:
+# in a stiff loop its estimate of the error takes the camera's noise for one and would make steps ten times
+# too small.
+_MEASURED = {"runge_kutta3": (1e-3, 5, 5), "radau3": (1e-2, 2, 1)}
 _PULLING_IN = 1.5  # s, in which a law brings the tip from centimetres away onto the path
 _MARGIN = 1.01  # so that two half steps in a tick leave no rest for a third
 
