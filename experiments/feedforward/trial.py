@@ -44,7 +44,7 @@ class Trial:
         told = commands(self, np.arange(0.0, stop + RINGING, period) + ahead, period)
         builder = DiagramBuilder()
         station = builder.AddNamedSystem(
-            "station", SimulatedStation(self.robot, config, "cascade", with_log=False, takes_torque=True)
+            "station", SimulatedStation(self.robot, config, "cascade", takes_torque=True)
         )
         player = builder.AddNamedSystem("commands", CommandPlayer(told, period))
         for index in range(player.num_output_ports()):
