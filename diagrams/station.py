@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from pydrake.common import RandomDistribution, RandomGenerator
 from pydrake.multibody.plant import MultibodyPlant
-from pydrake.systems.framework import Context, Diagram, DiagramBuilder
+from pydrake.systems.framework import Context, Diagram, DiagramBuilder, OutputPort
 from pydrake.systems.primitives import (
     ConstantVectorSource,
     DiscreteTimeDelay,
@@ -84,13 +84,12 @@ class SimulatedStation(Diagram):
         """
         super().__init__()
         builder = DiagramBuilder()
-        motion = None
+        self._motion = None
         if config.interface == "egm":
             # The controller plans the motion; its drives follow positions, whatever it is told.
             motion = EgmMotion(config.egm.motion, config.period, takes_position=drive != "velocity")
-            builder.AddNamedSystem("egm", motion)
+            self._motion = builder.AddNamedSystem("egm", motion)
             drive, takes_torque = "cascade", False
-        self._motion = motion
         self.plant = builder.AddNamedSystem("plant", MultibodyPlant(0.0))
         self.robot = add_robot(self.plant, robot, config.elasticity, config.payload, config.errors)
         self.plant.Finalize()
@@ -98,18 +97,34 @@ class SimulatedStation(Diagram):
             "drive", Drive(robot, drive, config.drive, config.period, config.payload)
         )
         motor_state = builder.AddNamedSystem("motor_state", motor_state_selector(self.robot))
-        sensor = builder.AddNamedSystem("joint_sensor", JointSensor(_RUNAWAY * float(robot.speed.max())))
-        tip = builder.AddNamedSystem("tip", TipPose(self.robot))
-        camera = builder.AddNamedSystem("camera", _camera(robot, config))
-        noise = camera.GetInputPort("noise")
-        self._noise = builder.AddNamedSystem(
-            "noise", RandomSource(RandomDistribution.kGaussian, noise.size(), BLOCK * config.camera.period)
-        )
+        builder.Connect(self.plant.get_state_output_port(), motor_state.get_input_port())
+        self._connect_drive(builder, motor_state.get_output_port())
+        self._connect_torque_feedforward(builder, config, takes_torque)
+        runaway = _RUNAWAY * float(robot.speed.max())
+        self._add_joint_sensor(builder, motor_state.get_output_port(), runaway)
+        self._noise = self._add_camera(builder, _camera(robot, config), motor_state.get_output_port(), config)
+        builder.ExportOutput(self.plant.get_state_output_port(), "truth.state")
+        builder.ExportOutput(self.drive.GetOutputPort("motor_torque"), "truth.motor_torque")
+        builder.BuildInto(self)
+        self.set_name("station")
 
-        state = self.plant.get_state_output_port()
-        torque = self.drive.GetOutputPort("motor_torque")
-        builder.Connect(state, motor_state.get_input_port())
-        builder.Connect(motor_state.get_output_port(), self.drive.GetInputPort("motor_state"))
+    def _connect_drive(self, builder: DiagramBuilder, motor_state: OutputPort) -> None:
+        """Commands to the drive, through the controller if there is one, and torques to the plant."""
+        for name in ("position_command", "velocity_command"):
+            if self._motion:
+                builder.Connect(self._motion.GetOutputPort(name), self.drive.GetInputPort(name))
+            builder.ExportInput((self._motion or self.drive).GetInputPort(name), name)
+        builder.Connect(motor_state, self.drive.GetInputPort("motor_state"))
+        builder.Connect(self.drive.GetOutputPort("joint_torque"), self.plant.get_actuation_input_port())
+        if self.robot.stiffening_gears is not None:
+            stiffening = builder.AddNamedSystem("stiffening_gears", stiffening_gears(self.robot))
+            builder.Connect(self.plant.get_state_output_port(), stiffening.get_input_port())
+            port = self.plant.get_applied_generalized_force_input_port()
+            builder.Connect(stiffening.get_output_port(), port)
+
+    def _connect_torque_feedforward(
+        self, builder: DiagramBuilder, config: StationConfig, takes_torque: bool
+    ) -> None:
         ahead = self.drive.GetInputPort("torque_feedforward")
         if takes_torque:
             # As late as the positions that it belongs to. The delay takes one period to read its input.
@@ -120,32 +135,35 @@ class SimulatedStation(Diagram):
         else:
             no_torque = builder.AddNamedSystem("no_feedforward", ConstantVectorSource(np.zeros(NUM_JOINTS)))
             builder.Connect(no_torque.get_output_port(), ahead)
-        builder.Connect(self.drive.GetOutputPort("joint_torque"), self.plant.get_actuation_input_port())
-        if self.robot.stiffening_gears is not None:
-            stiffening = builder.AddNamedSystem("stiffening_gears", stiffening_gears(self.robot))
-            builder.Connect(state, stiffening.get_input_port())
-            port = self.plant.get_applied_generalized_force_input_port()
-            builder.Connect(stiffening.get_output_port(), port)
-        builder.Connect(motor_state.get_output_port(), sensor.GetInputPort("motor_state"))
-        builder.Connect(torque, sensor.GetInputPort("motor_torque"))
-        builder.Connect(state, tip.GetInputPort("state"))
+
+    def _add_joint_sensor(self, builder: DiagramBuilder, motor_state: OutputPort, runaway: float) -> None:
+        sensor = builder.AddNamedSystem("joint_sensor", JointSensor(runaway))
+        builder.Connect(motor_state, sensor.GetInputPort("motor_state"))
+        builder.Connect(self.drive.GetOutputPort("motor_torque"), sensor.GetInputPort("motor_torque"))
+        builder.ExportOutput(sensor.GetOutputPort("joint_sample"), "joint_sample")
+
+    def _add_camera(
+        self,
+        builder: DiagramBuilder,
+        camera: PoseCamera | MarkerCamera,
+        motor_state: OutputPort,
+        config: StationConfig,
+    ) -> RandomSource:
+        """The camera, what it looks at, and the source of its noise, which is returned."""
+        builder.AddNamedSystem("camera", camera)
+        tip = builder.AddNamedSystem("tip", TipPose(self.robot))
+        builder.Connect(self.plant.get_state_output_port(), tip.GetInputPort("state"))
         builder.Connect(tip.GetOutputPort("X_WE"), camera.GetInputPort("X_WE"))
         if camera.HasInputPort("motor_state"):  # of the arm, which hides markers
-            builder.Connect(motor_state.get_output_port(), camera.GetInputPort("motor_state"))
-        builder.Connect(self._noise.get_output_port(), noise)
-
-        for name in ("position_command", "velocity_command"):
-            if motion:
-                builder.Connect(motion.GetOutputPort(name), self.drive.GetInputPort(name))
-            builder.ExportInput((motion or self.drive).GetInputPort(name), name)
-        builder.ExportOutput(sensor.GetOutputPort("joint_sample"), "joint_sample")
+            builder.Connect(motor_state, camera.GetInputPort("motor_state"))
+        port = camera.GetInputPort("noise")
+        noise = RandomSource(RandomDistribution.kGaussian, port.size(), BLOCK * config.camera.period)
+        builder.AddNamedSystem("noise", noise)
+        builder.Connect(noise.get_output_port(), port)
         builder.ExportOutput(camera.GetOutputPort("pose_sample"), "pose_sample")
         builder.ExportOutput(tip.GetOutputPort("X_WE"), "truth.X_WE")
-        builder.ExportOutput(state, "truth.state")
-        builder.ExportOutput(torque, "truth.motor_torque")
         builder.ExportOutput(camera.GetOutputPort("exposure"), "truth.exposure")
-        builder.BuildInto(self)
-        self.set_name("station")
+        return noise
 
     def set_at_rest(self, root_context: Context, theta: np.ndarray, seed: int) -> None:
         """Puts the motors at theta (rad, shape (6,)), everything at rest, and seeds the camera's noise."""
