@@ -32,7 +32,8 @@ class CellStatistics:
     cycles: int = 0
     late: int = 0  # messages of the robot that left more than a millisecond late
     worst_lateness: float = 0.0  # s
-    crowded: int = 0  # messages less than half a cycle after the one before, to catch up
+    # Stamps in s of the messages that left less than half a cycle after the one before, to catch up.
+    crowded_at: list[float] = field(default_factory=list)
     schedule_moves: int = 0  # times at which the machine was gone for so long that the schedule moved
     commands: int = 0  # datagrams that came in
     camera_frames: int = 0
@@ -132,7 +133,8 @@ class CellLoop:
             self._hear(now)
             self._hand_out(start, now)
             before, began = began, steady_time()
-            statistics.crowded += began - before < 0.5 * cell.period
+            if began - before < 0.5 * cell.period:
+                statistics.crowded_at.append(cell.stamp)
             lateness = began - start - now
             if lateness > _LOST_TRACK:
                 start += lateness
