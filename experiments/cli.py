@@ -1,9 +1,5 @@
 """The command line. What takes more than a page has a module of its own."""
 
-import math
-import shutil
-import sys
-import time
 from collections.abc import Mapping, Sequence
 from contextlib import ExitStack
 from importlib.metadata import PackageNotFoundError, version
@@ -32,11 +28,21 @@ from experiments.report.report import verdict
 from experiments.station.cell_command import cell_command
 from experiments.station.guided_command import ask_before_moving, guide, on_station
 from experiments.station.latency_command import latency_command
-from experiments.terminal.console import count, print_list, print_note, progress_bar, refusing
+from experiments.terminal.console import (
+    count,
+    print_list,
+    print_note,
+    progress_bar,
+    refusing,
+    wait_for_interrupt,
+)
+from experiments.terminal.json_output import human_console, json_output
+from experiments.terminal.option_limits import at_least, positive
 from experiments.terminal.options import (
     AnyScenarioOption,
     CameraOption,
     FeedforwardOption,
+    JobsOption,
     OutOption,
     RobotOption,
     ScenarioOption,
@@ -44,6 +50,7 @@ from experiments.terminal.options import (
     StationOption,
     WithCellOption,
     YesOption,
+    json_option,
 )
 from experiments.terminal.prepare import Prepared, check, prepare
 from experiments.terminal.staging import staged_file, staged_folder
@@ -102,8 +109,7 @@ def compare_command(
     yes: YesOption = False,
     out: OutOption = Path("out"),
     json_file: Annotated[
-        str | None,
-        typer.Option("--json", metavar="FILE", help="The summary once more; - prints it, and nothing else."),
+        str | None, json_option("The summary once more; - prints it, and nothing else.")
     ] = None,
     is_quick: Annotated[
         bool, typer.Option("--quick", help="One cycle, a faster path, less settling: a few seconds.")
@@ -111,16 +117,13 @@ def compare_command(
     cycles: Annotated[
         int, typer.Option(metavar="N", help="Runs of each law; those after the first serve repeatability.")
     ] = 3,
-    jobs: Annotated[
-        int | None, typer.Option(metavar="N", help="Processes at a time.", show_default="one per core")
-    ] = None,
+    jobs: JobsOption = None,
 ) -> None:
     """Run the open loop and the three laws on one scenario and compare them."""
-    human = Console(stderr=json_file == "-")
+    human = human_console(json_file)
     with refusing(ValueError, OSError):
-        if cycles < 1 or (jobs is not None and jobs < 1):
-            name, number = ("--cycles", cycles) if cycles < 1 else ("--jobs", jobs)
-            raise ValueError(f"{name} must be at least 1, got {number}")
+        at_least("--cycles", 1, cycles)
+        at_least("--jobs", 1, jobs)
         cycles = 1 if is_quick else cycles
         changes = _settings(settings, None, feedforward, camera)
         name, changes = on_station(scenario, changes, station, with_cell)
@@ -130,9 +133,9 @@ def compare_command(
         is_guided = prepared.scenario.station.kind == "egm"
         if is_guided:
             ask_before_moving(human, prepared, with_cell or yes)
-    with refusing(OSError), ExitStack() as stack:
+    with json_output(json_file) as output, refusing(OSError), ExitStack() as stack:
         stage = stack.enter_context(staged_folder(out))
-        copy = stack.enter_context(staged_file(json_file)) if json_file not in (None, "-") else None
+        stack.enter_context(output.staged())
         if is_guided:
             logs = guide(human, (stage, out), prepared, list(COMPARED_LAWS), cycles, with_cell)
         else:
@@ -143,11 +146,7 @@ def compare_command(
                     prepared.scenario, prepared.robot, list(COMPARED_LAWS), cycles, processes, progress
                 )
         result = _write(human, stage, prepared, logs)
-        if copy:
-            shutil.copyfile(stage / "summary.json", copy)
-        text = (stage / "summary.json").read_text(encoding="utf-8")
-    if json_file == "-":
-        sys.stdout.write(text)
+        output.write(result)
     _conclude(human, result, out)
 
 
@@ -172,8 +171,7 @@ def run_command(
     """Run one law."""
     console = Console()
     with refusing(ValueError, OSError):
-        if realtime is not None and not 0.0 < realtime < math.inf:
-            raise ValueError(f"--realtime must be positive, got {realtime:g}")
+        positive("--realtime", realtime)
         changes = _settings(settings, law, feedforward, camera)
         name, changes = on_station(scenario, changes, station, with_cell)
         prepared = prepare(name, changes, robot)
@@ -205,8 +203,8 @@ def run_command(
                 experiment.advance(progress=progress)
         result = _write(console, stage, prepared, {law: [experiment.log()]})
     _conclude(console, result, out)
-    if view and sys.stdin.isatty() and sys.stdout.isatty():
-        _wait(console, view)
+    if view:
+        wait_for_interrupt(console, f"Still at {view.address}; Ctrl-C ends it")
 
 
 @app.command("diagram")
@@ -276,15 +274,6 @@ def _conclude(console: Console, result: Mapping[str, Any], out: Path) -> None:
     console.print()
     for name, purpose in RESULTS.items():
         console.print(f"{escape(str(out / name))}  [dim]{purpose}[/dim]", soft_wrap=True)
-
-
-def _wait(console: Console, view: LiveView) -> None:
-    console.print(f"Still at {view.address}; Ctrl-C ends it")
-    try:
-        while True:
-            time.sleep(1.0)
-    except KeyboardInterrupt:
-        console.print()
 
 
 if __name__ == "__main__":

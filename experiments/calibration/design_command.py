@@ -8,14 +8,14 @@ from pathlib import Path
 from typing import Annotated
 
 import typer
-from rich.console import Console
 from rich.markup import escape
 
-from experiments.comparison.metrics import json_text, write_json
 from experiments.report.files import write_text
 from experiments.report.plot_page import Section, write_plot_page
 from experiments.report.robot_plot import joints_figure, tips_figure
-from experiments.terminal.console import progress_bar, refusing
+from experiments.terminal.console import print_files, progress_bar, refusing
+from experiments.terminal.json_output import human_console, json_output
+from experiments.terminal.options import JsonOption, PictureOption
 from experiments.terminal.staging import staged_file
 from robots.calibration.admissible import AdmissibleConfig, AdmissibleConfigurations, View
 from robots.calibration.criteria import NAMES
@@ -52,18 +52,15 @@ def design_command(
     out: Annotated[
         str | None, typer.Option(metavar="FILE.csv", help="The configurations, in the order of the visits.")
     ] = None,
-    report: Annotated[Path, typer.Option(metavar="FILE.html", help="The picture.")] = Path("out/design.html"),
-    json_file: Annotated[
-        str | None,
-        typer.Option("--json", metavar="FILE", help="The numbers; - prints them, and nothing else."),
-    ] = None,
+    report: PictureOption = Path("out/design.html"),
+    json_file: JsonOption = None,
 ) -> None:
     """Choose the configurations at which measurements say most about the robot's errors."""
-    human = Console(stderr=json_file == "-")
-    with refusing(ValueError, OSError), ExitStack() as stack:
+    human = human_console(json_file)
+    with json_output(json_file) as output, refusing(ValueError, OSError), ExitStack() as stack:
         page = stack.enter_context(staged_file(report))
         table = stack.enter_context(staged_file(out)) if out else None
-        copy = stack.enter_context(staged_file(json_file)) if json_file not in (None, "-") else None
+        stack.enter_context(output.staged())
         model = load_robot(robot)
         before, started = _peak_mb(), time.perf_counter()
         view = None if camera is None else View(_place(camera))
@@ -84,15 +81,11 @@ def design_command(
         }
         if table:
             write_text(table, configuration_text(design))
-        if copy:
-            write_json(copy, result)
+        output.write(result)
         write_design_page(page, model, design)
-    if json_file == "-":
-        sys.stdout.write(json_text(result))
     human.print(escape(design_verdict(design)))
     human.print(f"{seconds:.1f} s, {result['peak_mb']:.0f} MB beside the program itself")
-    for path in filter(None, (str(report), out)):
-        human.print(escape(path), soft_wrap=True)
+    print_files(human, report, out)
 
 
 def _place(text: str) -> tuple[float, float, float]:

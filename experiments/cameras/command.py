@@ -1,6 +1,5 @@
 """``truetip cameras``: calibrate the cameras of a cell, and study what limits accuracy."""
 
-import sys
 import time
 from contextlib import ExitStack
 from dataclasses import replace
@@ -9,8 +8,6 @@ from typing import Annotated
 
 import numpy as np
 import typer
-from rich.console import Console
-from rich.markup import escape
 
 from experiments.cameras.calibration import (
     CamerasFound,
@@ -22,10 +19,11 @@ from experiments.cameras.laws import study_laws
 from experiments.cameras.report import print_study, write_study_page
 from experiments.cameras.study import CamerasStudy, covariances, study_json, study_setup
 from experiments.cameras.sweeps import study_sweeps
-from experiments.comparison.metrics import json_text
 from experiments.report.files import write_text
-from experiments.terminal.console import progress_bar, refusing
-from experiments.terminal.options import ScenarioOption, SetOption
+from experiments.terminal.console import print_files, progress_bar, refusing
+from experiments.terminal.json_output import human_console, json_output
+from experiments.terminal.option_limits import at_least, positive
+from experiments.terminal.options import JobsOption, JsonOption, ScenarioOption, SetOption
 from experiments.terminal.prepare import prepare
 from experiments.terminal.staging import staged_file
 from systems.tracking.calibration.observation_file import observation_text, read_observations
@@ -44,10 +42,6 @@ cameras_app = typer.Typer(
 
 CellOption = Annotated[
     str, typer.Option("--cell", metavar="NAME|FILE", help="A shipped measuring cell or a YAML file.")
-]
-JsonOption = Annotated[
-    str | None,
-    typer.Option("--json", metavar="FILE", help="The numbers; - prints them, and nothing else."),
 ]
 
 
@@ -81,18 +75,17 @@ def calibrate_cameras_command(
     json_file: JsonOption = None,
 ) -> None:
     """Find where the cameras stand and how their lenses bend, from a wand and an L-frame."""
-    human = Console(stderr=json_file == "-")
-    with refusing(ValueError, OSError), ExitStack() as stack:
-        _positive("--wand-length", wand_length)
-        _positive("--pixel-sigma", pixel_sigma)
+    human = human_console(json_file)
+    with json_output(json_file) as output, refusing(ValueError, OSError), ExitStack() as stack:
+        positive("--wand-length", wand_length)
+        positive("--pixel-sigma", pixel_sigma)
         nominal, kit = load_cell(cell), CalibrationKit(wand_length_mm=wand_length)
         names = [camera.name for camera in nominal.cameras]
         page = stack.enter_context(staged_file(out))
-        files = {
-            name: stack.enter_context(staged_file(name))
-            for name in (observations, write, json_file)
-            if name and name != "-"
-        }
+        seen_file, cell_file = (
+            stack.enter_context(staged_file(name)) if name else None for name in (observations, write)
+        )
+        stack.enter_context(output.staged())
         # The camera system's own frame is that of the L-frame.
         start, truth = nominal.camera_model(nominal.base.pose()), None
         if images == SIMULATED:
@@ -106,31 +99,20 @@ def calibrate_cameras_command(
         found = CamerasFound(calibration, names, kit, time.perf_counter() - started, truth)
         title = f"{nominal.name}, {'simulated' if truth else Path(images).name}"
         write_calibration_page(page, title, found)
-        if write:
+        if cell_file:
             source = f"truetip cameras calibrate, {len(calibration.wand_lengths)} places of the wand"
-            write_text(files[write], cell_text(with_cameras(nominal, calibration.cameras, source)))
-        if observations:
-            write_text(files[observations], observation_text(run, names))
-        result = calibration_json(found)
-        if json_file and json_file != "-":
-            write_text(files[json_file], json_text(result))
-    if json_file == "-":
-        sys.stdout.write(json_text(result))
+            write_text(cell_file, cell_text(with_cameras(nominal, calibration.cameras, source)))
+        if seen_file:
+            write_text(seen_file, observation_text(run, names))
+        output.write(calibration_json(found))
     print_calibration(human, found)
-    for name in (str(out), write, observations):
-        if name:
-            human.print(escape(name), soft_wrap=True)
+    print_files(human, out, write, observations)
 
 
 def _simulated(
     cell: MeasuringCell, kit: CalibrationKit, truth: Cameras, run: SimulatedWandRun, seed: int
 ) -> WandRun:
     return simulate_wand_run(truth, cell.sensor_px, kit, run, np.random.default_rng(seed))[0]
-
-
-def _positive(name: str, value: float) -> None:
-    if not 0.0 < value < np.inf:
-        raise ValueError(f"{name} must be positive, got {value:g}")
 
 
 @cameras_app.command("study")
@@ -143,20 +125,17 @@ def study_cameras_command(
     without_laws: Annotated[
         bool, typer.Option("--without-laws", help="Geometry and images only; a few seconds.")
     ] = False,
-    jobs: Annotated[
-        int | None, typer.Option(metavar="N", help="Processes at a time.", show_default="one per core")
-    ] = None,
+    jobs: JobsOption = None,
     out: Annotated[Path, typer.Option(metavar="FILE.html", help="The report.")] = Path("out/study.html"),
     json_file: JsonOption = None,
 ) -> None:
     """Find out what limits the accuracy of a pose: cameras, light, markers; and what the laws make of it."""
-    human = Console(stderr=json_file == "-")
-    with refusing(ValueError, OSError), ExitStack() as stack:
-        if jobs is not None and jobs < 1:
-            raise ValueError(f"--jobs must be at least 1, got {jobs}")
+    human = human_console(json_file)
+    with json_output(json_file) as output, refusing(ValueError, OSError), ExitStack() as stack:
+        at_least("--jobs", 1, jobs)
         prepared = prepare(scenario, settings or [])
         page = stack.enter_context(staged_file(out))
-        copy = stack.enter_context(staged_file(json_file)) if json_file not in (None, "-") else None
+        stack.enter_context(output.staged())
         setup = study_setup(prepared)
         covariance_on_path, covariance_in_workspace = covariances(setup)
         with progress_bar("Geometry and images") as progress:
@@ -167,10 +146,6 @@ def study_cameras_command(
                 laws = study_laws(scenario, settings or [], is_quick, jobs, progress)
         study = CamerasStudy(setup, covariance_on_path, covariance_in_workspace, sweeps, laws)
         write_study_page(page, prepared.title, study)
-        result = study_json(study)
-        if copy:
-            write_text(copy, json_text(result))
-    if json_file == "-":
-        sys.stdout.write(json_text(result))
+        output.write(study_json(study))
     print_study(human, study)
-    human.print(escape(str(out)), soft_wrap=True)
+    print_files(human, out)

@@ -1,16 +1,12 @@
 """``truetip drivetrain``: pictures of the models that drive trains are made of."""
 
-import sys
 from contextlib import ExitStack
 from pathlib import Path
 from typing import Annotated
 
 import numpy as np
 import typer
-from rich.console import Console
-from rich.markup import escape
 
-from experiments.comparison.metrics import json_text
 from experiments.drivetrain.figures import (
     PLAY_APPROXIMATIONS,
     THRESHOLDS,
@@ -21,9 +17,10 @@ from experiments.drivetrain.figures import (
     hysteresis_figure,
     hysteresis_signal,
 )
-from experiments.report.files import write_text
 from experiments.report.plot_page import Section, html_table, write_plot_page
-from experiments.terminal.console import refusing
+from experiments.terminal.console import print_files, refusing
+from experiments.terminal.json_output import human_console, json_output
+from experiments.terminal.options import JsonOption
 from experiments.terminal.staging import staged_file
 from robots.drivetrain.hysteresis import PrandtlIshlinskii
 from robots.drivetrain.parts import PARTS
@@ -33,13 +30,10 @@ def drivetrain_command(
     out: Annotated[Path, typer.Option(metavar="FILE.html", help="The pictures.")] = Path(
         "out/drivetrain.html"
     ),
-    json_file: Annotated[
-        str | None,
-        typer.Option("--json", metavar="FILE", help="The numbers; - prints them, and nothing else."),
-    ] = None,
+    json_file: JsonOption = None,
 ) -> None:
     """Draw friction, efficiency, play and hysteresis as in Reiner (2010), figures 2.3 to 2.6."""
-    human = Console(stderr=json_file == "-")
+    human = human_console(json_file)
     x, _ = hysteresis_signal()
     operator = PrandtlIshlinskii(WEIGHTS, THRESHOLDS)
     inverse, starts = operator.inverse()
@@ -59,9 +53,9 @@ def drivetrain_command(
         *([name, f"T = {T} s, psi = {psi}, n = {n}"] for name, (T, psi, n) in PLAY_APPROXIMATIONS.items()),
         ["hysteresis and its exact inverse", f"w = {WEIGHTS}, r = {THRESHOLDS}"],
     ]
-    with refusing(OSError), ExitStack() as stack:
+    with json_output(json_file) as output, refusing(OSError), ExitStack() as stack:
         page = stack.enter_context(staged_file(out))
-        copy = stack.enter_context(staged_file(json_file)) if json_file not in (None, "-") else None
+        stack.enter_context(output.staged())
         sections = [
             Section(
                 "Friction",
@@ -101,8 +95,5 @@ def drivetrain_command(
         ]
         verdict = f"The inverse operator compensates the hysteresis to {residual:.1e}."
         write_plot_page(page, "Drive trains", verdict, sections)
-        if copy:
-            write_text(copy, json_text(result))
-    if json_file == "-":
-        sys.stdout.write(json_text(result))
-    human.print(escape(str(out)), soft_wrap=True)
+        output.write(result)
+    print_files(human, out)

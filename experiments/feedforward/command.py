@@ -1,17 +1,14 @@
 """``truetip feedforward``: three inverse models on one elastic robot, compared."""
 
-import sys
 from contextlib import ExitStack
 from pathlib import Path
 from typing import Annotated
 
 import typer
 from rich import box
-from rich.console import Console
 from rich.markup import escape
 from rich.table import Table
 
-from experiments.comparison.metrics import json_text, write_json
 from experiments.feedforward.plots import TABLE_HEAD, study_verdict, table_rows, write_study_page
 from experiments.feedforward.study import (
     ANGLES_DEG,
@@ -20,7 +17,16 @@ from experiments.feedforward.study import (
     study_feedforward,
     study_json,
 )
-from experiments.terminal.console import count, progress_bar, refusing
+from experiments.terminal.console import count, print_files, progress_bar, refusing
+from experiments.terminal.json_output import human_console, json_output
+from experiments.terminal.option_limits import at_least
+from experiments.terminal.options import (
+    GridOption,
+    JobsOption,
+    JsonOption,
+    PayloadOption,
+    StudiedRobotOption,
+)
 from experiments.terminal.staging import staged_file
 from experiments.terminal.workers import usable_cores
 from robots.model import load_robot
@@ -30,36 +36,25 @@ PAGE = "feedforward.html"
 
 
 def feedforward_command(
-    robot: Annotated[
-        str, typer.Option("--robot", metavar="NAME|FILE", help="A shipped robot or a YAML file.")
-    ] = "kr16",
-    payload: Annotated[
-        float | None,
-        typer.Option(metavar="KG", help="Mass at the flange.", show_default="the largest it may carry"),
-    ] = None,
-    grid: Annotated[int, typer.Option(metavar="N", help="Positions of axis 2, and of axis 3.")] = 7,
+    robot: StudiedRobotOption = "kr16",
+    payload: PayloadOption = None,
+    grid: GridOption = 7,
     stiffness_error: Annotated[
         float,
         typer.Option(metavar="SHARE", help="By which the models' springs and dampers are too stiff."),
     ] = 0.0,
     out: Annotated[Path, typer.Option("--out", metavar="DIR", help="Where the pictures go.")] = Path("out"),
-    json_file: Annotated[
-        str | None,
-        typer.Option("--json", metavar="FILE", help="The numbers; - prints them, and nothing else."),
-    ] = None,
-    jobs: Annotated[
-        int | None, typer.Option(metavar="N", help="Processes at a time.", show_default="one per core")
-    ] = None,
+    json_file: JsonOption = None,
+    jobs: JobsOption = None,
 ) -> None:
     """Compare inverse models: a rectangle in space, and how the wrist rings after short motions."""
-    human = Console(stderr=json_file == "-")
-    with refusing(ValueError, OSError), ExitStack() as stack:
-        if jobs is not None and jobs < 1:
-            raise ValueError(f"--jobs must be at least 1, got {jobs}")
+    human = human_console(json_file)
+    with json_output(json_file) as output, refusing(ValueError, OSError), ExitStack() as stack:
+        at_least("--jobs", 1, jobs)
         model = load_robot(robot)
         mass = model.payload.largest_mass if payload is None else payload
         page = stack.enter_context(staged_file(out / PAGE))
-        copy = stack.enter_context(staged_file(json_file)) if json_file not in (None, "-") else None
+        stack.enter_context(output.staged())
         runs = len(KINDS) * (1 + len(ANGLES_DEG) * grid * grid)
         processes = min(jobs or usable_cores(), max(runs, 1))
         label = f"{count(runs, 'run')} in {count(processes, 'process', 'processes')}"
@@ -67,13 +62,10 @@ def feedforward_command(
             config = FeedforwardConfig(stiffness_error=stiffness_error)
             study = study_feedforward(model, mass, config, grid, processes, progress)
         write_study_page(page, study)
-        if copy:
-            write_json(copy, study_json(study))
-    if json_file == "-":
-        sys.stdout.write(json_text(study_json(study)))
+        output.write(study_json(study))
     human.print(_table(study))
     human.print(escape(study_verdict(study)))
-    human.print(escape(str(out / PAGE)), soft_wrap=True)
+    print_files(human, out / PAGE)
 
 
 def _table(study: FeedforwardStudy) -> Table:

@@ -8,10 +8,11 @@ from typing import Annotated, Any
 import numpy as np
 import typer
 from pydrake.math import RigidTransform
-from rich.console import Console
 
 from experiments.frames.tables import MM, pose_json, print_facts, print_pose, print_residuals, write_result
 from experiments.terminal.console import refusing
+from experiments.terminal.json_output import human_console
+from experiments.terminal.options import json_option
 from robots.calibration.frame_chain import FrameChain, chain_of_frames
 from robots.calibration.frame_files import ORIENTATIONS, points_of, poses_of, transform_of
 from robots.calibration.frames import three_point_frame
@@ -42,10 +43,7 @@ OrientationOption = Annotated[
         + ". Twelve columns are the upper rows of a homogeneous matrix.",
     ),
 ]
-JsonOption = Annotated[
-    str | None,
-    typer.Option("--json", metavar="FILE", help="The result once more; - prints it, and nothing else."),
-]
+JsonOption = Annotated[str | None, json_option("The result once more; - prints it, and nothing else.")]
 
 
 def frame_command(files: FilesArgument, unit: UnitOption = "mm", json_file: JsonOption = None) -> None:
@@ -55,7 +53,7 @@ def frame_command(files: FilesArgument, unit: UnitOption = "mm", json_file: Json
     on the side of positive z. Six: nominal, then measured coordinates, for three or more points; a seventh
     number is the standard deviation of the point.
     """
-    console = Console(stderr=json_file == "-")
+    console = human_console(json_file)
     poses: list[RigidTransform] = []
     frames: list[dict[str, Any]] = []
     with refusing(ValueError, OSError):
@@ -120,7 +118,7 @@ def chain_command(
     wanted, more; the second frame of a position is the first of the next one. Or one file a transformation,
     with the four lines of its homogeneous matrix.
     """
-    console = Console(stderr=json_file == "-")
+    console = human_console(json_file)
     with refusing(ValueError, OSError):
         tables = [read_table(path) for path in files]
         with _blaming(tables):
@@ -153,7 +151,7 @@ def tool_command(
     json_file: JsonOption = None,
 ) -> None:
     """The tool centre point by pivoting: the tip stays on one spot, every line is a pose of the flange."""
-    console = Console(stderr=json_file == "-")
+    console = human_console(json_file)
     with refusing(ValueError, OSError):
         table = read_table(file)
         X_BF = poses_of(table, unit, angles, orientation)
@@ -209,7 +207,7 @@ def align_command(
     A pair is the pose of the flange in the base and, at the same time, that of the body in the camera: both
     in one line of one file, or in corresponding lines of two files.
     """
-    console = Console(stderr=json_file == "-")
+    console = human_console(json_file)
     sigmas = np.deg2rad(rotation_sigma_deg), translation_sigma_mm / MM
     with refusing(ValueError, OSError):
         flange, body = _two_halves([read_table(path) for path in files])

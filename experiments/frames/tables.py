@@ -1,7 +1,6 @@
 """Frames, tools and alignments as people read them: in mm and degrees, on a terminal and as JSON."""
 
 import math
-import sys
 from collections.abc import Mapping
 from typing import Any
 
@@ -12,8 +11,7 @@ from rich.console import Console
 from rich.markup import escape
 from rich.table import Table
 
-from experiments.comparison.metrics import json_text
-from experiments.terminal.staging import staged_file
+from experiments.terminal.json_output import json_output
 from robots.pose import zyx_from_rotation
 
 MM = 1e3  # mm in a m
@@ -83,20 +81,14 @@ def _text(value: Any) -> str:
     return str(value) if isinstance(value, int) else f"{value:z.4f}"
 
 
-def write_result(result: Mapping[str, Any], file: str | None) -> None:
+def write_result(result: Mapping[str, Any], json_file: str | None) -> None:
     """Writes a result to a file, to stdout for ``-``, or nowhere; numbers that do not exist are null.
 
     Raises:
         OSError: if the file cannot be written.
     """
-    if file is None:
-        return
-    text = json_text(_plain(result))
-    if file == "-":
-        sys.stdout.write(text)
-        return
-    with staged_file(file) as path:
-        path.write_text(text, encoding="utf-8")
+    with json_output(json_file) as output, output.staged():
+        output.write(_plain(result))
 
 
 def _plain(part: Any) -> Any:

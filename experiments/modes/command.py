@@ -1,7 +1,5 @@
 """``truetip modes``: natural frequencies of an elastic robot over its workspace, as numbers and pictures."""
 
-import sys
-import time
 from collections.abc import Sequence
 from contextlib import ExitStack
 from pathlib import Path
@@ -10,15 +8,21 @@ from typing import Annotated
 import numpy as np
 import typer
 from rich import box
-from rich.console import Console
 from rich.markup import escape
 from rich.table import Table
 
-from experiments.comparison.metrics import json_text, write_json
 from experiments.modes.study import SHOWN_MODES, ModalStudy, modes_json, spread, study_modes
 from experiments.modes.view import frequency_figure, show_mode, write_animation
 from experiments.report.plot_page import Section, html_table, write_plot_page
-from experiments.terminal.console import progress_bar, refusing
+from experiments.terminal.console import print_files, progress_bar, refusing, wait_for_interrupt
+from experiments.terminal.json_output import human_console, json_output
+from experiments.terminal.options import (
+    GridOption,
+    JsonOption,
+    PayloadOption,
+    PictureOption,
+    StudiedRobotOption,
+)
 from experiments.terminal.staging import staged_file
 from robots.model import load_robot
 
@@ -27,37 +31,29 @@ WORKSPACE_HEAD = ("mode", "Hz", "median", "damp. %", "tip", "yielding joints")
 
 
 def modes_command(
-    robot: Annotated[
-        str, typer.Option("--robot", metavar="NAME|FILE", help="A shipped robot or a YAML file.")
-    ] = "kr210",
-    payload: Annotated[
-        float | None,
-        typer.Option(metavar="KG", help="Mass at the flange.", show_default="the largest it may carry"),
-    ] = None,
+    robot: StudiedRobotOption = "kr210",
+    payload: PayloadOption = None,
     elasticity: Annotated[
         str, typer.Option(metavar="NAME", help="structure, or joints for elastic gears alone.")
     ] = "structure",
-    grid: Annotated[int, typer.Option(metavar="N", help="Positions of axis 2, and of axis 3.")] = 25,
+    grid: GridOption = 25,
     mode: Annotated[int, typer.Option(metavar="N", help="The mode that is animated, from 1.")] = 1,
-    out: Annotated[Path, typer.Option(metavar="FILE.html", help="The picture.")] = Path("out/modes.html"),
+    out: PictureOption = Path("out/modes.html"),
     animation: Annotated[
         Path, typer.Option(metavar="FILE.html", help="The mode in motion, stretched.")
     ] = Path("out/modes-animation.html"),
-    json_file: Annotated[
-        str | None,
-        typer.Option("--json", metavar="FILE", help="The numbers; - prints them, and nothing else."),
-    ] = None,
+    json_file: JsonOption = None,
     meshcat: Annotated[bool, typer.Option("--meshcat", help="Show the motion live in a browser.")] = False,
 ) -> None:
     """Find out how fast a robot swings with its motors held, and which joints yield."""
-    human = Console(stderr=json_file == "-")
-    with refusing(ValueError, OSError), ExitStack() as stack:
+    human = human_console(json_file)
+    with json_output(json_file) as output, refusing(ValueError, OSError), ExitStack() as stack:
         model = load_robot(robot)
         mass = model.payload.largest_mass if payload is None else payload
         if not 1 <= mode <= SHOWN_MODES:
             raise ValueError(f"--mode must be between 1 and {SHOWN_MODES}, got {mode}")
         page, motion = (stack.enter_context(staged_file(path)) for path in (out, animation))
-        copy = stack.enter_context(staged_file(json_file)) if json_file not in (None, "-") else None
+        stack.enter_context(output.staged())
         with progress_bar(f"{grid * grid} positions") as progress:
             study = study_modes(model, elasticity, mass, grid, progress)
         # Without --meshcat nothing connects to the server, so any port will do.
@@ -65,21 +61,16 @@ def modes_command(
         title = f"mode {mode} of {model.name}, {study.stretched.frequency_hz[mode - 1]:.2f} Hz"
         write_animation(motion, server, title)
         write_modes_page(page, study)
-        if copy:
-            write_json(copy, modes_json(study))
-    if json_file == "-":
-        sys.stdout.write(json_text(modes_json(study)))
+        output.write(modes_json(study))
     title = f"{model.name}, {mass:g} kg, motors held, stretched"
     human.print(_table(title, STRETCHED_HEAD, stretched_rows(study, joints=3)))
     title = f"over {grid} x {grid} positions of axes 2 and 3"
     human.print(_table(title, WORKSPACE_HEAD, workspace_rows(study, joints=2)))
     human.print(escape(modes_verdict(study)))
-    for path in (out, animation):
-        human.print(escape(str(path)), soft_wrap=True)
+    print_files(human, out, animation)
     if meshcat:
         human.print(f"Mode {mode} swings at {server.web_url()}")
-        if sys.stdin.isatty() and sys.stdout.isatty():
-            _wait(human)
+        wait_for_interrupt(human, "Ctrl-C ends it")
 
 
 def stretched_rows(study: ModalStudy, joints: int) -> list[list[str]]:
@@ -171,12 +162,3 @@ def write_modes_page(path: Path, study: ModalStudy) -> None:
     ]
     title = f"Modes, {study.robot.name}, {study.payload:g} kg"
     write_plot_page(path, title, modes_verdict(study), sections)
-
-
-def _wait(console: Console) -> None:
-    console.print("Ctrl-C ends it")
-    try:
-        while True:
-            time.sleep(1.0)
-    except KeyboardInterrupt:
-        console.print()

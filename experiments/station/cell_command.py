@@ -13,10 +13,9 @@ from rich.console import Console
 
 from diagrams.cell_loop import CellLoop, CellStatistics
 from diagrams.scenario import Scenario
-from experiments.comparison.metrics import json_text
-from experiments.report.files import write_text
+from experiments.comparison.metrics import write_json
 from experiments.terminal.console import count, refusing
-from experiments.terminal.options import RobotOption, SetOption
+from experiments.terminal.options import RobotOption, ScenarioOption, SetOption, json_option
 from experiments.terminal.prepare import prepare
 from experiments.terminal.staging import staged_file
 from systems.faulty_link import FaultConfig
@@ -24,9 +23,7 @@ from systems.mocap.server import CameraServerConfig, VirtualCameraServer
 
 
 def cell_command(
-    scenario: Annotated[
-        str, typer.Option(metavar="NAME|FILE", help="A shipped scenario or a YAML file.")
-    ] = "cell",
+    scenario: ScenarioOption = "cell",
     settings: SetOption = None,
     robot: RobotOption = None,
     faults: Annotated[
@@ -43,9 +40,7 @@ def cell_command(
         str | None,
         typer.Option(metavar="FILE.npz", help="The true motion by the controller's time stamps."),
     ] = None,
-    json_file: Annotated[
-        str | None, typer.Option("--json", metavar="FILE", help="How it ran, at the end.")
-    ] = None,
+    json_file: Annotated[str | None, json_option("How it ran, at the end.")] = None,
     announce: Annotated[
         bool, typer.Option("--announce", help="First print one line of JSON with the ports, for a program.")
     ] = False,
@@ -84,7 +79,7 @@ def cell_command(
         if files[0]:
             loop.cell.record().save(files[0])
         if files[1]:
-            write_text(files[1], json_text(statistics.as_dict()))
+            write_json(files[1], statistics.as_dict())
     print_statistics(human, statistics)
 
 

@@ -1,6 +1,5 @@
 """``truetip latency``: how late a station is, and where."""
 
-import sys
 from contextlib import ExitStack
 from pathlib import Path
 from typing import Annotated
@@ -9,67 +8,61 @@ import numpy as np
 import plotly.graph_objects as go
 import typer
 from rich import box
-from rich.console import Console
-from rich.markup import escape
 from rich.table import Table
 
 from diagrams.latency_run import LatencyConfig, LatencyRecord, measure_latency
 from diagrams.scenario import Scenario
-from experiments.comparison.metrics import json_text
 from experiments.report.files import write_text
 from experiments.report.plot_page import Section, write_plot_page
 from experiments.station.clients import station_clients
 from experiments.station.guided_command import ask_before_moving, on_station
 from experiments.station.latency import Latency, evaluate
-from experiments.terminal.console import progress_bar, refusing
-from experiments.terminal.options import SetOption, WithCellOption, YesOption
+from experiments.terminal.console import print_files, progress_bar, refusing
+from experiments.terminal.json_output import human_console, json_output
+from experiments.terminal.options import (
+    JsonOption,
+    PictureOption,
+    ScenarioOption,
+    SetOption,
+    WithCellOption,
+    YesOption,
+)
 from experiments.terminal.prepare import Prepared, prepare
 from experiments.terminal.staging import staged_file
 
 
 def latency_command(
-    scenario: Annotated[
-        str, typer.Option(metavar="NAME|FILE", help="A shipped scenario or a YAML file.")
-    ] = "cell",
+    scenario: ScenarioOption = "cell",
     settings: SetOption = None,
     with_cell: WithCellOption = False,
     yes: YesOption = False,
     joint: Annotated[int, typer.Option(metavar="N", help="The joint that is moved.")] = 1,
     amplitude: Annotated[float, typer.Option(metavar="DEG", help="By how much, to each side.")] = 4.0,
     duration: Annotated[float, typer.Option(metavar="S", help="For how long.")] = 20.0,
-    report: Annotated[Path, typer.Option(metavar="FILE.html", help="The picture.")] = Path(
-        "out/latency.html"
-    ),
+    report: PictureOption = Path("out/latency.html"),
     write: Annotated[
         str | None,
         typer.Option(metavar="FILE.yaml", help="A scenario with the delays that were found."),
     ] = None,
-    json_file: Annotated[
-        str | None,
-        typer.Option("--json", metavar="FILE", help="The numbers; - prints them, and nothing else."),
-    ] = None,
+    json_file: JsonOption = None,
 ) -> None:
     """Measure the delays and clocks of a real station by moving one joint back and forth."""
-    human = Console(stderr=json_file == "-")
-    with refusing(ValueError, OSError), ExitStack() as stack:
+    human = human_console(json_file)
+    with json_output(json_file) as output, refusing(ValueError, OSError), ExitStack() as stack:
         name, changes = on_station(scenario, list(settings or []), "egm", with_cell)
         prepared = prepare(name, changes)
         ask_before_moving(human, prepared, with_cell or yes)
         page = stack.enter_context(staged_file(report))
         written = stack.enter_context(staged_file(write)) if write else None
-        copy = stack.enter_context(staged_file(json_file)) if json_file not in (None, "-") else None
+        stack.enter_context(output.staged())
         record = _measured(prepared, LatencyConfig(joint, amplitude, duration), with_cell)
         found = evaluate(record)
         write_latency_page(page, found, record)
         if written:
             write_text(written, scenario_with(scenario, found))
-        if copy:
-            write_text(copy, json_text(found.as_dict()))
-    if json_file == "-":
-        sys.stdout.write(json_text(found.as_dict()))
+        output.write(found.as_dict())
     human.print(latency_table(found))
-    for path in filter(None, (str(report), write)):
-        human.print(escape(path), soft_wrap=True)
+    print_files(human, report, write)
 
 
 def _measured(prepared: Prepared, config: LatencyConfig, with_cell: bool) -> LatencyRecord:

@@ -1,7 +1,10 @@
 """What all commands share: refusals in one line, progress bars, lists."""
 
+import sys
+import time
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
+from pathlib import Path
 
 import typer
 from rich import box
@@ -48,6 +51,24 @@ def print_note(console: Console, note: str) -> None:
     """What a person should know before they wait for it, if there is anything."""
     if note:
         console.print(f"Note: {note}", style="yellow", highlight=False)
+
+
+def wait_for_interrupt(console: Console, message: str) -> None:
+    """Says what goes on and lets it until Ctrl-C; on no terminal, where nobody presses it, ends at once."""
+    if not (sys.stdin.isatty() and sys.stdout.isatty()):
+        return
+    console.print(message)
+    try:
+        while True:
+            time.sleep(1.0)
+    except KeyboardInterrupt:
+        console.print()
+
+
+def print_files(console: Console, *files: str | Path | None) -> None:
+    """Where the results are, a line each; None for a file that was not asked for."""
+    for file in filter(None, files):
+        console.print(escape(str(file)), soft_wrap=True)
 
 
 def print_list(rows: Iterable[tuple[str, str]]) -> None:

@@ -1,7 +1,7 @@
 """Options that several commands have."""
 
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 
@@ -43,6 +43,17 @@ RobotOption = Annotated[
         help="A robot in place of the scenario's, or a calibrated one for the controller.",
     ),
 ]
+# Of a study that takes a robot and no scenario.
+StudiedRobotOption = Annotated[
+    str, typer.Option("--robot", metavar="NAME|FILE", help="A shipped robot or a YAML file.")
+]
+PayloadOption = Annotated[
+    float | None,
+    typer.Option(
+        "--payload", metavar="KG", help="Mass at the flange.", show_default="the largest it may carry"
+    ),
+]
+GridOption = Annotated[int, typer.Option("--grid", metavar="N", help="Positions of axis 2, and of axis 3.")]
 FeedforwardOption = Annotated[
     str | None,
     typer.Option(
@@ -61,4 +72,17 @@ CameraOption = Annotated[
         show_default="the scenario's",
     ),
 ]
+JobsOption = Annotated[
+    int | None,
+    typer.Option("--jobs", metavar="N", help="Processes at a time.", show_default="one per core"),
+]
 OutOption = Annotated[Path, typer.Option("--out", metavar="DIR", help="Where the results go.")]
+PictureOption = Annotated[Path, typer.Option(metavar="FILE.html", help="The picture.")]  # --out or --report
+
+
+def json_option(text: str) -> Any:
+    """``--json`` with a help text of its own; what it does is in `json_output`."""
+    return typer.Option("--json", metavar="FILE", help=text)
+
+
+JsonOption = Annotated[str | None, json_option("The numbers; - prints them, and nothing else.")]
