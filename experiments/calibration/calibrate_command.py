@@ -1,15 +1,12 @@
 """``truetip calibrate``: measure, identify, validate, and write the robot as it is."""
 
-import sys
 import time
 from contextlib import ExitStack
-from dataclasses import replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Annotated, Any
 
 import typer
-from rich.console import Console
-from rich.markup import escape
 
 from diagrams.log import RunLog
 from diagrams.scenario import Scenario
@@ -26,18 +23,19 @@ from experiments.calibration.calibrate import (
     validation_configurations,
 )
 from experiments.calibration.report import calibration_json, print_calibration, write_calibration_page
-from experiments.comparison.metrics import json_text, summary
+from experiments.comparison.metrics import summary
 from experiments.report.files import write_text
-from experiments.terminal.console import progress_bar, refusing
-from experiments.terminal.options import OutOption, RobotOption, ScenarioOption, SetOption
-from experiments.terminal.prepare import check, prepare
+from experiments.terminal.console import print_files, progress_bar, refusing
+from experiments.terminal.json_output import human_console, json_output
+from experiments.terminal.option_limits import at_least
+from experiments.terminal.options import JsonOption, OutOption, RobotOption, ScenarioOption, SetOption
+from experiments.terminal.prepare import Prepared, check, prepare
 from experiments.terminal.staging import staged_file, staged_folder
 from robots.calibration.admissible import AdmissibleConfigurations
 from robots.calibration.criteria import NAMES
 from robots.calibration.design import MeasurementDesign, design_measurements
 from robots.calibration.identification import identify
 from robots.calibration.measurement_file import RowProblem, measurement_text, read_measurements
-from robots.model import RobotModel
 from robots.robot_file import robot_text
 from robots.urdf import urdf_text
 
@@ -77,122 +75,135 @@ def calibrate_command(
     ] = None,
     urdf: Annotated[str | None, typer.Option(metavar="FILE.urdf", help="The same as URDF.")] = None,
     out: OutOption = Path("out/calibration"),
-    json_file: Annotated[
-        str | None,
-        typer.Option("--json", metavar="FILE", help="The numbers; - prints them, and nothing else."),
-    ] = None,
+    json_file: JsonOption = None,
 ) -> None:
     """Find the true geometry of a robot and what it is worth on the path."""
-    human = Console(stderr=json_file == "-")
-    problems: list[tuple[str, RowProblem]] = []
-    with refusing(ValueError, OSError), ExitStack() as stack:
-        if validation and not measurements:
-            raise ValueError("--validation needs --measurements; without it both sets are simulated")
-        if noise not in NOISES:
-            raise ValueError(f"--noise must be one of {', '.join(NOISES)}, got '{noise}'")
-        if count < 5:
-            raise ValueError(f"--count must be at least 5, got {count}")
+    human = human_console(json_file)
+    wanted = _Wanted(
+        measurements, validation, count, criterion, noise, position_only, compliance, fixed or []
+    )
+    with json_output(json_file) as output, refusing(ValueError, OSError), ExitStack() as stack:
+        wanted.check()
         prepared = prepare(scenario, settings or [], robot)
         check(prepared, ["open_loop"])
         stage = stack.enter_context(staged_folder(out))
-        files = {
-            name: stack.enter_context(staged_file(name))
-            for name in (write, urdf, json_file)
-            if name and name != "-"
-        }
-        if measurements:
-            sets, problems = _read(measurements, validation)
-            design, design_seconds = None, 0.0
-        else:
-            design, design_seconds, sets = _simulated(
-                prepared.scenario, prepared.robot, count, criterion, noise, position_only, compliance
-            )
-        table = sets.calibration.without_rotation() if position_only else sets.calibration
-        config = identification_config(compliance, fixed or [], NOISES[noise])
-        identified = identify(prepared.robot, table, config)
-        calibrated = identified.calibrated_robot(prepared.scenario.robot)
-        rigid = None
-        if compliance:
-            rigid = identify(prepared.robot, table, replace(config, compliance=False)).calibrated_robot()
-        study = CalibrationStudy(
-            nominal=prepared.robot,
-            calibrated=calibrated,
-            design=design,
-            design_seconds=design_seconds,
-            sets=sets,
-            identified=identified,
-            truth=None
-            if measurements
-            else true_base_parameters(prepared.scenario, prepared.robot, position_only),
-            before=validated(prepared.robot, sets.validation, position_only),
-            after=validated(calibrated, sets.validation, position_only),
-            geometry_only=validated(rigid, sets.validation, position_only) if rigid else None,
-            after_noise_free=validated(calibrated, sets.validation_truth, position_only),
+        robot_file, urdf_file = (
+            stack.enter_context(staged_file(name)) if name else None for name in (write, urdf)
         )
-        path = None if measurements else _path(prepared.scenario, prepared.robot, calibrated)
-        result = calibration_json(study, path)
-        _write_tables(stage, sets)
-        write_calibration_page(stage / "report.html", prepared.title, study, path, problems)
-        if write:
-            write_text(files[write], robot_text(calibrated))
-        if urdf:
-            write_text(files[urdf], urdf_text(calibrated))
-        if json_file and json_file != "-":
-            write_text(files[json_file], json_text(result))
-    if json_file == "-":
-        sys.stdout.write(json_text(result))
-    print_calibration(human, study, path, problems)
-    for name in (str(out / "report.html"), write, urdf):
-        if name:
-            human.print(escape(name), soft_wrap=True)
+        stack.enter_context(output.staged())
+        measured = _read(wanted) if measurements else _simulated(prepared, wanted)
+        study = _study(prepared, wanted, measured)
+        path = None if measurements else _path(prepared.scenario, study)
+        output.write(calibration_json(study, path))
+        _write_tables(stage, study.sets)
+        write_calibration_page(stage / "report.html", prepared.title, study, path, measured.problems)
+        if robot_file:
+            write_text(robot_file, robot_text(study.calibrated))
+        if urdf_file:
+            write_text(urdf_file, urdf_text(study.calibrated))
+    print_calibration(human, study, path, measured.problems)
+    print_files(human, out / "report.html", write, urdf)
 
 
-def _read(measurements: str, validation: str | None) -> tuple[MeasuredSets, list[tuple[str, RowProblem]]]:
+@dataclass(frozen=True)
+class _Wanted:
+    """What to measure and to identify."""
+
+    measurements: str | None
+    validation: str | None
+    count: int
+    criterion: str
+    noise: str
+    position_only: bool
+    compliance: bool
+    fixed: list[str]
+
+    def check(self) -> None:
+        """Raises ValueError if something is unknown, too small or does not go together."""
+        if self.validation and not self.measurements:
+            raise ValueError("--validation needs --measurements; without it both sets are simulated")
+        if self.noise not in NOISES:
+            raise ValueError(f"--noise must be one of {', '.join(NOISES)}, got '{self.noise}'")
+        at_least("--count", 5, self.count)
+
+
+@dataclass(frozen=True)
+class _Measured:
+    """What there is to identify from and to validate with."""
+
+    sets: MeasuredSets
+    problems: list[tuple[str, RowProblem]] = field(default_factory=list)  # rows left out, by their files
+    design: MeasurementDesign | None = None  # only where it was simulated
+    design_seconds: float = 0.0
+
+
+def _read(wanted: _Wanted) -> _Measured:
+    """The tables that were given."""
     problems: list[tuple[str, RowProblem]] = []
     tables = []
-    for name in filter(None, (measurements, validation)):
+    for name in filter(None, (wanted.measurements, wanted.validation)):
         table, found = read_measurements(name)
         tables.append(table)
         problems += [(name, problem) for problem in found]
-    return MeasuredSets(tables[0], tables[1] if validation else None, None), problems
+    return _Measured(MeasuredSets(tables[0], tables[1] if wanted.validation else None, None), problems)
 
 
-def _simulated(
-    scenario: Scenario,
-    robot: RobotModel,
-    count: int,
-    criterion: str,
-    noise: str,
-    position_only: bool,
-    compliance: bool,
-) -> tuple[MeasurementDesign, float, MeasuredSets]:
+def _simulated(prepared: Prepared, wanted: _Wanted) -> _Measured:
     """Design and measurements of a simulated calibration."""
+    scenario, robot, count = prepared.scenario, prepared.robot, wanted.count
     started = time.perf_counter()
     with progress_bar(f"choosing {count} configurations") as progress:
         design = design_measurements(
             robot,
             count,
-            criterion,
-            position_only,
+            wanted.criterion,
+            wanted.position_only,
             admissible=AdmissibleConfigurations(robot),
             seed=scenario.seed,
             progress=progress,
         )
     seconds = time.perf_counter() - started
     fresh = validation_configurations(robot, VALIDATION_COUNT, scenario.seed)
-    payload = scenario.station.payload
-    payloads = [payload, 0.0 if payload > 0.0 else robot.payload.largest_mass] if compliance else [payload]
+    payloads = [scenario.station.payload]
+    if wanted.compliance:  # how far joints yield shows between two loads
+        payloads.append(0.0 if payloads[0] > 0.0 else robot.payload.largest_mass)
     with progress_bar(f"measuring {len(payloads) * count + len(fresh)} poses") as progress:
         sets = measure_sets(
-            scenario, design.configurations, fresh, payloads, NOISES[noise], progress=progress
+            scenario, design.configurations, fresh, payloads, NOISES[wanted.noise], progress=progress
         )
-    return design, seconds, sets
+    return _Measured(sets, design=design, design_seconds=seconds)
 
 
-def _path(scenario: Scenario, nominal: RobotModel, calibrated: RobotModel) -> dict[str, Any]:
+def _study(prepared: Prepared, wanted: _Wanted, measured: _Measured) -> CalibrationStudy:
+    """Identifies the robot and validates it."""
+    robot, sets, position_only = prepared.robot, measured.sets, wanted.position_only
+    table = sets.calibration.without_rotation() if position_only else sets.calibration
+    config = identification_config(wanted.compliance, wanted.fixed, NOISES[wanted.noise])
+    identified = identify(robot, table, config)
+    calibrated = identified.calibrated_robot(prepared.scenario.robot)
+    rigid = None
+    if wanted.compliance:
+        rigid = identify(robot, table, replace(config, compliance=False)).calibrated_robot()
+    is_simulated = measured.design is not None
+    return CalibrationStudy(
+        nominal=robot,
+        calibrated=calibrated,
+        design=measured.design,
+        design_seconds=measured.design_seconds,
+        sets=sets,
+        identified=identified,
+        truth=true_base_parameters(prepared.scenario, robot, position_only) if is_simulated else None,
+        before=validated(robot, sets.validation, position_only),
+        after=validated(calibrated, sets.validation, position_only),
+        geometry_only=validated(rigid, sets.validation, position_only) if rigid else None,
+        after_noise_free=validated(calibrated, sets.validation_truth, position_only),
+    )
+
+
+def _path(scenario: Scenario, study: CalibrationStudy) -> dict[str, Any]:
     """Logs and true errors of the path, before and after."""
     with progress_bar("the path before and after") as progress:
-        logs: dict[str, RunLog] = path_runs(scenario, nominal, calibrated, progress=progress)
+        logs: dict[str, RunLog] = path_runs(scenario, study.nominal, study.calibrated, progress=progress)
     runs = summary("", {name: [log] for name, log in logs.items()})["runs"]
     return {name: {"log": logs[name], "errors": runs[name]["true"]} for name in logs}
 
