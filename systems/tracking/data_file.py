@@ -1,14 +1,41 @@
 """Cells and bodies as YAML files: where the shipped ones are, and one-line errors for the others."""
 
+from collections.abc import Callable, Sequence
 from importlib.resources import files
 from pathlib import Path
 from typing import TypeVar
 
 from pydrake.common.yaml import yaml_load_typed
 
-from systems.tracking.yaml_lines import first_misfit
+from systems.tracking.yaml_lines import first_misfit, line_of
+
+Problem = tuple[Sequence[str | int], str]  # a place in a file, and what is wrong there
 
 _Schema = TypeVar("_Schema")
+
+
+def load_data_file(
+    name: str, kind: str, schema: type[_Schema], problem_of: Callable[[_Schema], Problem | None]
+) -> _Schema:
+    """Reads a cell or a body and refuses one that cannot be.
+
+    Args:
+        name: as for `data_file`.
+        kind: ``"cell"`` or ``"body"``.
+        schema: the dataclass tree that the file holds.
+        problem_of: gives the first thing that is wrong with it, or None.
+
+    Raises:
+        ValueError: if there is no such file, or it does not describe what it should; one line that names file
+            and line.
+    """
+    path = data_file(name, kind)
+    data = _read(path, schema)
+    problem = problem_of(data)
+    if problem:
+        place, reason = problem
+        raise ValueError(f"{kind} file {path}, line {line_of(path, place)}: {reason}")
+    return data
 
 
 def data_file(name: str, kind: str) -> Path:
@@ -34,7 +61,7 @@ def data_file(name: str, kind: str) -> Path:
     return path
 
 
-def read_data_file(path: Path, schema: type[_Schema]) -> _Schema:
+def _read(path: Path, schema: type[_Schema]) -> _Schema:
     """Reads a dataclass tree from a YAML file.
 
     Raises:

@@ -1,14 +1,12 @@
 """The detection body: where the centres of the markers are in the frame of the tool."""
 
-from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 
 import numpy as np
 
 from systems.tracking.body_pose import collinear
-from systems.tracking.data_file import data_file, read_data_file
-from systems.tracking.yaml_lines import line_of
+from systems.tracking.data_file import Problem, load_data_file
 
 MINIMUM_MARKERS = 4  # three give a pose, the fourth tells one naming of them from another
 
@@ -49,13 +47,7 @@ def load_body(name: str) -> DetectionBody:
         ValueError: if there is no such file, or it does not describe a body; one line that names file and
             line.
     """
-    path = data_file(name, "body")
-    body = read_data_file(path, DetectionBody)
-    problem = _problem(body)
-    if problem:
-        place, reason = problem
-        raise ValueError(f"body file {path}, line {line_of(path, place)}: {reason}")
-    return body
+    return load_data_file(name, "body", DetectionBody, _problem)
 
 
 def smallest_difference(distances: np.ndarray) -> float:
@@ -63,7 +55,7 @@ def smallest_difference(distances: np.ndarray) -> float:
     return float(np.diff(np.sort(distances[np.triu_indices(len(distances), 1)])).min())
 
 
-def _problem(body: DetectionBody) -> tuple[Sequence[str | int], str] | None:
+def _problem(body: DetectionBody) -> Problem | None:
     """Place and reason of the first thing that no body can have, or None."""
     markers = np.asarray(body.markers_mm, dtype=float)
     if markers.ndim != 2 or markers.shape[1:] != (3,) or not np.isfinite(markers).all():

@@ -5,7 +5,6 @@ come from, or the word ``assumed``. Positions are those of the camera system's o
 gives them so); ``base`` is the robot's base B in that frame.
 """
 
-from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -14,12 +13,9 @@ from pydrake.math import RigidTransform
 from robots.model import Placement
 from robots.pose import rotation_from_zyx
 from systems.tracking.camera_model import Cameras
-from systems.tracking.data_file import data_file, read_data_file
-from systems.tracking.yaml_lines import line_of
+from systems.tracking.data_file import Problem, load_data_file
 
 _IN_METRES = 20.0  # mm; a cell in metres by mistake is no larger, and two cameras are no nearer to each other
-
-_Problem = tuple[Sequence[str | int], str]  # a place in the file, and what is wrong there
 
 
 @dataclass
@@ -100,13 +96,7 @@ def load_cell(name: str) -> MeasuringCell:
         ValueError: if there is no such file, or it does not describe a cell; one line that names file and
             line.
     """
-    path = data_file(name, "cell")
-    cell = read_data_file(path, MeasuringCell)
-    problem = _problem(cell)
-    if problem:
-        place, reason = problem
-        raise ValueError(f"cell file {path}, line {line_of(path, place)}: {reason}")
-    return cell
+    return load_data_file(name, "cell", MeasuringCell, _problem)
 
 
 def _aimed(ray_C: np.ndarray, direction: np.ndarray) -> np.ndarray:
@@ -123,7 +113,7 @@ def _aimed(ray_C: np.ndarray, direction: np.ndarray) -> np.ndarray:
     return np.column_stack([right, np.cross(axis, right), axis])
 
 
-def _problem(cell: MeasuringCell) -> _Problem | None:
+def _problem(cell: MeasuringCell) -> Problem | None:
     """The first reason why the cell is impossible, or None."""
     if len(cell.cameras) < 2:
         return ["cameras"], f"needs at least two cameras, got {len(cell.cameras)}"
@@ -141,7 +131,7 @@ def _problem(cell: MeasuringCell) -> _Problem | None:
     return None
 
 
-def _camera_problem(camera: CellCamera, cell: MeasuringCell) -> _Problem | None:
+def _camera_problem(camera: CellCamera, cell: MeasuringCell) -> Problem | None:
     lens = camera.lens
     sizes = {
         ("position_mm",): (camera.position_mm, 3),
