@@ -1,9 +1,9 @@
-"""Runs ``truetip`` inside the test: arguments in; exit code, stdout and stderr out."""
+"""Runs ``truetip`` inside a test, and says what it refuses and what it leaves behind."""
 
-from dataclasses import dataclass
+import re
 from pathlib import Path
 
-import pytest
+from typer.testing import CliRunner, Result
 
 from experiments.cli import app
 
@@ -17,22 +17,16 @@ SHORT = [
 RESULTS = {"report.html", "replay.html", "figure.svg", "summary.json", "timing.json"}
 
 
-@dataclass(frozen=True)
-class Outcome:
-    """What a command left behind."""
-
-    code: int
-    out: str
-    err: str
+def truetip(*arguments: object) -> Result:
+    """Runs one command; a defect in it is raised as it is."""
+    return CliRunner().invoke(app, list(map(str, arguments)), prog_name="truetip", catch_exceptions=False)
 
 
-def truetip(capsys: pytest.CaptureFixture[str], *arguments: object) -> Outcome:
-    """Runs one command."""
-    capsys.readouterr()
-    with pytest.raises(SystemExit) as end:
-        app([str(argument) for argument in arguments], prog_name="truetip")
-    captured = capsys.readouterr()
-    return Outcome(int(end.value.code or 0), captured.out, captured.err)
+def refusal(result: Result) -> str:
+    """The line in which a command says why it will not run, which has to be all that it says."""
+    assert (result.exit_code, result.stdout) == (2, ""), result.output
+    assert re.fullmatch("truetip: .*\n", result.stderr), result.stderr
+    return result.stderr
 
 
 def files(folder: Path) -> set[str]:

@@ -5,19 +5,14 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from typer.testing import CliRunner, Result
 
-from experiments.cli import app
 from robots.calibration.measurement_file import read_measurements
 from robots.model import load_robot
 from tests.experiments.browser import open_page
+from tests.experiments.commands import files, refusal, truetip
 
 SMALL = ["--set", "station.elasticity=rigid", "--set", "reference.settle=0.2", "--set", "reference.dwell=0.6"]
 QUIET = ["--set", "station.camera.position_sigma=0", "--set", "station.camera.orientation_sigma_deg=0"]
-
-
-def invoke(*arguments: str) -> Result:
-    return CliRunner().invoke(app, arguments)
 
 
 @pytest.fixture(scope="module")
@@ -26,14 +21,14 @@ def calibrated(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("calibration")
     options = ["--count", "20", "--out", str(folder), "--json", str(folder / "result.json")]
     files = ["--write", str(folder / "robot.yaml"), "--urdf", str(folder / "robot.urdf")]
-    result = invoke("calibrate", *SMALL, *QUIET, *options, *files)
+    result = truetip("calibrate", *SMALL, *QUIET, *options, *files)
     assert result.exit_code == 0, result.output
     return folder
 
 
 def test_a_design_is_written_with_its_bound_and_its_picture(tmp_path: Path):
     table, page = tmp_path / "design.csv", tmp_path / "design.html"
-    result = invoke("design", "--count", "12", "--json", "-", "--out", str(table), "--report", str(page))
+    result = truetip("design", "--count", "12", "--json", "-", "--out", str(table), "--report", str(page))
     assert result.exit_code == 0, result.output
     numbers = json.loads(result.stdout)
     assert set(numbers) >= {"criterion", "count", "b3", "bound", "seconds", "peak_mb"}
@@ -67,7 +62,7 @@ def test_its_tables_serve_as_measurements_and_give_the_same_robot(calibrated: Pa
         str(calibrated / "validation.csv"),
     ]
     again = tmp_path / "again.yaml"
-    result = invoke("calibrate", *tables, "--write", str(again), "--out", str(tmp_path), "--json", "-")
+    result = truetip("calibrate", *tables, "--write", str(again), "--out", str(tmp_path), "--json", "-")
     assert result.exit_code == 0, result.output
     numbers = json.loads(result.stdout)
     assert numbers["path"] is None
@@ -79,13 +74,12 @@ def test_its_tables_serve_as_measurements_and_give_the_same_robot(calibrated: Pa
 
 def test_a_run_with_the_calibrated_robot_is_on_its_path_without_a_camera(calibrated: Path, tmp_path: Path):
     robot = str(calibrated / "robot.yaml")
-    result = invoke("run", "--law", "open_loop", "--robot", robot, *SMALL, "--out", str(tmp_path))
+    result = truetip("run", "--law", "open_loop", "--robot", robot, *SMALL, "--out", str(tmp_path))
     assert result.exit_code == 0, result.output
     summary = json.loads((tmp_path / "summary.json").read_text())
     assert max(summary["runs"]["open_loop"]["true"]["static_mm"]) < 0.02
-    other = invoke("run", "--robot", robot, "--set", "robot=other.yaml", *SMALL, "--out", str(tmp_path))
-    assert other.exit_code == 2
-    assert "was calibrated on 'irb1200', the scenario has 'other.yaml'" in other.stderr
+    other = truetip("run", "--robot", robot, "--set", "robot=other.yaml", *SMALL, "--out", str(tmp_path))
+    assert "was calibrated on 'irb1200', the scenario has 'other.yaml'" in refusal(other)
 
 
 def test_bad_rows_are_named_and_do_no_harm(calibrated: Path, tmp_path: Path):
@@ -95,7 +89,7 @@ def test_bad_rows_are_named_and_do_no_harm(calibrated: Path, tmp_path: Path):
     cells[6] = repr(float(cells[6]) + 1.0)  # a pose one metre off
     lines[6] = ",".join(cells)
     (tmp_path / "bad.csv").write_text("\n".join(lines))
-    result = invoke(
+    result = truetip(
         "calibrate", "--measurements", str(tmp_path / "bad.csv"), "--out", str(tmp_path), "--json", "-"
     )
     assert result.exit_code == 0, result.output
@@ -120,19 +114,15 @@ def test_wrong_arguments_are_refused_in_one_line(
     arguments: list[str], message: str, tmp_path: Path, monkeypatch
 ):
     monkeypatch.chdir(tmp_path)
-    result = invoke(*arguments)
-    assert result.exit_code == 2
-    assert message in result.stderr
-    assert len(result.stderr.strip().splitlines()) == 1
-    assert list(tmp_path.iterdir()) == []  # nothing half-written
+    assert message in refusal(truetip(*arguments))
+    assert files(tmp_path) == set()  # nothing half-written
 
 
 def test_measurements_that_hide_parameters_are_refused_by_name(calibrated: Path, tmp_path: Path):
     lines = (calibrated / "measurements.csv").read_text().splitlines()
     (tmp_path / "few.csv").write_text("\n".join(lines[:5]))
-    result = invoke("calibrate", "--measurements", str(tmp_path / "few.csv"), "--out", str(tmp_path / "out"))
-    assert result.exit_code == 2
-    assert "4 measurements do not determine" in result.stderr
+    result = truetip("calibrate", "--measurements", str(tmp_path / "few.csv"), "--out", str(tmp_path / "out"))
+    assert "4 measurements do not determine" in refusal(result)
     assert not (tmp_path / "out").exists()
 
 

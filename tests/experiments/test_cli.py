@@ -12,7 +12,7 @@ from diagrams.scenario import shipped_scenarios
 from experiments import cli
 from experiments.terminal.prepare import check, prepare
 from robots.model import shipped_robots
-from tests.experiments.commands import RESULTS, SHORT, files, truetip
+from tests.experiments.commands import RESULTS, SHORT, files, refusal, truetip
 
 
 @pytest.fixture(autouse=True)
@@ -53,56 +53,51 @@ REFUSED = {
 
 
 @pytest.mark.parametrize(("arguments", "reason"), REFUSED.values(), ids=REFUSED.keys())
-def test_bad_input_is_refused_in_one_line_before_anything_is_written(arguments, reason, capsys, tmp_path):
+def test_bad_input_is_refused_in_one_line_before_anything_is_written(arguments, reason, tmp_path):
     (tmp_path / "broken.yaml").write_text("station: {camera: [")
-    outcome = truetip(capsys, *arguments)
-    assert outcome.code == 2
-    assert outcome.err.startswith("truetip: ")
-    assert outcome.err.count("\n") == 1
-    assert reason in outcome.err
-    assert outcome.out == ""
+    assert reason in refusal(truetip(*arguments))
     assert files(tmp_path) == {"broken.yaml"}
 
 
 @pytest.mark.skipif(not hasattr(os, "geteuid") or os.geteuid() == 0, reason="root may write anywhere")
-def test_a_folder_without_permission_is_refused_before_anything_runs(capsys, tmp_path):
+def test_a_folder_without_permission_is_refused_before_anything_runs(tmp_path):
     (tmp_path / "closed").mkdir(mode=0o500)
-    outcome = truetip(capsys, "compare", "--out=closed")
-    assert (outcome.code, outcome.err) == (2, "truetip: cannot write in folder closed: permission denied\n")
+    refused = refusal(truetip("compare", "--out=closed"))
+    assert refused == "truetip: cannot write in folder closed: permission denied\n"
 
 
-def test_a_comparison_gives_the_same_bytes_whatever_the_number_of_processes(capsys, tmp_path):
-    two = truetip(capsys, "compare", *SHORT, "--cycles=2", "--jobs=2", "--out=a/b", "--json=copy.json")
-    one = truetip(capsys, "compare", *SHORT, "--cycles=2", "--jobs=1", "--out=c", "--json=-")
-    assert (two.code, one.code) == (0, 0)
+def test_a_comparison_gives_the_same_bytes_whatever_the_number_of_processes(tmp_path):
+    two = truetip("compare", *SHORT, "--cycles=2", "--jobs=2", "--out=a/b", "--json=copy.json")
+    one = truetip("compare", *SHORT, "--cycles=2", "--jobs=1", "--out=c", "--json=-")
+    assert (two.exit_code, one.exit_code) == (0, 0)
     summary = (tmp_path / "a/b/summary.json").read_text()
     assert (
         summary
         == (tmp_path / "copy.json").read_text()
         == (tmp_path / "c/summary.json").read_text()
-        == one.out
+        == one.stdout
     )
     assert files(tmp_path / "a/b") == files(tmp_path / "c") == RESULTS
     runs = json.loads(summary)["runs"]
     assert list(runs) == ["open_loop", "numerical_ik", "pbvs", "position_level"]
     assert runs["pbvs"]["true"]["iso_9283"]["cycles"] == 2
-    assert "Numerical IK" in two.out
-    assert "Numerical IK" in one.err  # the table gives way to the JSON
+    assert "Numerical IK" in two.stdout
+    assert "Numerical IK" in one.stderr  # the table gives way to the JSON
     assert files(tmp_path) >= {"a", "c", "copy.json"}
     assert not [name for name in files(tmp_path) if "truetip-" in name]
 
 
-def test_another_seed_gives_other_numbers(capsys, tmp_path):
+def test_another_seed_gives_other_numbers(tmp_path):
     for seed in (0, 1):
-        assert truetip(capsys, "run", *SHORT, f"--set=seed={seed}", f"--out={seed}").code == 0
+        assert truetip("run", *SHORT, f"--set=seed={seed}", f"--out={seed}").exit_code == 0
     numbers = [json.loads((tmp_path / f"{seed}/summary.json").read_text())["runs"] for seed in (0, 1)]
     assert numbers[0] != numbers[1]
 
 
-def test_quick_takes_one_cycle_of_a_faster_path_and_says_so(capsys, tmp_path):
-    outcome = truetip(capsys, "compare", "--quick", *SHORT[:1], *SHORT[2:], "--json=-")
-    assert outcome.code == 0
-    result = json.loads(outcome.out)
+def test_quick_takes_one_cycle_of_a_faster_path_and_says_so(tmp_path):
+    ended = truetip("compare", "--quick", *SHORT[:1], *SHORT[2:], "--json=-")
+    assert ended.exit_code == 0
+    result = json.loads(ended.stdout)
     assert "quick: one cycle, acceleration 2.8 1/s^2" in result["scenario"]
     assert "settling" not in result["scenario"].partition("quick")[2]  # was set explicitly
     assert result["runs"]["pbvs"]["true"]["iso_9283"]["cycles"] == 1
@@ -110,30 +105,30 @@ def test_quick_takes_one_cycle_of_a_faster_path_and_says_so(capsys, tmp_path):
     assert "# misaligned (" in (tmp_path / "out/report.html").read_text()
 
 
-def test_a_run_reports_one_law_and_replaces_older_results_only(capsys, tmp_path):
+def test_a_run_reports_one_law_and_replaces_older_results_only(tmp_path):
     (tmp_path / "out").mkdir()
     (tmp_path / "out/notes.txt").write_text("mine")
     (tmp_path / "out/summary.json").write_text("old")
-    outcome = truetip(capsys, "run", "--law=pbvs", *SHORT)
-    assert outcome.code == 0
-    assert "PBVS" in outcome.out
+    result = truetip("run", "--law=pbvs", *SHORT)
+    assert result.exit_code == 0
+    assert "PBVS" in result.stdout
     assert list(json.loads((tmp_path / "out/summary.json").read_text())["runs"]) == ["pbvs"]
     assert files(tmp_path / "out") == {*RESULTS, "notes.txt"}
 
 
-def test_an_interrupted_comparison_leaves_nothing(capsys, tmp_path, monkeypatch):
+def test_an_interrupted_comparison_leaves_nothing(tmp_path, monkeypatch):
     def interrupted(*_):
         raise KeyboardInterrupt
 
     monkeypatch.setattr(cli, "compare", interrupted)
-    outcome = truetip(capsys, "compare", *SHORT)
-    assert outcome.code == 130
-    assert outcome.err.strip() == "truetip: interrupted, nothing was written"
+    result = truetip("compare", *SHORT)
+    assert result.exit_code == 130
+    assert result.stderr.strip() == "truetip: interrupted, nothing was written"
     assert files(tmp_path) == set()
 
 
-def test_the_pace_of_a_run_can_be_set(capsys, tmp_path):
-    assert truetip(capsys, "run", "--law=open_loop", "--realtime=1.5", *SHORT).code == 0
+def test_the_pace_of_a_run_can_be_set(tmp_path):
+    assert truetip("run", "--law=open_loop", "--realtime=1.5", *SHORT).exit_code == 0
     timing = json.loads((tmp_path / "out/timing.json").read_text())["runs"]["open_loop"]
     # Slower on a busy machine, but never faster than it was told.
     assert timing["real_time_factor"] < 1.5 * 1.05
@@ -152,12 +147,12 @@ def test_what_the_readme_shows_can_be_run(tmp_path):
         check(prepare(name, settings), ["pbvs"])
 
 
-def test_scenarios_and_robots_are_listed(capsys):
-    scenarios, robots = truetip(capsys, "scenarios"), truetip(capsys, "robots")
-    assert all(name in scenarios.out for name in shipped_scenarios())
-    assert "Probst" in scenarios.out
-    assert all(name in robots.out for name in shipped_robots())
-    assert truetip(capsys, "--version").out.startswith("truetip")
+def test_scenarios_and_robots_are_listed():
+    scenarios, robots = truetip("scenarios"), truetip("robots")
+    assert all(name in scenarios.stdout for name in shipped_scenarios())
+    assert "Probst" in scenarios.stdout
+    assert all(name in robots.stdout for name in shipped_robots())
+    assert truetip("--version").stdout.startswith("truetip")
 
 
 def test_a_model_of_what_the_robot_does_not_have_is_remarked():

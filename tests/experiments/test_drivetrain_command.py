@@ -3,15 +3,13 @@
 import json
 from pathlib import Path
 
-from typer.testing import CliRunner
-
-from experiments.cli import app
 from experiments.drivetrain.figures import efficiency_run
 from tests.experiments.browser import open_page
+from tests.experiments.commands import refusal, truetip
 
 
 def test_the_pictures_open_and_the_inverse_compensates(tmp_path: Path):
-    result = CliRunner().invoke(app, ["drivetrain", "--out", str(tmp_path / "page.html"), "--json", "-"])
+    result = truetip("drivetrain", "--out", tmp_path / "page.html", "--json", "-")
     assert result.exit_code == 0, result.output
     numbers = json.loads(result.stdout)
     assert numbers["hysteresis"]["residual"] < 1e-12
@@ -30,6 +28,4 @@ def test_the_gear_of_figure_2_4_starts_only_against_its_losses():
 
 def test_a_folder_that_cannot_be_written_is_refused(tmp_path: Path):
     (tmp_path / "file").write_text("")
-    result = CliRunner().invoke(app, ["drivetrain", "--out", str(tmp_path / "file" / "page.html")])
-    assert result.exit_code == 2
-    assert "cannot write" in result.stderr
+    assert "cannot write" in refusal(truetip("drivetrain", "--out", tmp_path / "file" / "page.html"))

@@ -5,20 +5,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-import typer
 from scipy.spatial.transform import Rotation
-from typer.testing import CliRunner, Result
 
-from experiments.frames.commands import align_command, chain_command, frame_command, tool_command
-
-app = typer.Typer()
-for name, command in {
-    "frame": frame_command,
-    "chain": chain_command,
-    "tool": tool_command,
-    "align": align_command,
-}.items():
-    app.command(name)(command)
+from tests.experiments.commands import refusal, truetip
 
 # Wilms (2016): listings 2 and 3 in m, the links of listing 7 in mm.
 LISTING_2, LISTING_3 = "1.01;2;0\n2;2;0\n1;3;0\n", "2;1;0\n2.01;2;0\n1;1;0\n"
@@ -39,10 +28,6 @@ TOOL, PIVOT = np.array([-1.747805, 44.586360, -87.648108]), np.array([-253.03290
 def _work_in_an_empty_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
     monkeypatch.chdir(tmp_path)
     monkeypatch.setenv("COLUMNS", "200")  # Rich wraps at the width of the terminal that runs the tests
-
-
-def truetip(*arguments: str) -> Result:
-    return CliRunner().invoke(app, list(arguments))
 
 
 def numbers(*arguments: str) -> dict:
@@ -243,9 +228,4 @@ REFUSED = {
 def test_bad_input_is_refused_in_one_line(arguments: list[str], reason: str):
     for file, text in FILES.items():
         write(file, text)
-    result = truetip(*arguments)
-    assert result.exit_code == 2
-    assert result.stderr.startswith("truetip: ")
-    assert reason in result.stderr
-    assert result.stderr.count("\n") == 1
-    assert result.stdout == ""
+    assert reason in refusal(truetip(*arguments))
