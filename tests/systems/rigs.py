@@ -1,15 +1,19 @@
-"""What tests of systems share: signals as functions of time, and hand-cranked laws and guards."""
+"""What tests of systems share: signals as functions of time, cameras, hand-cranked laws and guards."""
 
 from collections.abc import Callable
 from typing import Any
 
 import numpy as np
+from pydrake.common import RandomDistribution, RandomGenerator
 from pydrake.common.value import Value
 from pydrake.math import RigidTransform, RotationMatrix
-from pydrake.systems.framework import LeafSystem
+from pydrake.systems.analysis import Simulator
+from pydrake.systems.framework import Context, Diagram, DiagramBuilder, LeafSystem
+from pydrake.systems.primitives import RandomSource
 
 from robots.kinematics import Kinematics
 from robots.model import RobotModel
+from systems.camera import BLOCK, CameraConfig
 from systems.guard import KINDS, CommandGuard, GuardConfig
 from systems.samples import JointSample, PoseSample
 from systems.servo import LAWS, LawConfig
@@ -47,6 +51,41 @@ class ValueSignal(LeafSystem):
             lambda context, output: output.set_value(signal(context.get_time())),
             {self.time_ticket()},
         )
+
+
+def camera_samples(
+    camera: LeafSystem,
+    config: CameraConfig,
+    times: np.ndarray,
+    tip: Callable[[float], RigidTransform],
+    q: np.ndarray | None = None,
+    seed: int = 0,
+) -> list[PoseSample]:
+    """What a camera reports at the given times, wired as in a station; ``q`` are the joints in rad."""
+    builder = DiagramBuilder()
+    builder.AddSystem(camera)
+    builder.Connect(builder.AddSystem(ValueSignal(tip)).get_output_port(), camera.GetInputPort("X_WE"))
+    noise = camera.GetInputPort("noise")
+    source = RandomSource(RandomDistribution.kGaussian, noise.size(), BLOCK * config.period)
+    builder.Connect(builder.AddSystem(source).get_output_port(), noise)
+    if q is not None:
+        state = builder.AddSystem(VectorSignal(lambda time: np.concatenate([q, np.zeros(6)])))
+        builder.Connect(state.get_output_port(), camera.GetInputPort("motor_state"))
+    builder.ExportOutput(camera.GetOutputPort("pose_sample"), "pose_sample")
+    diagram: Diagram = builder.Build()
+    simulator = Simulator(diagram)
+    context: Context = simulator.get_mutable_context()
+    diagram.SetRandomContext(context, RandomGenerator(seed))
+    found = []
+    for time in times:
+        simulator.AdvanceTo(time)
+        found.append(diagram.GetOutputPort("pose_sample").Eval(context))
+    return found
+
+
+def arrivals(config: CameraConfig, count: int) -> np.ndarray:
+    """Times in s at which the first samples of a camera have arrived, one from each exposure, (count,)."""
+    return config.delay + config.period * (np.arange(count) + 0.5)
 
 
 class GuardRig:

@@ -2,16 +2,12 @@
 
 import numpy as np
 import pytest
-from pydrake.common import RandomGenerator
 from pydrake.math import RigidTransform
-from pydrake.systems.analysis import Simulator
-from pydrake.systems.framework import Context, Diagram, DiagramBuilder
-from pydrake.systems.primitives import AddRandomInputs
 
 from robots.pose import pose_error, rotation_from_zyx
 from systems.camera import CameraConfig, PoseCamera
 from systems.samples import PoseSample
-from tests.systems.rigs import ValueSignal, pose
+from tests.systems.rigs import arrivals, camera_samples, pose
 
 STILL = np.eye(4)
 STILL[:3, :3] = rotation_from_zyx(np.array([0.4, -0.7, 1.1]))
@@ -22,25 +18,12 @@ def samples(
     config: CameraConfig, times: np.ndarray, tip=lambda time: pose(STILL), seed: int = 0
 ) -> list[PoseSample]:
     """What the camera reports at the given times."""
-    builder = DiagramBuilder()
-    camera = builder.AddSystem(PoseCamera(config))
-    builder.Connect(builder.AddSystem(ValueSignal(tip)).get_output_port(), camera.GetInputPort("X_WE"))
-    builder.ExportOutput(camera.GetOutputPort("pose_sample"), "pose_sample")
-    AddRandomInputs(config.period, builder)
-    diagram: Diagram = builder.Build()
-    simulator = Simulator(diagram)
-    context: Context = simulator.get_mutable_context()
-    diagram.SetRandomContext(context, RandomGenerator(seed))
-    found = []
-    for time in times:
-        simulator.AdvanceTo(time)
-        found.append(diagram.GetOutputPort("pose_sample").Eval(context))
-    return found
+    return camera_samples(PoseCamera(config), config, times, tip, seed=seed)
 
 
 def each_exposure(config: CameraConfig, count: int, seed: int = 0) -> list[PoseSample]:
     """The first samples, one from each exposure, read when they have arrived."""
-    return samples(config, config.delay + config.period * (np.arange(count) + 0.5), seed=seed)
+    return samples(config, arrivals(config, count), seed=seed)
 
 
 def step_to(time_of_step: float, height: float):

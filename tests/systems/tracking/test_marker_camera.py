@@ -1,15 +1,11 @@
 """The marker camera in a diagram: ports, stamps and delays of the pose camera, and errors of its own."""
 
-from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
-from pydrake.common import RandomDistribution, RandomGenerator
-from pydrake.systems.analysis import Simulator
-from pydrake.systems.framework import Context, Diagram, DiagramBuilder
-from pydrake.systems.primitives import RandomSource
+from pydrake.math import RigidTransform
 
 from robots.kinematics import Kinematics
 from robots.model import load_robot
@@ -22,7 +18,7 @@ from systems.tracking.features import FeatureConfig
 from systems.tracking.images import ImageConfig
 from systems.tracking.marker_camera import MarkerCamera, MarkerCameraConfig
 from systems.tracking.tracker import TrackerConfig
-from tests.systems.rigs import ValueSignal, VectorSignal, pose
+from tests.systems.rigs import arrivals, camera_samples, pose
 from tests.systems.tracking.rigs import CELL
 
 ROBOT = load_robot("irb1200")
@@ -31,41 +27,15 @@ STILL = Kinematics(ROBOT).forward(Q)
 EXACT = MarkerCameraConfig(features=FeatureConfig(pixel_sigma=0.0))
 
 
-def samples(
-    camera: MarkerCamera | PoseCamera,
-    config: CameraConfig,
-    times: np.ndarray,
-    tip: Callable[[float], object] = lambda time: pose(STILL),
-    q: np.ndarray | None = None,
-    seed: int = 0,
-) -> list[PoseSample]:
-    """What the camera reports at the given times, wired as in a station."""
-    builder = DiagramBuilder()
-    builder.AddSystem(camera)
-    builder.Connect(builder.AddSystem(ValueSignal(tip)).get_output_port(), camera.GetInputPort("X_WE"))
-    noise = camera.GetInputPort("noise")
-    source = RandomSource(RandomDistribution.kGaussian, noise.size(), BLOCK * config.period)
-    builder.Connect(builder.AddSystem(source).get_output_port(), noise)
-    if q is not None:
-        state = builder.AddSystem(VectorSignal(lambda time: np.concatenate([q, np.zeros(6)])))
-        builder.Connect(state.get_output_port(), camera.GetInputPort("motor_state"))
-    builder.ExportOutput(camera.GetOutputPort("pose_sample"), "pose_sample")
-    diagram: Diagram = builder.Build()
-    simulator = Simulator(diagram)
-    context: Context = simulator.get_mutable_context()
-    diagram.SetRandomContext(context, RandomGenerator(seed))
-    found = []
-    for time in times:
-        simulator.AdvanceTo(time)
-        found.append(diagram.GetOutputPort("pose_sample").Eval(context))
-    return found
+def still(time: float) -> RigidTransform:
+    return pose(STILL)
 
 
 def each_exposure(
     config: CameraConfig, markers: MarkerCameraConfig, count: int, level: str = "features", **kwargs
 ) -> list[PoseSample]:
-    times = config.delay + config.period * (np.arange(count) + 0.5)
-    return samples(MarkerCamera(config, markers, ROBOT, level), config, times, **kwargs)
+    camera = MarkerCamera(config, markers, ROBOT, level)
+    return camera_samples(camera, config, arrivals(config, count), still, **kwargs)
 
 
 def errors(found: list[PoseSample]) -> np.ndarray:
@@ -97,8 +67,8 @@ def test_samples_come_when_those_of_the_pose_camera_come(delay: float):
         X[2, 3] += 0.1 * max(time - 0.01, 0.0)
         return pose(X)
 
-    ours = samples(MarkerCamera(config, EXACT), config, times, tip)
-    theirs = samples(PoseCamera(config), config, times, tip)
+    ours = camera_samples(MarkerCamera(config, EXACT), config, times, tip)
+    theirs = camera_samples(PoseCamera(config), config, times, tip)
     assert [sample.time for sample in ours] == [sample.time for sample in theirs]
     assert [sample.valid for sample in ours] == [sample.valid for sample in theirs]
     for mine, other in zip(ours, theirs, strict=True):
@@ -146,7 +116,7 @@ def test_a_body_out_of_sight_is_invalid_and_found_again_when_it_returns():
     def tip(time: float):
         return pose(away if 0.02 <= time < 0.1 else STILL)
 
-    found = samples(MarkerCamera(config, EXACT), config, 4e-3 * np.arange(40) + 2e-3, tip)
+    found = camera_samples(MarkerCamera(config, EXACT), config, arrivals(config, 40), tip)
     assert [i for i, sample in enumerate(found) if not sample.valid] == list(range(5, 25))
     np.testing.assert_allclose(found[10].X_WE.GetAsMatrix4(), STILL, atol=1e-9)  # the last one, repeated
     assert [sample.time for sample in found] == pytest.approx(4e-3 * np.arange(40))
@@ -172,14 +142,15 @@ def test_by_images_a_body_is_followed_in_motion_among_reflections():
     """1 m/s upwards; two reflections in every window, some of them round and as large as a marker."""
     markers = MarkerCameraConfig(images=ImageConfig(reflections=2.0))
     config = CameraConfig(delay=0.0)
-    times = config.period * (np.arange(60) + 0.5)
 
     def rising(time: float):
         X = STILL.copy()
         X[2, 3] += time
         return pose(X)
 
-    found = samples(MarkerCamera(config, markers, ROBOT, "images"), config, times, rising)
+    found = camera_samples(
+        MarkerCamera(config, markers, ROBOT, "images"), config, arrivals(config, 60), rising
+    )
     height = np.array([sample.X_WE.translation()[2] - sample.time for sample in found])
     assert all(sample.valid for sample in found)
     np.testing.assert_allclose(height, STILL[2, 3], atol=5e-5)
