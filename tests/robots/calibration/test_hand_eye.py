@@ -1,5 +1,6 @@
 """Camera, base, flange and body: round trips, OpenCV beside it, predicted spread, degenerate motions."""
 
+import cv2
 import numpy as np
 import pytest
 from hypothesis import given
@@ -68,16 +69,15 @@ def test_a_camera_on_the_flange_is_the_same_problem():
 
 @pytest.mark.parametrize("method", ["SHAH", "LI"])
 def test_opencv_finds_the_same_and_fits_no_better(method: str):
-    cv2 = pytest.importorskip("cv2")
     rng = np.random.default_rng(2)
     X_BF = flange_poses(rng, 30)
     X_CD = noisy(seen(X_BF), rng)
     # What OpenCV calls world, camera, base and gripper is here D, C, F and B: X_CD X_DF = X_CB X_BF.
     R_DF, p_DF, R_CB, p_CB = cv2.calibrateRobotWorldHandEye(
-        X_CD[:, :3, :3],
-        X_CD[:, :3, 3],
-        X_BF[:, :3, :3],
-        X_BF[:, :3, 3],
+        list(X_CD[:, :3, :3]),
+        list(X_CD[:, :3, 3]),
+        list(X_BF[:, :3, :3]),
+        list(X_BF[:, :3, 3]),
         method=getattr(cv2, f"CALIB_ROBOT_WORLD_HAND_EYE_{method}"),
     )
     X_FD_cv, X_BC_cv = (
