@@ -60,10 +60,11 @@ class PoseCamera(LeafSystem):
         self._noise = self.DeclareVectorInputPort(
             "noise", BLOCK * _PER_EXPOSURE, RandomDistribution.kGaussian
         )
-        in_flight = int(np.floor(config.delay / config.period + _EPSILON)) + 2
+        self._in_flight = int(np.floor(config.delay / config.period + _EPSILON)) + 2
         empty = np.concatenate([[-np.inf, 0.0], np.eye(4)[:3].ravel()])
         newest = self.DeclareDiscreteState(empty)
-        self._older = self.DeclareDiscreteState(np.tile(empty, in_flight - 1))
+        # All that may not have arrived yet, and one that has, in a ring.
+        self._ring = self.DeclareDiscreteState(np.tile(empty, self._in_flight))
         self.DeclareStateOutputPort("exposure", newest)
         self.DeclareAbstractOutputPort(
             "pose_sample",
@@ -87,7 +88,8 @@ class PoseCamera(LeafSystem):
     def _expose(self, context: Context, discrete_state: DiscreteValues) -> None:
         time = context.get_time()
         turns, shifts, are_lost = self._disturbances.Eval(context)
-        number = round(time / self._config.period) % BLOCK
+        tick = round(time / self._config.period)
+        number = tick % BLOCK
         lost = are_lost[number]
         for start, end in self._config.dropouts:
             lost = lost or start <= time < end
@@ -97,17 +99,17 @@ class PoseCamera(LeafSystem):
         seen = exposure[2:].reshape(3, 4)
         seen[:, :3] = turns[number].dot(pose[:, :3])
         seen[:, 3] = pose[:, 3] + shifts[number]
-        older = discrete_state.get_mutable_value(self._older)
-        older[_WIDTH:] = older[:-_WIDTH].copy()
-        older[:_WIDTH] = context.get_discrete_state(0).value()
         discrete_state.set_value(0, exposure)
+        place = _WIDTH * (tick % self._in_flight)
+        discrete_state.get_mutable_value(self._ring)[place : place + _WIDTH] = exposure
 
     def _calc_sample(self, context: Context, output) -> None:
         due = context.get_time() - self._config.delay + _EPSILON
         entry = context.get_discrete_state(0).value()
         if entry[0] > due:
-            older = context.get_discrete_state(self._older).value().reshape(-1, _WIDTH)
-            entry = next(candidate for candidate in older if candidate[0] <= due)
+            ring = context.get_discrete_state(self._ring).value().reshape(-1, _WIDTH)
+            arrived = ring[ring[:, 0] <= due]
+            entry = arrived[np.argmax(arrived[:, 0])]
         # Orthonormal by construction; checking it again would cost more than the rest.
         X_WE = RigidTransform.MakeUnchecked(entry[2:].reshape(3, 4))
         output.set_value(PoseSample(float(entry[0]), X_WE, bool(entry[1]), self._config.position_sigma))
