@@ -29,7 +29,7 @@ from experiments.bench.feedforward import feedforward
 from experiments.bench.images import images
 from experiments.bench.tracking import tracking
 from experiments.bench.wire import wire
-from experiments.comparison.metrics import write_json
+from experiments.report.files import write_json
 from robots.calibration.admissible import AdmissibleConfigurations
 from robots.calibration.design import design_measurements
 from robots.calibration.identification import identify

@@ -7,17 +7,14 @@ differ by the seed of the noise, the first is the one whose errors are reported,
 ISO 9283 (`experiments.comparison.iso9283`).
 """
 
-import json
 import math
 from collections.abc import Mapping, Sequence
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from diagrams.log import RunLog
 from experiments.comparison.iso9283 import iso_9283
-from experiments.report.files import write_text
 from robots.pose import pose_error
 
 STATIC_WINDOW = 0.5  # s, the end of the dwell over which the static error is the mean
@@ -188,21 +185,6 @@ def judged_by(result: Mapping[str, Any]) -> str:
     """By what the runs of a `summary` are judged, as `judged_source`."""
     is_known = any(run["true"]["max_norm_mm"] is not None for run in result["runs"].values())
     return "true" if is_known else "measured"
-
-
-def write_json(path: str | Path, data: Any) -> None:
-    """Writes ``data`` as JSON in its own order of keys, atomically; NaN is refused.
-
-    Raises:
-        OSError: if the folder is missing or cannot be written.
-        ValueError: if a number is NaN or infinite.
-    """
-    write_text(path, json_text(data))
-
-
-def json_text(data: Any) -> str:
-    """The data as JSON in its own order of keys. Raises ValueError if a number is NaN or infinite."""
-    return json.dumps(data, indent=2, allow_nan=False, ensure_ascii=False) + "\n"
 
 
 def _rounded(value: Any) -> Any:

@@ -6,8 +6,9 @@ from typing import Any
 
 from diagrams.log import RunLog
 from experiments.comparison.figure import write_figure
-from experiments.comparison.metrics import summary, timing, write_json
+from experiments.comparison.metrics import summary, timing
 from experiments.replay.replay import write_replay
+from experiments.report.files import write_json
 from experiments.report.report import write_report
 from experiments.terminal.prepare import Prepared
 

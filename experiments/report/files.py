@@ -1,7 +1,9 @@
 """Writing a result so that a reader finds the old file or the new one, never half of one."""
 
+import json
 import os
 from pathlib import Path
+from typing import Any
 
 
 def write_text(path: str | Path, text: str) -> None:
@@ -18,3 +20,18 @@ def write_text(path: str | Path, text: str) -> None:
         os.replace(temporary, path)
     finally:
         temporary.unlink(missing_ok=True)
+
+
+def write_json(path: str | Path, data: Any) -> None:
+    """Writes ``data`` as JSON in its own order of keys, atomically; NaN is refused.
+
+    Raises:
+        OSError: if the folder is missing or cannot be written.
+        ValueError: if a number is NaN or infinite.
+    """
+    write_text(path, json_text(data))
+
+
+def json_text(data: Any) -> str:
+    """The data as JSON in its own order of keys. Raises ValueError if a number is NaN or infinite."""
+    return json.dumps(data, indent=2, allow_nan=False, ensure_ascii=False) + "\n"

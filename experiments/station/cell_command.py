@@ -13,7 +13,7 @@ from rich.console import Console
 
 from diagrams.cell_loop import CellLoop, CellStatistics
 from diagrams.scenario import Scenario
-from experiments.comparison.metrics import write_json
+from experiments.report.files import write_json
 from experiments.terminal.console import count, refusing
 from experiments.terminal.options import RobotOption, ScenarioOption, SetOption, json_option
 from experiments.terminal.prepare import prepare

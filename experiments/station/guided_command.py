@@ -13,7 +13,7 @@ from rich.console import Console
 
 from diagrams.guided_run import GuidedRecord
 from diagrams.log import RunLog
-from experiments.comparison.metrics import write_json
+from experiments.report.files import write_json
 from experiments.station.guided import compare_on_station
 from experiments.terminal.console import count, progress_bar
 from experiments.terminal.prepare import Prepared

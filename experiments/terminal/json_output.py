@@ -8,7 +8,7 @@ from typing import Any
 
 from rich.console import Console
 
-from experiments.comparison.metrics import json_text, write_json
+from experiments.report.files import json_text, write_json
 from experiments.terminal.staging import staged_file
 
 STDOUT = "-"

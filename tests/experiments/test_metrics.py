@@ -15,8 +15,8 @@ from experiments.comparison.metrics import (
     summary,
     timing,
     transient_metrics,
-    write_json,
 )
+from experiments.report.files import write_json
 from tests.experiments.synthetic import comparison, displaced, make_log, rectangle, straight
 
 TIME = np.arange(0.0, 6.002, 0.004)
@@ -174,14 +174,3 @@ def test_real_time_factor_is_simulated_over_wall_time():
     X = straight(TIME)
     run = timing({"pbvs": [make_log(TIME, X, X)] * 2})["runs"]["pbvs"]
     assert run == {"wall_s": 5.0, "simulated_s": 12.0, "real_time_factor": 2.4}
-
-
-def test_a_refused_number_leaves_the_old_file_and_no_rubbish(tmp_path):
-    path = tmp_path / "summary.json"
-    write_json(path, {"a": 1})
-    with pytest.raises(ValueError, match="not JSON compliant"):
-        write_json(path, {"a": float("nan")})
-    with pytest.raises(FileNotFoundError):
-        write_json(tmp_path / "missing" / "summary.json", {})
-    assert [entry.name for entry in tmp_path.iterdir()] == ["summary.json"]
-    assert path.read_text() == '{\n  "a": 1\n}\n'
