@@ -5,9 +5,11 @@ two echoes on the same machine. One does what the smallest client of EGM does, w
 others (ABBRobotEGM): decode, answer with the joints that came. The other sends the bytes back as they are.
 All three are timed in the same way, from the moment at which a message can be read to the reply's departure.
 A cycle is missed when its message is not answered before the next one is there. Where the machine held up the
-cell, which then catches up, the next one comes too soon for any answer: such misses are counted apart.
+sender, which then catches up, the next one comes too soon for any answer: such misses are counted apart.
 """
 
+import itertools
+import json
 import os
 import select
 import socket
@@ -26,6 +28,7 @@ from experiments.station.guided import compare_on_station
 from robots.model import load_robot
 from systems.egm.channel import UdpChannel, steady_time
 from systems.egm.controller import EgmRunConfig, VirtualController
+from systems.egm.messages import decode_report
 
 LAW = "numerical_ik"
 PERIOD = 4.032e-3  # s
@@ -60,7 +63,7 @@ def wire(minutes: float = 0.0) -> Iterator[Row]:
     yield "turn_around_median", f"{text}, median", servo.median, "ms", ALLOWED, "allowed"
     yield "turn_around_99", f"{text}, 99 %", servo.late, "ms", ALLOWED_LATE, "allowed"
     yield "turn_around_plain", f"{text}", servo.median, "ms", plain.median, "plain echo"
-    text = f"{LAW} over EGM: missed (+ {servo.excused} excused)"
+    text = f"{LAW} over EGM: missed (excused {servo.excused}, echo {echo.excused})"
     yield "missed_cycles", text, float(servo.missed), "", 1.0 + echo.missed, "echo + 1"
 
 
@@ -116,10 +119,11 @@ class _Echo:
 
     def finish(self) -> TurnAround:
         """Ends it and says how it was."""
-        self._metronome.communicate("")
+        crowded, _ = self._metronome.communicate("")
         output, _ = self._echo.communicate(timeout=30.0)
-        median, late, missed = output.split()
-        return TurnAround(float(median), float(late), int(missed))
+        median, late, overtaken_by = json.loads(output)
+        excused = len(set(overtaken_by) & set(json.loads(crowded)))
+        return TurnAround(median, late, len(overtaken_by) - excused, excused)
 
     def __exit__(self, *_: object) -> None:
         for process in (self._metronome, self._echo):
@@ -127,68 +131,78 @@ class _Echo:
 
 
 def _echo(kind: str) -> None:
-    """Answers until it is told to stop, then prints median and 99 % in ms, and what it has missed."""
+    """Answers until it is told to stop, then prints median and 99 % in ms, and what came too soon."""
     answer, channel = _egm_answer() if kind == "egm" else _plain_answer()
     print(channel.getsockname()[1], flush=True)
-    times, missed = [], 0
-    while (started := answer()) is not None:
+    times, overtaken_by = [], []
+    while (answered := answer()) is not None:
+        number, started = answered
         times.append(steady_time() - started)
-        missed += bool(select.select([channel], [], [], 0.0)[0])
-    quantiles = 1e3 * np.percentile(times[20:], [50, 99])
-    print(f"{quantiles[0]} {quantiles[1]} {missed}")
+        if select.select([channel], [], [], 0.0)[0]:
+            overtaken_by.append(number + 1)
+    print(json.dumps([*(1e3 * np.percentile(times[20:], [50, 99])), overtaken_by]))
 
 
-def _egm_answer() -> tuple[Callable[[], float | None], Any]:
+def _egm_answer() -> tuple[Callable[[], tuple[int, float] | None], Any]:
     from ABBRobotEGM import EGM
 
     client = EGM(port=0)
     channel = client.socket
     assert channel is not None
 
-    def answer() -> float | None:
+    def answer() -> tuple[int, float] | None:
         select.select([channel], [], [])
         started = steady_time()
         ok, state = client.receive_from_robot(0.0)
         if not ok or state is None or state.header.tm == 0:
             return None
         client.send_to_robot(state.joint_angles)
-        return started
+        return state.header.seqno, started
 
     return answer, channel
 
 
-def _plain_answer() -> tuple[Callable[[], float | None], Any]:
+def _plain_answer() -> tuple[Callable[[], tuple[int, float] | None], Any]:
     channel = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
     channel.bind(("127.0.0.1", 0))
+    numbers = itertools.count(1)
 
-    def answer() -> float | None:
+    def answer() -> tuple[int, float] | None:
         select.select([channel], [], [])
         started = steady_time()
         data, sender = channel.recvfrom(65536)
         if len(data) < 10:
             return None
         channel.sendto(data, sender)
-        return started
+        return next(numbers), started
 
     return answer, channel
 
 
 def _metronome(port: int) -> None:
-    """Sends messages of a robot that stands until its input ends, then one that says stop."""
+    """Sends messages of a robot that stands until its input ends, then one that says stop.
+
+    Prints the numbers of those that left less than half a cycle after the one before.
+    """
     robot = load_robot("irb1200")
     controller, still = VirtualController(robot, EgmRunConfig()), np.zeros(6)
     os.set_blocking(sys.stdin.fileno(), False)
     with UdpChannel() as channel:
-        start, cycle = steady_time(), 0
+        start, cycle, crowded = steady_time(), 0, []
+        sent = start
         while sys.stdin.buffer.read() is None:
             cycle += 1
             data = controller.report(1.0 + cycle * PERIOD, still, still, still)
             time.sleep(max(0.0, start + cycle * PERIOD - steady_time()))
             channel.send(data, ("127.0.0.1", port))
+            before, sent = sent, steady_time()
+            if sent - before < 0.5 * PERIOD:
+                crowded.append(decode_report(data).seqno)
             channel.receive()
         # A message at the controller's time zero ends the echoes: none of its own has that.
         time.sleep(0.1)
         channel.send(b"", ("127.0.0.1", port))
+        print(json.dumps(crowded))
 
 
 def main() -> None:
