@@ -78,9 +78,20 @@ def test_the_closed_form_of_the_feedback_is_the_corrected_law():
     for _ in range(50):
         seen, V = displaced(0.4 * rng.uniform(-1.0, 1.0, 6))[:3], rng.normal(size=6)
         L = sine_error_rate_matrix(HOME[:3, :3], seen[:, :3])
-        expected = np.linalg.solve(L, L.T @ V[:3] + 7.0 * sine_pose_error(HOME[:3], seen)[:3])
-        feedback = sine_feedback(HOME[:3].tolist(), seen.tolist(), V.tolist(), 7.0, 1.0)
+        error = sine_pose_error(HOME[:3], seen)
+        expected = np.linalg.solve(L, L.T @ V[:3] + 7.0 * error[:3])
+        feedback = sine_feedback(HOME[:3].tolist(), seen.tolist(), V.tolist(), 7.0, 3.0)
         assert V[:3] + feedback[:3] == pytest.approx(expected, abs=1e-12)
+        assert feedback[3:] == pytest.approx(3.0 * error[3:], abs=1e-15)
+
+
+@pytest.mark.parametrize("angle_deg", [61.0, 90.0, 120.0])
+def test_far_from_the_wanted_orientation_the_feedback_still_turns_the_shorter_way(angle_deg: float):
+    """At 90 degrees L cannot be inverted; from 60 degrees on the sine of the angle counts alone."""
+    seen = displaced(np.array([0.0, 0.0, np.deg2rad(angle_deg), 0.0, 0.0, 0.0]))[:3]
+    feedback = sine_feedback(HOME[:3].tolist(), seen.tolist(), [1.0] * 6, 7.0, 3.0)
+    assert feedback[:3] == pytest.approx(7.0 * sine_pose_error(HOME[:3], seen)[:3], abs=1e-12)
+    assert np.linalg.norm(feedback[:3]) == pytest.approx(7.0 * np.sin(np.deg2rad(angle_deg)))
 
 
 @pytest.mark.parametrize("law", CORRECTING)

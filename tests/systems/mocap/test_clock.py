@@ -28,13 +28,13 @@ def observe(clock: CameraClock, stamps: np.ndarray, arrivals: np.ndarray) -> Non
 @pytest.mark.parametrize("jitter", JITTERS)
 @pytest.mark.parametrize("drift", [100e-6, -100e-6, 0.0])
 def test_a_minute_of_jittery_frames_gives_the_drift_and_the_place_of_a_stamp(jitter: str, drift: float):
-    """A slope of 60 second percentiles is known to 0.5 ppm, a place to 15 us; four times that is allowed."""
+    """In 25 runs the drift spread by 0.25 ppm, a place was off by 10 +- 7 us; four times that is allowed."""
     time, stamps = exposures(60.0, drift)
     arrivals = time + DELAY + JITTERS[jitter](np.random.default_rng(3), len(time))
     clock = CameraClock(ClockConfig(smallest_delay=DELAY))
     observe(clock, stamps, arrivals)
     quality = clock.quality()
-    assert quality.drift_ppm == pytest.approx(1e6 * drift, abs=2.0)
+    assert quality.drift_ppm == pytest.approx(1e6 * drift, abs=1.0)
     assert clock.station_time(int(stamps[-1])) == pytest.approx(time[-1], abs=60e-6)
     assert quality.drift_sigma_ppm < 1.0
     assert quality.offset_sigma < 30e-6
@@ -67,7 +67,10 @@ def test_the_stated_sigmas_are_those_of_repeated_runs():
 
 
 def test_frames_that_wait_in_a_pattern_do_not_look_like_a_drift():
-    """Most frames wait while a controller is answered; which ones do not shifts with the two periods."""
+    """Most frames wait while a controller is answered; which ones do not shifts with the two periods.
+
+    The tenth percentiles of the bins drift by 2.2 ppm here, the earliest frames by a tenth of that.
+    """
     time, stamps = exposures(20.0, 0.0)
     phase = (time - 1000.0) / 4.032e-3 % 1.0
     share = 0.1 + 0.05 * (time - 1000.0) / 20.0
