@@ -3,11 +3,11 @@
 from pydrake.systems.framework import Diagram, DiagramBuilder
 from pydrake.systems.primitives import Adder
 
-from diagrams.scenario import Scenario
-from robots.model import NUM_JOINTS, RobotModel
+from diagrams.scenario.scenario import Scenario
+from robots.description.model import NUM_JOINTS, RobotModel
 from systems.feedforward import FEEDFORWARDS
-from systems.guard import CommandGuard
-from systems.reference import Reference
+from systems.guard.guard import CommandGuard
+from systems.reference.reference import Reference
 from systems.servo import BLIND_LAWS, LAWS, LawConfig
 
 # Laws whose position commands start from where the motors are: the gears are wound up there already.
@@ -26,7 +26,7 @@ class Servo(Diagram):
     and to look at:
         out ``X_WE_desired``      RigidTransform
         out ``correction``        vector 6 in rad and m, rotation first
-        out ``guard_status``      counts of `systems.guard.KINDS`
+        out ``guard_status``      counts of `systems.guard.guard.KINDS`
     """
 
     def __init__(self, robot: RobotModel, scenario: Scenario, law: str) -> None:

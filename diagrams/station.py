@@ -14,16 +14,16 @@ from pydrake.systems.primitives import (
     SelectorParams,
 )
 
-from diagrams.scenario import StationConfig
-from robots.model import NUM_JOINTS, RobotModel
-from robots.plant import PlantRobot, add_robot
-from systems.camera import BLOCK, PoseCamera
-from systems.drive import Drive
-from systems.egm.motion import EgmMotion
-from systems.joint_sensor import JointSensor
-from systems.stiffening_gears import stiffening_gears
-from systems.tip_pose import TipPose
-from systems.tracking.marker_camera import MarkerCamera
+from diagrams.scenario.scenario import StationConfig
+from robots.description.model import NUM_JOINTS, RobotModel
+from robots.dynamics.plant import PlantRobot, add_robot
+from systems.cell.drive import Drive
+from systems.cell.joint_sensor import JointSensor
+from systems.cell.marker_camera import MarkerCamera
+from systems.cell.pose_camera import BLOCK, PoseCamera
+from systems.cell.stiffening_gears import stiffening_gears
+from systems.cell.tip_pose import TipPose
+from systems.link.abb.motion import EgmMotion
 
 _RUNAWAY = 10.0  # times the largest joint speed: no drive of a working simulation gets there
 

@@ -9,13 +9,13 @@ from pydrake.systems.analysis import Simulator
 from pydrake.systems.framework import DiagramBuilder
 
 from diagrams.integration import Integration
-from diagrams.packed_log import PackedLog
-from diagrams.run import start_position
-from diagrams.scenario import Scenario
+from diagrams.record.packed_log import PackedLog
+from diagrams.runs.simulation import start_position
+from diagrams.scenario.scenario import Scenario
 from diagrams.station import SimulatedStation
-from robots.model import RobotModel
-from systems.egm.controller import VirtualController
-from systems.paths import make_path
+from robots.description.model import RobotModel
+from systems.link.abb.controller import VirtualController
+from systems.reference.paths import make_path
 from systems.samples import JointSample, PoseSample
 
 CLOCK_START = 1000.0  # s, what the controller's clock shows at the start: nobody may take it for zero

@@ -5,7 +5,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from pydrake.math import RigidTransform
 
-from robots.model import NUM_JOINTS
+from robots.description.model import NUM_JOINTS
 
 
 @dataclass(frozen=True, slots=True)

@@ -16,7 +16,7 @@ import pytest
 ROOT = Path(__file__).resolve().parents[1]
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text())
 FLOORS = ["robots", "systems", "diagrams", "experiments"]  # from the ground up
-DATA = {"robots": "data", "diagrams": "scenarios"}
+DATA = {"robots": "data", "diagrams": "scenario/data"}
 
 SOURCES = sorted(path for floor in FLOORS for path in (ROOT / floor).rglob("*.py"))
 TESTS = sorted((ROOT / "tests").rglob("*.py"))

@@ -20,9 +20,9 @@ from rich import box
 from rich.console import Console
 from rich.table import Table
 
-from diagrams.log import RunLog
-from diagrams.run import Experiment
-from diagrams.scenario import Scenario, load_scenario
+from diagrams.record.log import RunLog
+from diagrams.runs.simulation import Experiment
+from diagrams.scenario.scenario import Scenario, load_scenario
 from experiments.bench.bare import BarePlant
 from experiments.bench.cameras import cameras
 from experiments.bench.feedforward import feedforward
@@ -30,16 +30,16 @@ from experiments.bench.images import images
 from experiments.bench.tracking import tracking
 from experiments.bench.wire import wire
 from experiments.report.files import write_json
-from robots.calibration.admissible import AdmissibleConfigurations
-from robots.calibration.design import design_measurements
 from robots.calibration.identification import identify
 from robots.calibration.measurements import Measurements
-from robots.error_kinematics import ErrorKinematics
-from robots.geometric_errors import GeometricErrors
-from robots.inverse_kinematics import InverseKinematics
-from robots.kinematics import Kinematics
-from robots.model import RobotModel, load_robot
-from robots.plant import add_robot
+from robots.description.geometric_errors import GeometricErrors
+from robots.description.model import RobotModel, load_robot
+from robots.dynamics.plant import add_robot
+from robots.kinematics.analytic_inverse import InverseKinematics
+from robots.kinematics.error_kinematics import ErrorKinematics
+from robots.kinematics.forward import Kinematics
+from robots.measurement_design.constraints import AdmissibleConfigurations
+from robots.measurement_design.design import design_measurements
 from systems.servo import COMPARED_LAWS
 
 REPEATS = 3

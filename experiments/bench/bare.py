@@ -11,12 +11,12 @@ from pydrake.systems.primitives import (
 )
 from pydrake.trajectories import PiecewisePolynomial
 
-from diagrams.log import RunLog
-from diagrams.run import Experiment
+from diagrams.record.log import RunLog
+from diagrams.runs.simulation import Experiment
 from diagrams.station import motor_state_selector
-from robots.model import NUM_JOINTS, RobotModel
-from robots.plant import add_robot
-from systems.drive import Drive
+from robots.description.model import NUM_JOINTS, RobotModel
+from robots.dynamics.plant import add_robot
+from systems.cell.drive import Drive
 
 
 class BarePlant:

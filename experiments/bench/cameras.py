@@ -14,9 +14,9 @@ import numpy as np
 
 from experiments.bench.tracking import Row
 from experiments.cameras.calibration import CamerasFound
-from systems.tracking.calibration.wand import CalibrationKit, SimulatedWandRun, simulate_wand_run
-from systems.tracking.calibration.wand_calibration import calibrate_with_wand
-from systems.tracking.measuring_cell import load_cell
+from systems.vision.calibration.wand import CalibrationKit, SimulatedWandRun, simulate_wand_run
+from systems.vision.calibration.wand_calibration import calibrate_with_wand
+from systems.vision.camera_rig import load_cell
 
 REQUIRED_RATIO = 1.02  # of the residual to OpenCV's
 RUNS = 8

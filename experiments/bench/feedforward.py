@@ -11,8 +11,8 @@ from pydrake.multibody.tree import MultibodyForces
 
 from experiments.feedforward.rectangle import RectangleTrial
 from experiments.feedforward.tick import median_time, tick_time
-from robots.model import RobotModel, load_robot
-from robots.plant import add_robot
+from robots.description.model import RobotModel, load_robot
+from robots.dynamics.plant import add_robot
 from systems.feedforward import FEEDFORWARDS, FeedforwardConfig
 
 ROBOT = "kr16"

@@ -12,16 +12,16 @@ import numpy as np
 
 from experiments.bench.tracking import PERIOD, PIXEL_SIGMA, Row
 from experiments.cameras.accuracy import centroid_errors
-from robots.inverse_kinematics import InverseKinematics
-from robots.model import load_robot
+from robots.description.model import load_robot
+from robots.kinematics.analytic_inverse import InverseKinematics
 from robots.pose import pose_error
-from systems.paths import ReferenceConfig, make_path
-from systems.tracking.arm_capsules import ArmCapsules
-from systems.tracking.centroids import CentroidConfig, blobs_in
-from systems.tracking.detection_body import load_body
-from systems.tracking.images import ImageConfig, ImageSource
-from systems.tracking.measuring_cell import load_cell
-from systems.tracking.tracker import Tracker, TrackerState
+from systems.cell.imaging.images import ImageConfig, ImageSource
+from systems.reference.paths import ReferenceConfig, make_path
+from systems.vision.arm_capsules import ArmCapsules
+from systems.vision.camera_rig import load_cell
+from systems.vision.centroids import CentroidConfig, blobs_in
+from systems.vision.marker_body import load_body
+from systems.vision.tracking.tracker import Tracker, TrackerState
 
 EVERY = 10  # frames of the path apart
 REQUIRED_FRAME_TIME = 10.0  # ms

@@ -15,16 +15,16 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from experiments.cameras.accuracy import Places, information, places_in_workspace, pose_covariance
-from robots.inverse_kinematics import InverseKinematics
-from robots.model import RobotModel, load_robot
+from robots.description.model import RobotModel, load_robot
+from robots.kinematics.analytic_inverse import InverseKinematics
 from robots.pose import pose_error
-from systems.paths import ReferenceConfig, make_path
-from systems.tracking.arm_capsules import ArmCapsules
-from systems.tracking.camera_model import Cameras
-from systems.tracking.detection_body import DetectionBody, load_body
-from systems.tracking.features import FeatureConfig, FeatureSource
-from systems.tracking.measuring_cell import MeasuringCell, load_cell
-from systems.tracking.tracker import TrackedPose, Tracker, TrackerState
+from systems.cell.imaging.features import FeatureConfig, FeatureSource
+from systems.reference.paths import ReferenceConfig, make_path
+from systems.vision.arm_capsules import ArmCapsules
+from systems.vision.camera_model import Cameras
+from systems.vision.camera_rig import MeasuringCell, load_cell
+from systems.vision.marker_body import DetectionBody, load_body
+from systems.vision.tracking.tracker import TrackedPose, Tracker, TrackerState
 
 PERIOD = 4e-3  # s
 PIXEL_SIGMA, MISSING, FALSE = 0.1, 0.1, 0.05

@@ -23,12 +23,12 @@ from typing import Any
 
 import numpy as np
 
-from diagrams.scenario import load_scenario
+from diagrams.scenario.scenario import load_scenario
 from experiments.station.guided import compare_on_station
-from robots.model import load_robot
-from systems.egm.channel import UdpChannel, steady_time
-from systems.egm.controller import EgmRunConfig, VirtualController
-from systems.egm.messages import decode_report
+from robots.description.model import load_robot
+from systems.link.abb.channel import UdpChannel, steady_time
+from systems.link.abb.controller import EgmRunConfig, VirtualController
+from systems.link.abb.messages import decode_report
 
 LAW = "numerical_ik"
 PERIOD = 4.032e-3  # s

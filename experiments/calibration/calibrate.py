@@ -5,21 +5,21 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from diagrams.log import RunLog
-from diagrams.measurement_run import MeasurementRecord, MeasurementRun
-from diagrams.scenario import Scenario
+from diagrams.record.log import RunLog
+from diagrams.runs.measurement import MeasurementRecord, MeasurementRun
+from diagrams.scenario.scenario import Scenario
+from experiments.cli.workers import Progress, SimulationError, in_processes
 from experiments.comparison.compare import RunJob, run_job
-from experiments.terminal.workers import Progress, SimulationError, in_processes
-from robots.calibration.admissible import AdmissibleConfigurations
-from robots.calibration.candidate_grid import SOURCE_RANGES
-from robots.calibration.design import MeasurementDesign
+from robots.calibration.identifiability import identifiable_parameters
 from robots.calibration.identification import IdentificationConfig, Identified
 from robots.calibration.measurements import SOURCE_NOISE, MeasurementNoise, Measurements
-from robots.calibration.ordering import visiting_order
 from robots.calibration.validation import ErrorStatistics, prediction_errors, statistics
-from robots.error_parameters import NUM_PARAMETERS
-from robots.identifiability import identifiable_parameters
-from robots.model import NUM_JOINTS, RobotModel
+from robots.description.error_parameters import NUM_PARAMETERS
+from robots.description.model import NUM_JOINTS, RobotModel
+from robots.measurement_design.candidate_grid import SOURCE_RANGES
+from robots.measurement_design.constraints import AdmissibleConfigurations
+from robots.measurement_design.design import MeasurementDesign
+from robots.measurement_design.visiting_order import visiting_order
 
 # The source's validation set has 125 configurations, Probst (2024) section 4.3.
 VALIDATION_COUNT = 125

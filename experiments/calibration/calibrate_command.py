@@ -8,8 +8,8 @@ from typing import Annotated, Any
 
 import typer
 
-from diagrams.log import RunLog
-from diagrams.scenario import Scenario
+from diagrams.record.log import RunLog
+from diagrams.scenario.scenario import Scenario
 from experiments.calibration.calibrate import (
     NOISES,
     VALIDATION_COUNT,
@@ -23,21 +23,21 @@ from experiments.calibration.calibrate import (
     validation_configurations,
 )
 from experiments.calibration.report import calibration_json, print_calibration, write_calibration_page
-from experiments.comparison.metrics import summary
+from experiments.cli.console import print_files, progress_bar, refusing
+from experiments.cli.json_output import human_console, json_output
+from experiments.cli.option_limits import at_least
+from experiments.cli.options import JsonOption, OutOption, RobotOption, ScenarioOption, SetOption
+from experiments.cli.prepare import Prepared, check, prepare
+from experiments.cli.staging import staged_file, staged_folder
+from experiments.metrics.run_metrics import summary
 from experiments.report.files import write_text
-from experiments.terminal.console import print_files, progress_bar, refusing
-from experiments.terminal.json_output import human_console, json_output
-from experiments.terminal.option_limits import at_least
-from experiments.terminal.options import JsonOption, OutOption, RobotOption, ScenarioOption, SetOption
-from experiments.terminal.prepare import Prepared, check, prepare
-from experiments.terminal.staging import staged_file, staged_folder
-from robots.calibration.admissible import AdmissibleConfigurations
-from robots.calibration.criteria import NAMES
-from robots.calibration.design import MeasurementDesign, design_measurements
 from robots.calibration.identification import identify
 from robots.calibration.measurement_file import RowProblem, measurement_text, read_measurements
-from robots.robot_file import robot_text
-from robots.urdf import urdf_text
+from robots.description.robot_file import robot_text
+from robots.description.urdf import urdf_text
+from robots.measurement_design.constraints import AdmissibleConfigurations
+from robots.measurement_design.criteria import NAMES
+from robots.measurement_design.design import MeasurementDesign, design_measurements
 
 
 def calibrate_command(

@@ -10,17 +10,17 @@ from typing import Annotated
 import typer
 from rich.markup import escape
 
+from experiments.cli.console import print_files, progress_bar, refusing
+from experiments.cli.json_output import human_console, json_output
+from experiments.cli.options import JsonOption, PictureOption
+from experiments.cli.staging import staged_file
 from experiments.report.files import write_text
 from experiments.report.plot_page import Section, write_plot_page
 from experiments.report.robot_plot import joints_figure, tips_figure
-from experiments.terminal.console import print_files, progress_bar, refusing
-from experiments.terminal.json_output import human_console, json_output
-from experiments.terminal.options import JsonOption, PictureOption
-from experiments.terminal.staging import staged_file
-from robots.calibration.admissible import AdmissibleConfig, AdmissibleConfigurations, View
-from robots.calibration.criteria import NAMES
-from robots.calibration.design import MeasurementDesign, design_measurements
-from robots.model import RobotModel, load_robot
+from robots.description.model import RobotModel, load_robot
+from robots.measurement_design.constraints import AdmissibleConfig, AdmissibleConfigurations, View
+from robots.measurement_design.criteria import NAMES
+from robots.measurement_design.design import MeasurementDesign, design_measurements
 
 _MEASURES = {
     "b3": "smallest eigenvalue of the information matrix, in m and rad",

@@ -12,12 +12,12 @@ from rich.markup import escape
 from rich.table import Table
 
 from experiments.calibration.calibrate import CalibrationStudy
-from experiments.comparison.metrics import path_window, pose_errors
+from experiments.metrics.run_metrics import path_window, pose_errors
 from experiments.report.plot_page import Section, html_table, write_plot_page
 from experiments.report.robot_plot import tips_figure
 from robots.calibration.measurement_file import RowProblem
 from robots.calibration.validation import ErrorStatistics, prediction_errors
-from robots.error_parameters import parameter_names
+from robots.description.error_parameters import parameter_names
 
 Problems = Sequence[tuple[str, RowProblem]]
 _AXES = ("Δx mm", "Δy mm", "Δz mm", "ρx °", "ρy °", "ρz °")

@@ -10,23 +10,23 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from diagrams.run import start_position
-from diagrams.scenario import Scenario
-from robots.calibration.admissible import AdmissibleConfigurations
-from robots.kinematics import Kinematics
-from robots.model import RobotModel
-from robots.newton_inverse import inverse_kinematics
-from systems.paths import CartesianPath
-from systems.tracking.arm_capsules import ArmCapsules
-from systems.tracking.camera_model import Cameras
-from systems.tracking.centroids import CentroidConfig, blobs_in
-from systems.tracking.detection_body import DetectionBody
-from systems.tracking.images import ImageConfig, ImageSource
-from systems.tracking.marker_images import image_shares, marker_diameters, touching
-from systems.tracking.pose_refinement import linearize, shared
-from systems.tracking.visibility import in_window, occluded
+from diagrams.runs.simulation import start_position
+from diagrams.scenario.scenario import Scenario
+from robots.description.model import RobotModel
+from robots.dynamics.newton_inverse import inverse_kinematics
+from robots.kinematics.forward import Kinematics
+from robots.measurement_design.constraints import AdmissibleConfigurations
+from systems.cell.imaging.images import ImageConfig, ImageSource
+from systems.reference.paths import CartesianPath
+from systems.vision.arm_capsules import ArmCapsules
+from systems.vision.camera_model import Cameras
+from systems.vision.centroids import CentroidConfig, blobs_in
+from systems.vision.marker_body import DetectionBody
+from systems.vision.tracking.marker_images import image_shares, marker_diameters, touching
+from systems.vision.tracking.pose_refinement import linearize, shared
+from systems.vision.visibility import in_window, occluded
 
-_LEAST_INFORMATION = 1.0  # px^2 per m^2 or rad^2, as in `systems.tracking.pose_refinement`
+_LEAST_INFORMATION = 1.0  # px^2 per m^2 or rad^2, as in `systems.vision.tracking.pose_refinement`
 _LONE = 1.1, 3.0  # diameters, and px beside, that a marker must be away from the next one to stand alone
 _NEAR = 0.25  # diameters, within which a blob is the one of a marker
 

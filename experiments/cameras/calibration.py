@@ -13,10 +13,10 @@ from rich.table import Table
 
 from experiments.cameras.plots import SCENE
 from experiments.report.plot_page import Section, html_table, write_plot_page
-from systems.tracking.calibration.camera_parameters import LENS_NAMES, NUM_LENS, change_between
-from systems.tracking.calibration.wand import CalibrationKit
-from systems.tracking.calibration.wand_calibration import WandCalibration
-from systems.tracking.camera_model import Cameras
+from systems.vision.calibration.camera_parameters import LENS_NAMES, NUM_LENS, change_between
+from systems.vision.calibration.wand import CalibrationKit
+from systems.vision.calibration.wand_calibration import WandCalibration
+from systems.vision.camera_model import Cameras
 
 HEAD = ("camera", "x mm", "y mm", "z mm", "± mm", "points", "out", "rms px", "ray mm")
 _COLOR = "#0f7cc0"

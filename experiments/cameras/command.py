@@ -19,19 +19,19 @@ from experiments.cameras.laws import study_laws
 from experiments.cameras.report import print_study, write_study_page
 from experiments.cameras.study import CamerasStudy, covariances, study_json, study_setup
 from experiments.cameras.sweeps import study_sweeps
+from experiments.cli.console import print_files, progress_bar, refusing
+from experiments.cli.json_output import human_console, json_output
+from experiments.cli.option_limits import at_least, positive
+from experiments.cli.options import JobsOption, JsonOption, ScenarioOption, SetOption
+from experiments.cli.prepare import prepare
+from experiments.cli.staging import staged_file
 from experiments.report.files import write_text
-from experiments.terminal.console import print_files, progress_bar, refusing
-from experiments.terminal.json_output import human_console, json_output
-from experiments.terminal.option_limits import at_least, positive
-from experiments.terminal.options import JobsOption, JsonOption, ScenarioOption, SetOption
-from experiments.terminal.prepare import prepare
-from experiments.terminal.staging import staged_file
-from systems.tracking.calibration.observation_file import observation_text, read_observations
-from systems.tracking.calibration.wand import CalibrationKit, SimulatedWandRun, WandRun, simulate_wand_run
-from systems.tracking.calibration.wand_calibration import calibrate_with_wand
-from systems.tracking.camera_model import Cameras
-from systems.tracking.cell_file import cell_text, with_cameras
-from systems.tracking.measuring_cell import MeasuringCell, load_cell
+from systems.vision.calibration.observation_file import observation_text, read_observations
+from systems.vision.calibration.wand import CalibrationKit, SimulatedWandRun, WandRun, simulate_wand_run
+from systems.vision.calibration.wand_calibration import calibrate_with_wand
+from systems.vision.camera_model import Cameras
+from systems.vision.camera_rig import MeasuringCell, load_cell
+from systems.vision.camera_rig_file import cell_text, with_cameras
 
 SIMULATED = "simulated"
 

@@ -4,11 +4,11 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
+from experiments.cli.prepare import prepare
+from experiments.cli.workers import Progress, in_processes
 from experiments.comparison.compare import RunJob, run_job
-from experiments.comparison.metrics import error_metrics
-from experiments.terminal.prepare import prepare
-from experiments.terminal.workers import Progress, in_processes
-from systems.camera import CAMERAS
+from experiments.metrics.run_metrics import error_metrics
+from systems.cell.pose_camera import CAMERAS
 from systems.servo import COMPARED_LAWS
 
 FRAME_RATES = (31.25, 62.5, 125.0, 250.0)  # Hz
@@ -21,7 +21,7 @@ class LawResult:
     law: str
     camera: str
     rate_hz: float
-    errors: dict[str, Any]  # `experiments.comparison.metrics.error_metrics` of the true errors
+    errors: dict[str, Any]  # `experiments.metrics.run_metrics.error_metrics` of the true errors
 
 
 def study_laws(

@@ -8,8 +8,8 @@ import plotly.graph_objects as go
 from experiments.cameras.accuracy import Places
 from experiments.cameras.sweeps import Sweep, SweepPoint
 from experiments.report.robot_plot import joint_origins
-from robots.model import RobotModel
-from systems.tracking.camera_model import Cameras
+from robots.description.model import RobotModel
+from systems.vision.camera_model import Cameras
 
 ENLARGED = 500.0  # times, of the ellipsoids
 _SIGMAS = 3.0  # from the middle of an ellipsoid to its surface

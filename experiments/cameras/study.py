@@ -16,11 +16,11 @@ from experiments.cameras.accuracy import (
 )
 from experiments.cameras.laws import LawResult
 from experiments.cameras.sweeps import SWEEPS, SweepPoint, SweepSetup
-from experiments.terminal.prepare import Prepared
-from systems.paths import make_path
-from systems.tracking.detection_body import load_body
-from systems.tracking.marker_camera import MarkerCamera
-from systems.tracking.measuring_cell import load_cell
+from experiments.cli.prepare import Prepared
+from systems.cell.marker_camera import MarkerCamera
+from systems.reference.paths import make_path
+from systems.vision.camera_rig import load_cell
+from systems.vision.marker_body import load_body
 
 PATH_PLACES, WORKSPACE_PLACES = 60, 200
 
@@ -47,7 +47,7 @@ def study_setup(prepared: Prepared) -> SweepSetup:
     Raises:
         ValueError: if a file is missing or wrong, or the path is out of reach.
     """
-    scenario, robot = prepared.scenario, prepared.drawn_robot
+    scenario, robot = prepared.scenario, prepared.nominal_robot
     markers, path = scenario.station.markers, make_path(scenario.reference)
     times = np.linspace(path.path_start, path.dwell_start, 2_000)
     speed = np.linalg.norm(path.sample(times)[1][:, 3:], axis=1).max()

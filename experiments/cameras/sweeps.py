@@ -20,12 +20,12 @@ from experiments.cameras.accuracy import (
     pose_covariance,
 )
 from experiments.cameras.variations import best_subsets, ring, with_markers, with_resolution, with_size
-from experiments.terminal.workers import Progress, in_processes
-from robots.model import RobotModel
-from systems.tracking.camera_model import Cameras
-from systems.tracking.detection_body import DetectionBody
-from systems.tracking.images import ImageConfig
-from systems.tracking.measuring_cell import MeasuringCell
+from experiments.cli.workers import Progress, in_processes
+from robots.description.model import RobotModel
+from systems.cell.imaging.images import ImageConfig
+from systems.vision.camera_model import Cameras
+from systems.vision.camera_rig import MeasuringCell
+from systems.vision.marker_body import DetectionBody
 
 RING_CAMERAS, RING_RADIUS, RING_HEIGHT = 8, 4.0, 2.0  # m
 PICTURED = 12  # poses of which pictures are taken

@@ -4,9 +4,9 @@ from dataclasses import replace
 
 import numpy as np
 
-from systems.tracking.camera_model import Cameras
-from systems.tracking.detection_body import DetectionBody
-from systems.tracking.measuring_cell import CellCamera, MeasuringCell
+from systems.vision.camera_model import Cameras
+from systems.vision.camera_rig import CellCamera, MeasuringCell
+from systems.vision.marker_body import DetectionBody
 
 
 def best_subsets(information: np.ndarray) -> list[list[int]]:

@@ -4,11 +4,11 @@ from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 
-from diagrams.log import RunLog
-from diagrams.run import run
-from diagrams.scenario import Scenario
-from experiments.terminal.workers import Progress, SimulationError, in_processes
-from robots.model import RobotModel
+from diagrams.record.log import RunLog
+from diagrams.runs.simulation import run
+from diagrams.scenario.scenario import Scenario
+from experiments.cli.workers import Progress, SimulationError, in_processes
+from robots.description.model import RobotModel
 
 # The longest job comes first, so that no core waits for it at the end.
 SLOWEST_FIRST = ("pbvs", "position_level", "numerical_ik", "open_loop")

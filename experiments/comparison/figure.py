@@ -7,8 +7,8 @@ from pathlib import Path
 
 import numpy as np
 
-from diagrams.log import RunLog
-from experiments.comparison.metrics import known_poses
+from diagrams.record.log import RunLog
+from experiments.metrics.run_metrics import known_poses
 from experiments.report.files import write_text
 from experiments.report.style import law_colors, law_title
 

@@ -4,13 +4,13 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from diagrams.log import RunLog
+from diagrams.record.log import RunLog
+from experiments.cli.prepare import Prepared
 from experiments.comparison.figure import write_figure
-from experiments.comparison.metrics import summary, timing
+from experiments.metrics.run_metrics import summary, timing
 from experiments.replay.replay import write_replay
 from experiments.report.files import write_json
 from experiments.report.report import write_report
-from experiments.terminal.prepare import Prepared
 
 RESULTS = {
     "report.html": "errors, plots and guard events; opens offline",
@@ -41,7 +41,7 @@ def write_results(folder: Path, prepared: Prepared, logs: Mapping[str, Sequence[
     write_json(folder / "timing.json", times)
     write_report(folder / "report.html", prepared.text, result, times, logs)
     write_replay(
-        folder / "replay.html", prepared.drawn_robot, first_cycles, errors=prepared.scenario.station.errors
+        folder / "replay.html", prepared.nominal_robot, first_cycles, errors=prepared.scenario.station.errors
     )
     write_figure(folder / "figure.svg", prepared.title, first_cycles)
     return result

@@ -7,6 +7,10 @@ from typing import Annotated
 import numpy as np
 import typer
 
+from experiments.cli.console import print_files, refusing
+from experiments.cli.json_output import human_console, json_output
+from experiments.cli.options import JsonOption
+from experiments.cli.staging import staged_file
 from experiments.drivetrain.figures import (
     PLAY_APPROXIMATIONS,
     THRESHOLDS,
@@ -18,10 +22,6 @@ from experiments.drivetrain.figures import (
     hysteresis_signal,
 )
 from experiments.report.plot_page import Section, html_table, write_plot_page
-from experiments.terminal.console import print_files, refusing
-from experiments.terminal.json_output import human_console, json_output
-from experiments.terminal.options import JsonOption
-from experiments.terminal.staging import staged_file
 from robots.drivetrain.hysteresis import PrandtlIshlinskii
 from robots.drivetrain.parts import PARTS
 

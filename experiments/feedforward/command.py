@@ -9,6 +9,18 @@ from rich import box
 from rich.markup import escape
 from rich.table import Table
 
+from experiments.cli.console import count, print_files, progress_bar, refusing
+from experiments.cli.json_output import human_console, json_output
+from experiments.cli.option_limits import at_least
+from experiments.cli.options import (
+    GridOption,
+    JobsOption,
+    JsonOption,
+    PayloadOption,
+    StudiedRobotOption,
+)
+from experiments.cli.staging import staged_file
+from experiments.cli.workers import usable_cores
 from experiments.feedforward.plots import TABLE_HEAD, study_verdict, table_rows, write_study_page
 from experiments.feedforward.study import (
     ANGLES_DEG,
@@ -17,19 +29,7 @@ from experiments.feedforward.study import (
     study_feedforward,
     study_json,
 )
-from experiments.terminal.console import count, print_files, progress_bar, refusing
-from experiments.terminal.json_output import human_console, json_output
-from experiments.terminal.option_limits import at_least
-from experiments.terminal.options import (
-    GridOption,
-    JobsOption,
-    JsonOption,
-    PayloadOption,
-    StudiedRobotOption,
-)
-from experiments.terminal.staging import staged_file
-from experiments.terminal.workers import usable_cores
-from robots.model import load_robot
+from robots.description.model import load_robot
 from systems.feedforward import FeedforwardConfig
 
 PAGE = "feedforward.html"

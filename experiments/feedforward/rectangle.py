@@ -5,16 +5,16 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.integrate import trapezoid
 
-from diagrams.run import run
-from diagrams.scenario import Scenario, load_scenario
-from experiments.terminal.workers import Progress
-from robots.inverse_kinematics import seen_from_base
-from robots.kinematics import Kinematics
-from robots.model import NUM_JOINTS, RobotModel
+from diagrams.runs.simulation import run
+from diagrams.scenario.scenario import Scenario, load_scenario
+from experiments.cli.workers import Progress
+from robots.description.model import NUM_JOINTS, RobotModel
+from robots.kinematics.analytic_inverse import seen_from_base
+from robots.kinematics.forward import Kinematics
 from robots.pose import zyx_from_rotation
 from systems.feedforward import FeedforwardConfig
 from systems.feedforward.arm_correction import reach
-from systems.paths import ReferenceConfig, Waypoint
+from systems.reference.paths import ReferenceConfig, Waypoint
 
 LAW = "open_loop"  # no camera: the feedforward has to do it alone
 PACE = 8.0  # 1/s^2, k_a: an edge takes a second

@@ -6,12 +6,12 @@ from typing import Any
 
 import numpy as np
 
-from diagrams.scenario import StationConfig
+from diagrams.scenario.scenario import StationConfig
+from experiments.cli.workers import Progress, SimulationError, in_processes
 from experiments.feedforward.rectangle import Deviation, RectangleTrial
 from experiments.feedforward.tick import tick_time
 from experiments.feedforward.trial import Trial
-from experiments.terminal.workers import Progress, SimulationError, in_processes
-from robots.model import RobotModel
+from robots.description.model import RobotModel
 from systems.feedforward import FEEDFORWARDS, FeedforwardConfig
 
 KINDS: tuple[str, ...] = ("rigid", "flexible_joint", "elastic_structure")

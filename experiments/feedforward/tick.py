@@ -12,7 +12,7 @@ from pydrake.systems.primitives import ConstantValueSource
 
 from experiments.feedforward.rectangle import SETTLE, RectangleTrial, rectangle_scenario
 from systems.feedforward import FEEDFORWARDS
-from systems.reference import Reference
+from systems.reference.reference import Reference
 from systems.samples import JointSample
 
 TICKS = 1000  # that are timed, along the rectangle

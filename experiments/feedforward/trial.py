@@ -11,12 +11,12 @@ from pydrake.systems.framework import Context, DiagramBuilder, DiscreteValues, E
 from scipy.integrate import trapezoid
 
 from diagrams.integration import Integration, IntegratorConfig
-from diagrams.scenario import StationConfig
+from diagrams.scenario.scenario import StationConfig
 from diagrams.station import SimulatedStation
-from experiments.terminal.workers import Progress
-from robots.model import NUM_JOINTS, RobotModel
+from experiments.cli.workers import Progress
+from robots.description.model import NUM_JOINTS, RobotModel
 from systems.feedforward import FEEDFORWARDS, FeedforwardConfig, JointReference
-from systems.paths import SineSquaredProfile
+from systems.reference.paths import SineSquaredProfile
 
 SETTLE = 0.1  # s at rest before the motion
 RINGING = 0.9  # s after the motion, T of (6.1)

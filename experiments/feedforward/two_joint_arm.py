@@ -21,7 +21,7 @@ from pydrake.multibody.tree import (
 )
 from scipy.integrate import solve_ivp
 
-from robots.elastic_structure import massless
+from robots.dynamics.elastic_structure import massless
 from systems.feedforward.sprung_deflection import SprungDeflection
 
 LENGTH, SHARE, MASS, INERTIA = 2.0, 0.2, 100.0, 10.0  # m, xi, kg, kg m^2

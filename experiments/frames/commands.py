@@ -9,24 +9,24 @@ import numpy as np
 import typer
 from pydrake.math import RigidTransform
 
+from experiments.cli.console import refusing
+from experiments.cli.json_output import human_console
+from experiments.cli.options import json_option
 from experiments.frames.tables import MM, pose_json, print_facts, print_pose, print_residuals, write_result
-from experiments.terminal.console import refusing
-from experiments.terminal.json_output import human_console
-from experiments.terminal.options import json_option
-from robots.calibration.frame_chain import FrameChain, chain_of_frames
-from robots.calibration.frame_files import ORIENTATIONS, points_of, poses_of, transform_of
-from robots.calibration.frames import three_point_frame
-from robots.calibration.hand_eye import (
+from robots.metrology.frame_chain import FrameChain, chain_of_frames
+from robots.metrology.frame_files import ORIENTATIONS, points_of, poses_of, transform_of
+from robots.metrology.frames import three_point_frame
+from robots.metrology.hand_eye import (
     ROTATION_SIGMA,
     TRANSLATION_SIGMA,
     Alignment,
     align_camera,
     align_hand_eye,
 )
-from robots.calibration.least_squares import UndeterminedError
-from robots.calibration.number_table import NumberTable, parse_table, read_table
-from robots.calibration.point_registration import register_points
-from robots.calibration.tool_centre import tool_centre
+from robots.metrology.least_squares import UndeterminedError
+from robots.metrology.number_table import NumberTable, parse_table, read_table
+from robots.metrology.point_registration import register_points
+from robots.metrology.tcp_calibration import tool_centre
 
 FilesArgument = Annotated[list[Path], typer.Argument(metavar="FILE...", show_default=False)]
 UnitOption = Annotated[str, typer.Option("--unit", metavar="mm|m", help="Unit of the lengths in the files.")]

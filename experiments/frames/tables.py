@@ -11,7 +11,7 @@ from rich.console import Console
 from rich.markup import escape
 from rich.table import Table
 
-from experiments.terminal.json_output import json_output
+from experiments.cli.json_output import json_output
 from robots.pose import zyx_from_rotation
 
 MM = 1e3  # mm in a m

@@ -11,20 +11,20 @@ from rich import box
 from rich.markup import escape
 from rich.table import Table
 
-from experiments.modes.study import SHOWN_MODES, ModalStudy, modes_json, spread, study_modes
-from experiments.modes.view import frequency_figure, show_mode, write_animation
-from experiments.report.plot_page import Section, html_table, write_plot_page
-from experiments.terminal.console import print_files, progress_bar, refusing, wait_for_interrupt
-from experiments.terminal.json_output import human_console, json_output
-from experiments.terminal.options import (
+from experiments.cli.console import print_files, progress_bar, refusing, wait_for_interrupt
+from experiments.cli.json_output import human_console, json_output
+from experiments.cli.options import (
     GridOption,
     JsonOption,
     PayloadOption,
     PictureOption,
     StudiedRobotOption,
 )
-from experiments.terminal.staging import staged_file
-from robots.model import load_robot
+from experiments.cli.staging import staged_file
+from experiments.modes.study import SHOWN_MODES, ModalStudy, modes_json, spread, study_modes
+from experiments.modes.view import frequency_figure, show_mode, write_animation
+from experiments.report.plot_page import Section, html_table, write_plot_page
+from robots.description.model import load_robot
 
 STRETCHED_HEAD = ("mode", "Hz", "damp. %", "tip", "yielding joints")
 WORKSPACE_HEAD = ("mode", "Hz", "median", "damp. %", "tip", "yielding joints")
@@ -106,8 +106,8 @@ def workspace_rows(study: ModalStudy, joints: int) -> list[list[str]]:
 def _shape(study: ModalStudy, mode: int, joints: int, everywhere: bool) -> tuple[str, str]:
     """How the tip moves most, and the joints that yield most, as many as asked for."""
     motion = next(iter(study.tip_motion(mode, everywhere)))
-    yielding = list(study.yielding(mode, everywhere).items())[:joints]
-    names = ", ".join(f"{_label(name)} {100.0 * part:.0f}%" for name, part in yielding)
+    energy_share = list(study.energy_share(mode, everywhere).items())[:joints]
+    names = ", ".join(f"{_label(name)} {100.0 * part:.0f}%" for name, part in energy_share)
     return motion, names
 
 

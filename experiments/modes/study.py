@@ -6,8 +6,8 @@ from typing import Any
 
 import numpy as np
 
-from robots.model import RobotModel
-from robots.modes import ModalAnalysis, Modes, stretched
+from robots.description.model import RobotModel
+from robots.dynamics.modes import ModalAnalysis, Modes, stretched
 
 SHOWN_MODES = 6
 # How a tool swings, for an arm whose axis 1 stands at zero: along x, y and z of the base, or about itself.
@@ -37,7 +37,7 @@ class ModalStudy:
         """Damping over the workspace, shape (n, m, shown modes)."""
         return np.array([[modes.damping_ratio[:SHOWN_MODES] for modes in row] for row in self.workspace])
 
-    def yielding(self, mode: int, everywhere: bool) -> dict[str, float]:
+    def energy_share(self, mode: int, everywhere: bool) -> dict[str, float]:
         """The share of each joint in the strain energy of a mode, the largest first.
 
         Args:
@@ -50,7 +50,8 @@ class ModalStudy:
     def tip_motion(self, mode: int, everywhere: bool) -> dict[str, float]:
         """How much the tool swings in each of `TIP_MOTIONS`, shares of its squared motion, the largest first.
 
-        A turn counts by what it moves a tip as far from the wrist as the tool is. Arguments as of `yielding`.
+        A turn counts by what it moves a tip as far from the wrist as the tool is. Arguments as of
+        `energy_share`.
         """
         hand = self.robot.joints[5].placement.translation, self.robot.tool.translation
         length = sum(float(np.linalg.norm(part)) for part in hand)
@@ -106,7 +107,7 @@ def modes_json(study: ModalStudy) -> dict[str, Any]:
             "frequency_hz": modes.frequency_hz[:SHOWN_MODES].tolist(),
             "damping_ratio": modes.damping_ratio[:SHOWN_MODES].tolist(),
             "shape": [_normed(modes, k) for k in shown],
-            "energy_share": [study.yielding(k, everywhere=False) for k in shown],
+            "energy_share": [study.energy_share(k, everywhere=False) for k in shown],
             "tip_motion": [study.tip_motion(k, everywhere=False) for k in shown],
         },
         "workspace": {
@@ -115,7 +116,7 @@ def modes_json(study: ModalStudy) -> dict[str, Any]:
             "lowest_frequency_hz": frequency[..., 0].tolist(),
             "frequency_hz": [spread(frequency[..., k]) for k in shown],
             "damping_ratio": [spread(damping[..., k]) for k in shown],
-            "energy_share": [study.yielding(k, everywhere=True) for k in shown],
+            "energy_share": [study.energy_share(k, everywhere=True) for k in shown],
             "tip_motion": [study.tip_motion(k, everywhere=True) for k in shown],
         },
     }

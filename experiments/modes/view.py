@@ -10,9 +10,9 @@ from pydrake.systems.framework import DiagramBuilder
 
 from experiments.replay.scene import FRAME_RATE, open_meshcat
 from experiments.report.files import write_text
-from robots.model import RobotModel
-from robots.modes import Modes
-from robots.plant import add_robot
+from robots.description.model import RobotModel
+from robots.dynamics.modes import Modes
+from robots.dynamics.plant import add_robot
 
 SHOWN_PERIOD = 2.0  # s; a period takes this long whatever the frequency
 _SWING = 0.06  # of the distance from axis 1 to the tip: how far the tip swings

@@ -5,10 +5,10 @@ from collections.abc import Callable
 import numpy as np
 from pydrake.math import RigidTransform, RotationMatrix
 
-from diagrams.run import Experiment
+from diagrams.runs.simulation import Experiment
 from experiments.replay.scene import FRAME_RATE, RobotPicture, draw_frame, draw_path, open_meshcat, rgba
 from experiments.report.style import WANTED_COLOR, law_colors
-from robots.model import RobotModel
+from robots.description.model import RobotModel
 
 WANTED_RADIUS, TRUE_RADIUS = 0.003, 0.0015  # m
 TRAIL_PIECE = 15  # frames after which the path so far gets longer

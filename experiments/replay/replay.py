@@ -12,13 +12,13 @@ import numpy as np
 from pydrake.geometry import MeshcatAnimation, Sphere
 from pydrake.math import RigidTransform, RotationMatrix
 
-from diagrams.log import RunLog
-from experiments.comparison.metrics import known_poses, path_window
+from diagrams.record.log import RunLog
+from experiments.metrics.run_metrics import known_poses, path_window
 from experiments.replay.scene import FRAME_RATE, RobotPicture, draw_frame, draw_path, open_meshcat, rgba
 from experiments.report.files import write_text
 from experiments.report.style import WANTED_COLOR, law_colors, law_title
-from robots.geometric_errors import GeometricErrors
-from robots.model import RobotModel
+from robots.description.geometric_errors import GeometricErrors
+from robots.description.model import RobotModel
 from robots.pose import pose_error
 
 TIP_RADIUS = 0.006  # m

@@ -18,9 +18,9 @@ from pydrake.math import RigidTransform, RotationMatrix
 from pydrake.multibody.plant import AddMultibodyPlantSceneGraph
 from pydrake.systems.framework import DiagramBuilder
 
-from robots.geometric_errors import GeometricErrors
-from robots.model import RobotModel
-from robots.plant import add_robot
+from robots.description.geometric_errors import GeometricErrors
+from robots.description.model import RobotModel
+from robots.dynamics.plant import add_robot
 
 FRAME_RATE = 30.0  # 1/s
 POINT_SPACING = 0.003  # m, along a path

@@ -6,8 +6,8 @@ from typing import Any
 
 import numpy as np
 
-from diagrams.log import RunLog
-from experiments.comparison.metrics import Comparison, judged_by, known_poses, path_window, pose_errors
+from diagrams.record.log import RunLog
+from experiments.metrics.run_metrics import Comparison, judged_by, known_poses, path_window, pose_errors
 from experiments.report.style import law_colors, law_title
 
 TRUE_SAMPLES = 2500  # per law and axis at most

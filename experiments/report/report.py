@@ -8,13 +8,13 @@ from typing import Any
 
 from plotly.offline import get_plotlyjs
 
-from experiments.comparison.metrics import Comparison, best_law, judged_by
+from experiments.cli.tables import AXES, KINDS, error_row, format_cell, is_best, smallest_of_columns
+from experiments.metrics.run_metrics import Comparison, best_law, judged_by
 from experiments.report.data import norm, plot_data
 from experiments.report.files import write_text
 from experiments.report.page import page
 from experiments.report.script import SCRIPT
 from experiments.report.style import law_colors, law_title
-from experiments.terminal.tables import AXES, KINDS, error_row, format_cell, is_best, smallest_of_columns
 
 MAGNIFICATIONS = (1, 2, 5, 10, 20, 50, 100, 200, 500)
 MAGNIFIED_SHARE = 0.25  # of the path's extent that the largest deviation may fill when the page opens

@@ -4,8 +4,8 @@ import numpy as np
 import plotly.graph_objects as go
 from pydrake.math import RigidTransform, RotationMatrix
 
-from robots.kinematics import Kinematics, rotation_about
-from robots.model import RobotModel
+from robots.description.model import RobotModel
+from robots.kinematics.forward import Kinematics, rotation_about
 
 _INK, _SOFT = "#d2691e", "#9aa5b4"
 

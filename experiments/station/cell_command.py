@@ -11,15 +11,15 @@ from typing import Annotated
 import typer
 from rich.console import Console
 
-from diagrams.cell_loop import CellLoop, CellStatistics
-from diagrams.scenario import Scenario
+from diagrams.runs.cell_loop import CellLoop, CellStatistics
+from diagrams.scenario.scenario import Scenario
+from experiments.cli.console import count, refusing
+from experiments.cli.options import RobotOption, ScenarioOption, SetOption, json_option
+from experiments.cli.prepare import prepare
+from experiments.cli.staging import staged_file
 from experiments.report.files import write_json
-from experiments.terminal.console import count, refusing
-from experiments.terminal.options import RobotOption, ScenarioOption, SetOption, json_option
-from experiments.terminal.prepare import prepare
-from experiments.terminal.staging import staged_file
-from systems.faulty_link import FaultConfig
-from systems.mocap.server import CameraServerConfig, VirtualCameraServer
+from systems.cell.network_faults import FaultConfig
+from systems.link.qualisys.server import CameraServerConfig, VirtualCameraServer
 
 
 def cell_command(
@@ -56,7 +56,7 @@ def cell_command(
         camera = stack.enter_context(VirtualCameraServer(_camera_config(prepared.scenario)))
         loop = CellLoop(
             prepared.scenario,
-            prepared.drawn_robot,
+            prepared.nominal_robot,
             (link.address, link.port),
             camera,
             (link.address, link.signal_port) if link.signal_port else None,
@@ -68,7 +68,7 @@ def cell_command(
             sys.stdout.write(json.dumps({"camera_port": camera.port}) + "\n")
             sys.stdout.flush()
         human.print(
-            f"{prepared.drawn_robot.name}: speaks EGM to UDP {link.address}:{link.port} every "
+            f"{prepared.nominal_robot.name}: speaks EGM to UDP {link.address}:{link.port} every "
             f"{1e3 * prepared.scenario.station.period:g} ms; its camera listens on TCP "
             f"{link.camera.server.address}:{camera.port}"
         )

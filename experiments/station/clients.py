@@ -11,14 +11,14 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
-from diagrams.scenario import Scenario, scenario_text
-from diagrams.station_wire import StationError
+from diagrams.hardware_link import StationError
+from diagrams.scenario.scenario import Scenario, scenario_text
 from diagrams.virtual_cell import CellRecord
-from experiments.terminal.workers import SimulationError
-from robots.model import RobotModel
-from systems.egm.client import EgmClient
-from systems.egm.signal_client import SignalClient
-from systems.mocap.receiver import MocapReceiver
+from experiments.cli.workers import SimulationError
+from robots.description.model import RobotModel
+from systems.link.abb.client import EgmClient
+from systems.link.abb.signal_client import SignalClient
+from systems.link.qualisys.receiver import MocapReceiver
 
 _PATIENCE = 30.0  # s in which a cell must have ended
 
@@ -98,7 +98,7 @@ class CellBeside:
         folder = Path(self._folder.name)
         self._truth, self._json = folder / "truth.npz", folder / "cell.json"
         (folder / "scenario.yaml").write_text(scenario_text(scenario), encoding="utf-8")
-        command = [sys.executable, "-m", "experiments.cli", "cell", "--announce"]
+        command = [sys.executable, "-m", "experiments.main", "cell", "--announce"]
         command += ["--scenario", str(folder / "scenario.yaml"), "--set", f"station.link.port={port}"]
         command += ["--set", "station.link.camera.server.port=0"]
         command += ["--set", f"station.link.signal_port={signal_port}"]

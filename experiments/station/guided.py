@@ -6,12 +6,12 @@ from typing import Any
 
 import numpy as np
 
-from diagrams.guided_run import GuidedRecord, GuidedRun
-from diagrams.log import RunLog
-from diagrams.scenario import Scenario
+from diagrams.record.log import RunLog
+from diagrams.runs.real_time import RealTimeRecord, RealTimeRun
+from diagrams.scenario.scenario import Scenario
 from diagrams.virtual_cell import CellRecord
 from experiments.station.clients import station_clients
-from robots.model import RobotModel
+from robots.description.model import RobotModel
 from systems.servo import BLIND_LAWS
 
 
@@ -19,7 +19,7 @@ from systems.servo import BLIND_LAWS
 class GuidedComparison:
     """The records of several laws on one station."""
 
-    records: dict[str, list[GuidedRecord]]
+    records: dict[str, list[RealTimeRecord]]
     cell: dict[str, Any] = field(default_factory=dict)  # how a cell of our own has run
 
     @property
@@ -55,9 +55,9 @@ def compare_on_station(
         SimulationError: if the station is not there, or a run broke off before its path began.
         ValueError: if a part refuses its configuration.
     """
-    jobs = [(law, GuidedRun(scenario, law, robot)) for law in laws for _ in range(cycles)]
+    jobs = [(law, RealTimeRun(scenario, law, robot)) for law in laws for _ in range(cycles)]
     report = progress or (lambda share: None)
-    records: dict[str, list[GuidedRecord]] = {law: [] for law in laws}
+    records: dict[str, list[RealTimeRecord]] = {law: [] for law in laws}
     needs_camera = any(law not in BLIND_LAWS for law in laws)
     with station_clients(scenario, robot, with_cell, needs_camera) as station:
         for number, (law, run) in enumerate(jobs):
@@ -76,7 +76,7 @@ def compare_on_station(
     return GuidedComparison(records, cell.statistics if cell else {})
 
 
-def with_truth(record: GuidedRecord, truth: CellRecord) -> RunLog:
+def with_truth(record: RealTimeRecord, truth: CellRecord) -> RunLog:
     """The log of a run with the truth of the cell beside it, matched by the controller's stamps."""
     stamps, ticks = record.stamps, np.arange(len(record.stamps))
     heard = np.isfinite(stamps)
@@ -87,7 +87,7 @@ def with_truth(record: GuidedRecord, truth: CellRecord) -> RunLog:
     return replace(record.log, X_WE_true=X_WE, link_position=links)
 
 
-def _link_json(record: GuidedRecord) -> dict[str, Any]:
+def _link_json(record: RealTimeRecord) -> dict[str, Any]:
     quantiles = np.percentile(record.turn_around, [50, 99, 100]) if len(record.turn_around) else [None] * 3
     clock = record.camera_clock
     drift, sigma = (clock.drift_ppm, 1e3 * clock.offset_sigma) if clock else (np.nan, np.nan)

@@ -11,13 +11,13 @@ import numpy as np
 import typer
 from rich.console import Console
 
-from diagrams.guided_run import GuidedRecord
-from diagrams.log import RunLog
+from diagrams.record.log import RunLog
+from diagrams.runs.real_time import RealTimeRecord
+from experiments.cli.console import count, progress_bar
+from experiments.cli.prepare import Prepared
+from experiments.cli.workers import SimulationError
 from experiments.report.files import write_json
 from experiments.station.guided import compare_on_station
-from experiments.terminal.console import count, progress_bar
-from experiments.terminal.prepare import Prepared
-from experiments.terminal.workers import SimulationError
 
 
 def on_station(
@@ -99,7 +99,7 @@ def guide(
     return comparison.logs
 
 
-def write_log(path: Path, record: GuidedRecord) -> None:
+def write_log(path: Path, record: RealTimeRecord) -> None:
     """Everything that a run on a station has recorded, tick by tick, as arrays with the names of `RunLog`."""
     arrays: dict[str, Any] = {
         name: value for name, value in vars(record.log).items() if isinstance(value, np.ndarray)

@@ -8,7 +8,7 @@ from scipy.interpolate import CubicSpline
 from scipy.optimize import minimize_scalar
 from scipy.signal import correlate, correlation_lags
 
-from diagrams.latency_run import LatencyRecord
+from diagrams.runs.latency import LatencyRecord
 
 _LONGEST = 0.5  # s, of a delay that is looked for
 _TRIM = 0.6  # s at both ends, where the shifted motion is not known

@@ -10,16 +10,11 @@ import typer
 from rich import box
 from rich.table import Table
 
-from diagrams.latency_run import LatencyConfig, LatencyRecord, measure_latency
-from diagrams.scenario import Scenario
-from experiments.report.files import write_text
-from experiments.report.plot_page import Section, write_plot_page
-from experiments.station.clients import station_clients
-from experiments.station.guided_command import ask_before_moving, on_station
-from experiments.station.latency import Latency, evaluate
-from experiments.terminal.console import print_files, progress_bar, refusing
-from experiments.terminal.json_output import human_console, json_output
-from experiments.terminal.options import (
+from diagrams.runs.latency import LatencyConfig, LatencyRecord, measure_latency
+from diagrams.scenario.scenario import Scenario
+from experiments.cli.console import print_files, progress_bar, refusing
+from experiments.cli.json_output import human_console, json_output
+from experiments.cli.options import (
     JsonOption,
     PictureOption,
     ScenarioOption,
@@ -27,8 +22,13 @@ from experiments.terminal.options import (
     WithCellOption,
     YesOption,
 )
-from experiments.terminal.prepare import Prepared, prepare
-from experiments.terminal.staging import staged_file
+from experiments.cli.prepare import Prepared, prepare
+from experiments.cli.staging import staged_file
+from experiments.report.files import write_text
+from experiments.report.plot_page import Section, write_plot_page
+from experiments.station.clients import station_clients
+from experiments.station.guided_command import ask_before_moving, on_station
+from experiments.station.latency import Latency, evaluate
 
 
 def latency_command(

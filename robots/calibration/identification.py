@@ -9,12 +9,12 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from scipy.stats import chi2
 
+from robots.calibration.identifiability import identifiable_parameters, unseen_parameters
 from robots.calibration.measurements import MeasurementNoise, Measurements
-from robots.compliant_kinematics import CompliantKinematics
-from robots.error_kinematics import ErrorKinematics
-from robots.error_parameters import NUM_PARAMETERS
-from robots.identifiability import identifiable_parameters, unseen_parameters
-from robots.model import NUM_JOINTS, Calibration, RobotModel
+from robots.description.error_parameters import NUM_PARAMETERS
+from robots.description.model import NUM_JOINTS, Calibration, RobotModel
+from robots.dynamics.compliant_kinematics import CompliantKinematics
+from robots.kinematics.error_kinematics import ErrorKinematics
 from robots.pose import pose_error
 
 _MOST_ITERATIONS = 30
@@ -63,7 +63,7 @@ class Identified:
         """The robot with its true geometry and its compliances, as far as they were found.
 
         Args:
-            of: the robot that was calibrated, as `robots.model.load_robot` takes it.
+            of: the robot that was calibrated, as `robots.description.model.load_robot` takes it.
         """
         robot = ErrorKinematics(self.robot).robot_with_errors(self.p)
         source = f"identified from {len(self.residuals)} measurements, {len(self.names)} parameters"
@@ -175,7 +175,7 @@ class _Problem:
             )
 
     def _visible_compliances(self) -> np.ndarray:
-        """The joints whose yielding geometric errors cannot imitate at these configurations."""
+        """The joints whose compliance geometric errors cannot imitate at these configurations."""
         zero = np.zeros(NUM_PARAMETERS)
         Theta = self._model.regressor(self._measurements.q, zero)[:, self._rows]
         geometric = Theta[..., self._indices].reshape(-1, len(self._indices))
@@ -222,8 +222,8 @@ class _Problem:
         Theta = Theta[:, self._rows]
         columns = [Theta[..., self._indices]]
         if len(self._joints):
-            yielding = self._compliance_columns(Theta[..., :NUM_JOINTS], q, p)
-            columns.append(yielding[..., self._joints])
+            by_compliance = self._compliance_columns(Theta[..., :NUM_JOINTS], q, p)
+            columns.append(by_compliance[..., self._joints])
         return residuals, np.concatenate(columns, axis=-1), self._whitening(Theta[..., :NUM_JOINTS])
 
     def _whitening(self, J: np.ndarray) -> np.ndarray:

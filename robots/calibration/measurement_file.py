@@ -16,7 +16,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from robots.calibration.measurements import Measurements
-from robots.model import NUM_JOINTS
+from robots.description.model import NUM_JOINTS
 from robots.pose import rotation_from_zyx
 
 _JOINTS = tuple(f"q{number}" for number in range(1, NUM_JOINTS + 1))

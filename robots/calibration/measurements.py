@@ -5,7 +5,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from robots.model import NUM_JOINTS
+from robots.description.model import NUM_JOINTS
 
 
 @dataclass(frozen=True)

@@ -5,8 +5,8 @@ from dataclasses import asdict, dataclass
 import numpy as np
 
 from robots.calibration.measurements import Measurements
-from robots.compliant_kinematics import controller_kinematics
-from robots.model import RobotModel
+from robots.description.model import RobotModel
+from robots.dynamics.compliant_kinematics import controller_kinematics
 from robots.pose import pose_error
 
 

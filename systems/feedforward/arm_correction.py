@@ -8,7 +8,7 @@ import math
 
 import numpy as np
 
-from robots.model import NUM_JOINTS, RobotModel
+from robots.description.model import NUM_JOINTS, RobotModel
 from robots.pose import pose_error
 from systems.feedforward.deformed_arm import DeformedArm
 

@@ -6,8 +6,8 @@ import numpy as np
 from pydrake.multibody.plant import MultibodyPlant
 from pydrake.multibody.tree import JacobianWrtVariable, MultibodyForces
 
-from robots.model import RobotModel
-from robots.plant import add_robot
+from robots.description.model import RobotModel
+from robots.dynamics.plant import add_robot
 from systems.feedforward.joint_motion import JointReference
 
 

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from robots.model import NUM_JOINTS, RobotModel
+from robots.description.model import NUM_JOINTS, RobotModel
 from systems.feedforward.arm_correction import CORRECTIONS, smoothly_limited
 from systems.feedforward.backward_differences import HISTORY, at_rest, with_newest
 from systems.feedforward.config import FeedforwardConfig

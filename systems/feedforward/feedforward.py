@@ -7,12 +7,12 @@ from pydrake.multibody.plant import MultibodyPlant
 from pydrake.multibody.tree import MultibodyForces
 from pydrake.systems.framework import Context, DiscreteValues, LeafSystem
 
-from robots.compliant_kinematics import CompliantKinematics
-from robots.inverse_kinematics import JointLimitError, UnreachableError
-from robots.kinematics import Kinematics, robust_solve
-from robots.model import NUM_JOINTS, RobotModel
-from robots.newton_inverse import inverse_kinematics
-from robots.plant import add_robot
+from robots.description.model import NUM_JOINTS, RobotModel
+from robots.dynamics.compliant_kinematics import CompliantKinematics
+from robots.dynamics.newton_inverse import inverse_kinematics
+from robots.dynamics.plant import add_robot
+from robots.kinematics.analytic_inverse import JointLimitError, UnreachableError
+from robots.kinematics.forward import Kinematics, robust_solve
 from systems.feedforward.config import FeedforwardConfig
 from systems.feedforward.joint_motion import Answer, Drive, JointReference
 from systems.feedforward.prefilter import Prefilter

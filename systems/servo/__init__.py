@@ -1,6 +1,6 @@
 """Visual-servo laws, one file each, all with the same ports."""
 
-from systems.compensation import Compensation
+from systems.servo.compensation import Compensation
 from systems.servo.law import LawConfig, ServoLaw
 from systems.servo.numerical_ik import NumericalIk
 from systems.servo.open_loop import OpenLoop

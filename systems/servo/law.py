@@ -10,13 +10,13 @@ from pydrake.common.value import Value
 from pydrake.math import RigidTransform
 from pydrake.systems.framework import Context, DiscreteValues, LeafSystem
 
-from robots.compliant_kinematics import controller_kinematics
-from robots.inverse_kinematics import JointLimitError, UnreachableError
-from robots.kinematics import robust_solve, rotation_about
-from robots.model import NUM_JOINTS, RobotModel
-from robots.newton_inverse import InverseSolver, inverse_kinematics
+from robots.description.model import NUM_JOINTS, RobotModel
+from robots.dynamics.compliant_kinematics import controller_kinematics
+from robots.dynamics.newton_inverse import InverseSolver, inverse_kinematics
+from robots.kinematics.analytic_inverse import JointLimitError, UnreachableError
+from robots.kinematics.forward import robust_solve, rotation_about
 from robots.pose import Rows, error_of_rows
-from systems.guard import GuardConfig
+from systems.guard.guard import GuardConfig
 from systems.samples import JointSample, PoseSample
 
 _ENTRY = 19  # a moment of the path: time, the rows of the 3 x 4 pose matrix, the twist
@@ -40,7 +40,7 @@ class LawConfig:
     correction_speed_limit_deg_s: float = 30.0  # of one joint, where a law corrects velocities
 
 
-class Moment(NamedTuple):
+class LawInput(NamedTuple):
     """What a law sees at one tick. Poses are the first three rows of homogeneous matrices.
 
     They are lists of floats, for which Python is quicker than numpy in so small a thing as a pose.
@@ -52,7 +52,7 @@ class Moment(NamedTuple):
     measured: tuple[Rows, Rows] | None  # wanted and seen pose at an exposure, if it may be used
 
 
-class Step(NamedTuple):
+class LawOutput(NamedTuple):
     """What a law answers: a command, its correction so far and its memory for the next tick."""
 
     position: np.ndarray  # rad
@@ -142,11 +142,11 @@ class ServoLaw(LeafSystem):
 
     memory_size = NUM_JOINTS  # how many numbers a law remembers
 
-    def _start(self, moment: Moment) -> np.ndarray:
+    def _start(self, moment: LawInput) -> np.ndarray:
         """The memory with which the law begins; where a law says nothing else, the measured positions."""
         return moment.position
 
-    def _step(self, moment: Moment, memory: np.ndarray) -> Step:
+    def _step(self, moment: LawInput, memory: np.ndarray) -> LawOutput:
         """One tick of the law."""
         raise NotImplementedError
 
@@ -167,7 +167,7 @@ class ServoLaw(LeafSystem):
         arrived = sample.valid and sample.time > newest
         # A sample serves until the next one arrives, but not for ever. How late it came does not matter.
         if arrived or (sample.valid and time - last_used <= self._guard.hold_after + 1e-9):
-            measured = self._compared(path, tick, sample, self._led_aside(context))
+            measured = self.pose_error_at_exposure(path, tick, sample, self.guard_offset(context))
             if arrived:
                 newest = sample.time
                 if measured is None:
@@ -175,7 +175,7 @@ class ServoLaw(LeafSystem):
                 else:
                     last_used = time
 
-        moment = Moment(X_WD.tolist(), V_WD.tolist(), joints.position, measured)
+        moment = LawInput(X_WD.tolist(), V_WD.tolist(), joints.position, measured)
         first_tick = math.isnan(path[(tick - 1) % len(path), 0])
         memory = self._start(moment) if first_tick else context.get_discrete_state(self._memory).value()
         try:
@@ -183,7 +183,7 @@ class ServoLaw(LeafSystem):
         except (UnreachableError, JointLimitError):
             # No command is an answer too: the guard holds the robot and counts it.
             correction = context.get_discrete_state(self._outputs[2]).value()
-            step = Step(_NO_COMMAND, _NO_COMMAND, correction, memory)
+            step = LawOutput(_NO_COMMAND, _NO_COMMAND, correction, memory)
         discrete_state.set_value(0, step.position)
         discrete_state.set_value(1, step.velocity)
         discrete_state.set_value(2, step.correction)
@@ -237,7 +237,7 @@ class ServoLaw(LeafSystem):
                 twist[3:] = 0.0, 0.0, 0.0
         return twist
 
-    def _led_aside(self, context: Context) -> tuple[np.ndarray, np.ndarray] | None:
+    def guard_offset(self, context: Context) -> tuple[np.ndarray, np.ndarray] | None:
         """Where the tool is led and where the law would have it, poses (3, 4); None if that is the same."""
         if not self._deviation.HasValue(context):
             return None
@@ -252,12 +252,12 @@ class ServoLaw(LeafSystem):
         forward = self._kinematics.forward
         return forward(led)[:3], forward(led - deviation)[:3]
 
-    def _compared(
+    def pose_error_at_exposure(
         self,
         path: np.ndarray,
         tick: int,
         sample: PoseSample,
-        led_aside: tuple[np.ndarray, np.ndarray] | None,
+        offset: tuple[np.ndarray, np.ndarray] | None,
     ) -> tuple[Rows, Rows] | None:
         """The pose that was wanted when a sample was exposed, and the pose that was seen.
 
@@ -265,7 +265,7 @@ class ServoLaw(LeafSystem):
             path: the remembered moments, a ring of rows.
             tick: the number of the newest one.
             sample: a valid sample.
-            led_aside: what `_led_aside` says of the robot; it is taken to be so at the exposure already.
+            offset: what `guard_offset` says of the robot; it is taken to be so at the exposure already.
 
         Returns:
             None if the sample is too old to compare or too far from the path to be true.
@@ -280,9 +280,9 @@ class ServoLaw(LeafSystem):
         wanted = entry[1:13].reshape(3, 4)
         passed = sample.time - float(entry[0])
         if abs(passed) > 1e-6:
-            wanted = moved_pose(wanted, passed * entry[13:])
-        if led_aside is not None:
-            wanted = _as_led(wanted, *led_aside)
+            wanted = integrate_twist(wanted, passed * entry[13:])
+        if offset is not None:
+            wanted = _shifted_by_guard(wanted, *offset)
         wanted_rows: Rows = wanted.tolist()
         seen: Rows = sample.X_WE.GetAsMatrix34().tolist()
         (a0, a1, a2, ax), (b0, b1, b2, bx), (c0, c1, c2, cx) = wanted_rows
@@ -295,7 +295,7 @@ class ServoLaw(LeafSystem):
         return wanted_rows, seen
 
 
-def _as_led(X: np.ndarray, led: np.ndarray, wished: np.ndarray) -> np.ndarray:
+def _shifted_by_guard(X: np.ndarray, led: np.ndarray, wished: np.ndarray) -> np.ndarray:
     """A pose (3, 4), displaced as the tool is that is led to one pose and not to the wished one."""
     displaced = np.empty((3, 4))
     displaced[:, :3] = led[:, :3] @ wished[:, :3].T @ X[:, :3]
@@ -303,7 +303,7 @@ def _as_led(X: np.ndarray, led: np.ndarray, wished: np.ndarray) -> np.ndarray:
     return displaced
 
 
-def moved_pose(X: np.ndarray, step: np.ndarray) -> np.ndarray:
+def integrate_twist(X: np.ndarray, step: np.ndarray) -> np.ndarray:
     """A pose (3, 4), moved by a small spatial displacement (rad, m) in world axes."""
     angle = math.sqrt(float(step[:3] @ step[:3]))
     moved = np.empty((3, 4))

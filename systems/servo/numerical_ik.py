@@ -2,9 +2,9 @@
 
 import numpy as np
 
-from robots.kinematics import robust_solve
+from robots.kinematics.forward import robust_solve
 from robots.pose import error_of_rows
-from systems.servo.law import Moment, ServoLaw, Step
+from systems.servo.law import LawInput, LawOutput, ServoLaw
 from systems.servo.sine_feedback import sine_feedback
 
 
@@ -21,10 +21,10 @@ class NumericalIk(ServoLaw):
 
     memory_size = 18
 
-    def _start(self, moment: Moment) -> np.ndarray:
+    def _start(self, moment: LawInput) -> np.ndarray:
         return np.concatenate([moment.position, moment.position, np.zeros(6)])
 
-    def _step(self, moment: Moment, memory: np.ndarray) -> Step:
+    def _step(self, moment: LawInput, memory: np.ndarray) -> LawOutput:
         q_d, q, last_velocity = memory[:6], memory[6:12], memory[12:]
         # Where both will be at this tick, to which the wanted pose and twist belong.
         halfway = 0.5 * (q + q_d) + self.period * last_velocity
@@ -42,4 +42,4 @@ class NumericalIk(ServoLaw):
         q = q + 0.5 * self.period * (velocity + last_velocity)
         following = np.empty(18)
         following[:6], following[6:12], following[12:] = halfway + rates[:, 0], q, velocity
-        return Step(q, velocity, correction, following)
+        return LawOutput(q, velocity, correction, following)

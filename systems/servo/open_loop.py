@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from systems.servo.law import Moment, ServoLaw, Step
+from systems.servo.law import LawInput, LawOutput, ServoLaw
 
 
 class OpenLoop(ServoLaw):
@@ -13,9 +13,9 @@ class OpenLoop(ServoLaw):
 
     memory_size = 18
 
-    def _start(self, moment: Moment) -> np.ndarray:
+    def _start(self, moment: LawInput) -> np.ndarray:
         return np.concatenate([moment.position, np.zeros(12)])
 
-    def _step(self, moment: Moment, memory: np.ndarray) -> Step:
+    def _step(self, moment: LawInput, memory: np.ndarray) -> LawOutput:
         joints = self._joints_at(moment.X_WD, moment.V_WD, memory)
-        return Step(joints[:6], joints[6:12], np.zeros(6), joints)
+        return LawOutput(joints[:6], joints[6:12], np.zeros(6), joints)

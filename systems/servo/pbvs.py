@@ -4,9 +4,9 @@ import math
 
 import numpy as np
 
-from robots.kinematics import robust_solve
+from robots.kinematics.forward import robust_solve
 from robots.pose import Rows, angular_velocity, error_of_rows, euler_difference, zyx_angles
-from systems.servo.law import Moment, ServoLaw, Step, refuse_jump
+from systems.servo.law import LawInput, LawOutput, ServoLaw, refuse_jump
 
 
 class Pbvs(ServoLaw):
@@ -19,7 +19,7 @@ class Pbvs(ServoLaw):
     q_d, the nominal joint positions on the path, carried on by their velocity and one Newton step a tick.
     """
 
-    def _step(self, moment: Moment, memory: np.ndarray) -> Step:
+    def _step(self, moment: LawInput, memory: np.ndarray) -> LawOutput:
         rows, J = self._kinematics.rows_and_jacobian(memory)
         # Columns that LAPACK need not copy.
         rates = robust_solve(J, np.array((error_of_rows(moment.X_WD, rows), moment.V_WD)).T)
@@ -34,7 +34,7 @@ class Pbvs(ServoLaw):
             fastest = math.radians(self.config.correction_speed_limit_deg_s)
             largest = max(map(abs, added.tolist()))
             velocity = velocity + added * min(1.0, fastest / max(largest, 1e-12))
-        return Step(moment.position + self.period * velocity, velocity, np.array(correction), q_d)
+        return LawOutput(moment.position + self.period * velocity, velocity, np.array(correction), q_d)
 
     def _feedback(self, wanted: Rows, seen: Rows) -> list[float]:
         zyx = zyx_angles(seen)

@@ -5,7 +5,7 @@ import math
 import numpy as np
 
 from robots.pose import Rows, angular_velocity, euler_difference, euler_rates, rotation_rows, zyx_angles
-from systems.servo.law import Moment, ServoLaw, Step
+from systems.servo.law import LawInput, LawOutput, ServoLaw
 
 
 class PositionLevel(ServoLaw):
@@ -22,11 +22,11 @@ class PositionLevel(ServoLaw):
 
     memory_size = 24
 
-    def _start(self, moment: Moment) -> np.ndarray:
+    def _start(self, moment: LawInput) -> np.ndarray:
         rows, _ = self._kinematics.rows_and_jacobian(moment.position)
         return np.concatenate([_euler_difference(rows, moment.X_WD), moment.position, np.zeros(12)])
 
-    def _step(self, moment: Moment, memory: np.ndarray) -> Step:
+    def _step(self, moment: LawInput, memory: np.ndarray) -> LawOutput:
         c, rate = memory[:6].tolist(), [0.0] * 6
         if moment.measured is not None:
             difference = _euler_difference(*moment.measured)
@@ -46,7 +46,7 @@ class PositionLevel(ServoLaw):
         V_WC = (*angular_velocity(zyx, zyx_rates), x + dx, y + dy, z + dz)
         joints = self._joints_at(X_WC, V_WC, memory[6:])
         correction = np.array([*angular_velocity(zyx, turn), *shift])
-        return Step(joints[:6], joints[6:12], correction, np.concatenate([c, joints]))
+        return LawOutput(joints[:6], joints[6:12], correction, np.concatenate([c, joints]))
 
     def _limited(self, correction: list[float]) -> list[float]:
         """A correction, angle and length cut to their limits."""

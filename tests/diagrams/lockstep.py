@@ -8,14 +8,14 @@ import heapq
 import itertools
 from types import SimpleNamespace
 
-from diagrams.scenario import Scenario
+from diagrams.scenario.scenario import Scenario
 from diagrams.virtual_cell import VirtualCell
-from robots.model import load_robot
-from systems.egm.controller import VirtualController
-from systems.egm.messages import Command, Mode, RobotReport
-from systems.egm.session import EgmSession
-from systems.faulty_link import FaultyLink
-from systems.mocap.clock import ClockQuality
+from robots.description.model import load_robot
+from systems.cell.network_faults import FaultyLink
+from systems.link.abb.controller import VirtualController
+from systems.link.abb.messages import Command, Mode, RobotReport
+from systems.link.abb.session import EgmSession
+from systems.link.clock import ClockQuality
 from systems.samples import PoseSample
 
 LOOK = 2e-5  # s that it takes to look for a message
@@ -48,7 +48,7 @@ class Lockstep:
         return self.time
 
     def poll(self, timeout: float = 0.0) -> RobotReport | None:
-        """As `systems.egm.client.EgmClient.poll`; time passes only here."""
+        """As `systems.link.abb.client.EgmClient.poll`; time passes only here."""
         end = self.time + max(timeout, LOOK)
         while not self._on_the_way or self._on_the_way[0][0] > end:
             if self.cell.time > end:
@@ -66,7 +66,7 @@ class Lockstep:
         return newest
 
     def reply(self, mode: Mode, command: Command) -> bool:
-        """As `systems.egm.client.EgmClient.reply`."""
+        """As `systems.link.abb.client.EgmClient.reply`."""
         data = self.session.reply(mode, command, self.time)
         if data is None:
             return False
@@ -75,9 +75,9 @@ class Lockstep:
                 heapq.heappush(self._replies, (delivery.time, next(self._order), delivery.data))
         return True
 
-    def rehearse(self) -> None:
-        """As `systems.egm.client.EgmClient.rehearse`."""
-        self.session.rehearse()
+    def warm_up(self) -> None:
+        """As `systems.link.abb.client.EgmClient.warm_up`."""
+        self.session.warm_up()
 
     def switch_motors_off(self) -> None:
         """Somebody presses the button before the first message is out."""
@@ -123,7 +123,7 @@ class Lockstep:
 
 
 class LockstepCamera:
-    """As `systems.mocap.receiver.MocapReceiver`, with a clock that is known."""
+    """As `systems.link.qualisys.receiver.MocapReceiver`, with a clock that is known."""
 
     def __init__(self, wire: Lockstep) -> None:
         self._wire = wire

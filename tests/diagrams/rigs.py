@@ -6,12 +6,12 @@ import numpy as np
 from pydrake.systems.analysis import Simulator
 from pydrake.systems.framework import DiagramBuilder
 
-from diagrams.run import Experiment, start_position
-from diagrams.scenario import Scenario, load_scenario
+from diagrams.runs.simulation import Experiment, start_position
+from diagrams.scenario.scenario import Scenario, load_scenario
 from diagrams.servo import Servo
-from robots.model import load_robot
+from robots.description.model import load_robot
 from robots.pose import pose_error
-from systems.guard import KINDS
+from systems.guard.guard import KINDS
 from systems.samples import JointSample, PoseSample
 from tests.systems.rigs import PERIOD, ValueSignal
 

@@ -9,12 +9,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from diagrams.cell_loop import CellLoop
-from diagrams.scenario import load_scenario
-from robots.model import load_robot
-from systems.egm.channel import UdpChannel
+from diagrams.runs.cell_loop import CellLoop
+from diagrams.scenario.scenario import load_scenario
+from robots.description.model import load_robot
+from systems.link.abb.channel import UdpChannel
 
-CLIENT = Path(__file__).parents[1] / "systems" / "egm" / "foreign_client.py"
+CLIENT = Path(__file__).parents[1] / "systems" / "link" / "abb" / "foreign_client.py"
 
 
 def moved_by(package: str, mode: str) -> dict:

@@ -5,9 +5,9 @@ from dataclasses import fields
 import numpy as np
 import pytest
 
-from diagrams.log import RunLog
-from diagrams.run import Experiment, run
-from robots.model import load_robot
+from diagrams.record.log import RunLog
+from diagrams.runs.simulation import Experiment, run
+from robots.description.model import load_robot
 from robots.pose import pose_error
 from tests.diagrams.rigs import LAWS, QUIET, SETTLE, scenario, true_errors
 

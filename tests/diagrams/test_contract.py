@@ -3,7 +3,7 @@
 import pytest
 from pydrake.systems.framework import Diagram, InputPortIndex, OutputPortIndex, PortDataType
 
-from diagrams.run import Experiment
+from diagrams.runs.simulation import Experiment
 from tests.diagrams.rigs import LAWS, scenario
 
 COMMANDS = {"position_command", "velocity_command"}

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from diagrams.run import Experiment
+from diagrams.runs.simulation import Experiment
 from tests.diagrams.rigs import LAWS, QUIET, scenario
 
 FAST = [

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from diagrams.run import Experiment
+from diagrams.runs.simulation import Experiment
 from systems.samples import PoseSample
 from tests.diagrams.rigs import QUIET, scenario
 from tests.systems.rigs import PERIOD

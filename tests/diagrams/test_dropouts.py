@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from pydrake.math import RigidTransform
 
-from diagrams.run import Experiment
+from diagrams.runs.simulation import Experiment
 from systems.samples import PoseSample
 from tests.diagrams.rigs import LAWS, QUIET, SETTLE, PlayedStation, scenario, true_errors
 from tests.systems.rigs import PERIOD, pose

@@ -6,13 +6,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from diagrams.log import RunLog
-from diagrams.run import Experiment, run
-from diagrams.scenario import load_scenario
-from experiments.comparison.metrics import summary
+from diagrams.record.log import RunLog
+from diagrams.runs.simulation import Experiment, run
+from diagrams.scenario.scenario import load_scenario
+from experiments.metrics.run_metrics import summary
+from robots.description.model import RobotModel, load_robot
+from robots.description.robot_file import robot_text
 from robots.drivetrain.stiffening import Stiffening
-from robots.model import RobotModel, load_robot
-from robots.robot_file import robot_text
 from systems.feedforward import FEEDFORWARDS
 from systems.feedforward.prefilter import Prefilter, PrefilterConfig
 

@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
-from diagrams.log import RunLog
-from diagrams.run import Experiment, run
-from diagrams.scenario import ScenarioError, load_scenario
-from experiments.comparison.metrics import error_metrics
+from diagrams.record.log import RunLog
+from diagrams.runs.simulation import Experiment, run
+from diagrams.scenario.scenario import ScenarioError, load_scenario
+from experiments.metrics.run_metrics import error_metrics
 
 SETTLED = [
     "reference.path=circle",

@@ -5,7 +5,7 @@ from pathlib import Path
 
 from typer.testing import CliRunner, Result
 
-from experiments.cli import app
+from experiments.main import app
 
 # A small circle in 1.8 s of simulated time.
 SHORT = [

@@ -4,9 +4,9 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from diagrams.log import GuardEvent, RunLog
-from robots.kinematics import Kinematics, robust_inverse
-from robots.model import load_robot
+from diagrams.record.log import GuardEvent, RunLog
+from robots.description.model import load_robot
+from robots.kinematics.forward import Kinematics, robust_inverse
 from robots.pose import pose_error, rotation_from_zyx
 
 LAWS = ("open_loop", "numerical_ik", "pbvs", "position_level")

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from robots.calibration.measurement_file import read_measurements
-from robots.model import load_robot
+from robots.description.model import load_robot
 from tests.experiments.browser import open_page
 from tests.experiments.commands import files, refusal, truetip
 

@@ -8,7 +8,7 @@ import pytest
 from typer.testing import Result
 
 from experiments.cameras.sweeps import SWEEPS
-from systems.tracking.measuring_cell import load_cell
+from systems.vision.camera_rig import load_cell
 from tests.experiments.browser import open_page
 from tests.experiments.commands import SHORT, files, refusal, truetip
 

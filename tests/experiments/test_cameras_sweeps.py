@@ -9,7 +9,7 @@ from experiments.cameras.accuracy import accuracy, centroid_errors, information,
 from experiments.cameras.study import covariances, study_setup
 from experiments.cameras.sweeps import SWEEPS, SweepPoint, SweepSetup
 from experiments.cameras.variations import best_subsets, ring, with_markers
-from experiments.terminal.prepare import prepare
+from experiments.cli.prepare import prepare
 
 
 @cache

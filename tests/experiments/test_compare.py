@@ -7,12 +7,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from diagrams.run import run
-from diagrams.scenario import load_scenario
+from diagrams.runs.simulation import run
+from diagrams.scenario.scenario import load_scenario
+from experiments.cli.prepare import quick
+from experiments.cli.workers import SimulationError
 from experiments.comparison.compare import compare
-from experiments.terminal.prepare import quick
-from experiments.terminal.workers import SimulationError
-from robots.model import load_robot
+from robots.description.model import load_robot
 from tests.experiments.commands import SHORT
 
 SETTINGS = [setting.removeprefix("--set=") for setting in SHORT]

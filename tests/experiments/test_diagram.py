@@ -7,8 +7,8 @@ import pytest
 from pydrake.systems.framework import Diagram
 from pydrake.systems.primitives import VectorLogSink
 
-from diagrams.run import Experiment
-from diagrams.scenario import load_scenario
+from diagrams.runs.simulation import Experiment
+from diagrams.scenario.scenario import load_scenario
 from experiments.diagram.graph import OUTSIDE, read_graph
 from experiments.diagram.layout import Layout
 from experiments.diagram.stack import stacked

@@ -19,9 +19,9 @@ from experiments.feedforward.trial import (
     motion_profile,
     references,
 )
-from robots.kinematics import Kinematics
-from robots.model import load_robot, shipped_robots
-from robots.newton_inverse import inverse_kinematics
+from robots.description.model import load_robot, shipped_robots
+from robots.dynamics.newton_inverse import inverse_kinematics
+from robots.kinematics.forward import Kinematics
 from systems.feedforward import FeedforwardConfig
 from tests.experiments.browser import open_page
 from tests.experiments.commands import files, refusal, truetip

@@ -2,10 +2,10 @@
 
 import numpy as np
 
-from diagrams.run import Experiment, run
-from diagrams.scenario import load_scenario
+from diagrams.runs.simulation import Experiment, run
+from diagrams.scenario.scenario import load_scenario
 from experiments.replay.live import LiveView, advance_live
-from robots.model import load_robot
+from robots.description.model import load_robot
 from tests.experiments.test_compare import SETTINGS, same
 
 

@@ -8,8 +8,8 @@ import pytest
 from typer.testing import Result
 
 from experiments.modes.study import SHOWN_MODES, TIP_MOTIONS
-from robots.model import load_robot
-from robots.modes import ModalAnalysis, stretched
+from robots.description.model import load_robot
+from robots.dynamics.modes import ModalAnalysis, stretched
 from tests.experiments.browser import open_page
 from tests.experiments.commands import files, refusal, truetip
 

@@ -9,12 +9,12 @@ import numpy as np
 import pytest
 from rich.console import Console
 
-from experiments.comparison.metrics import summary, timing
+from experiments.cli.tables import print_summary
+from experiments.metrics.run_metrics import summary, timing
 from experiments.replay.replay import write_replay
 from experiments.report.report import verdict, write_report
 from experiments.report.style import TITLES, law_colors, law_title
-from experiments.terminal.tables import print_summary
-from robots.model import load_robot
+from robots.description.model import load_robot
 from tests.experiments.browser import open_page, screenshot
 from tests.experiments.synthetic import comparison, displaced, make_log, rectangle
 

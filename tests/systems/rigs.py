@@ -11,10 +11,10 @@ from pydrake.systems.analysis import Simulator
 from pydrake.systems.framework import Context, Diagram, DiagramBuilder, LeafSystem
 from pydrake.systems.primitives import RandomSource
 
-from robots.kinematics import Kinematics
-from robots.model import RobotModel
-from systems.camera import BLOCK, CameraConfig
-from systems.guard import KINDS, CommandGuard, GuardConfig
+from robots.description.model import RobotModel
+from robots.kinematics.forward import Kinematics
+from systems.cell.pose_camera import BLOCK, CameraConfig
+from systems.guard.guard import KINDS, CommandGuard, GuardConfig
 from systems.samples import JointSample, PoseSample
 from systems.servo import LAWS, LawConfig
 

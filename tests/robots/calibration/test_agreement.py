@@ -9,11 +9,11 @@ from scipy.optimize import least_squares
 
 from robots.calibration.identification import identify
 from robots.calibration.measurements import SOURCE_NOISE, Measurements
-from robots.error_kinematics import ErrorKinematics
-from robots.error_parameters import NUM_PARAMETERS
-from robots.kinematics import Kinematics
-from robots.model import Placement, load_robot
-from robots.urdf import urdf_text
+from robots.description.error_parameters import NUM_PARAMETERS
+from robots.description.model import Placement, load_robot
+from robots.description.urdf import urdf_text
+from robots.kinematics.error_kinematics import ErrorKinematics
+from robots.kinematics.forward import Kinematics
 
 tools = pytest.importorskip("figaroh.calibration.calibration_tools", reason="figaroh is not installed")
 pinocchio = pytest.importorskip("pinocchio", reason="pinocchio is not installed")

@@ -7,17 +7,17 @@ import pytest
 from pydrake.multibody.plant import MultibodyPlant
 from scipy.optimize import root
 
+from robots.calibration.identifiability import identifiable_parameters
 from robots.calibration.identification import IdentificationConfig, IdentificationError, Identified, identify
 from robots.calibration.measurements import SOURCE_NOISE, Measurements
 from robots.calibration.validation import prediction_errors, statistics
-from robots.compliant_kinematics import CompliantKinematics, controller_kinematics
-from robots.error_kinematics import ErrorKinematics
-from robots.error_parameters import NUM_PARAMETERS, error_parameters
-from robots.geometric_errors import GeometricErrors
-from robots.identifiability import identifiable_parameters
-from robots.kinematics import Kinematics
-from robots.model import load_robot
-from robots.plant import add_robot
+from robots.description.error_parameters import NUM_PARAMETERS, error_parameters
+from robots.description.geometric_errors import GeometricErrors
+from robots.description.model import load_robot
+from robots.dynamics.compliant_kinematics import CompliantKinematics, controller_kinematics
+from robots.dynamics.plant import add_robot
+from robots.kinematics.error_kinematics import ErrorKinematics
+from robots.kinematics.forward import Kinematics
 from robots.pose import pose_error
 
 ROBOT = load_robot("irb1200")

@@ -14,8 +14,8 @@ from robots.calibration.measurement_file import (
     read_measurements,
 )
 from robots.calibration.measurements import Measurements
-from robots.kinematics import Kinematics
-from robots.model import load_robot
+from robots.description.model import load_robot
+from robots.kinematics.forward import Kinematics
 
 ROBOT = load_robot("irb1200")
 JOINTS = ",".join(f"q{n}_rad" for n in range(1, 7))

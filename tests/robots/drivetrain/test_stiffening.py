@@ -9,12 +9,12 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 from pydrake.multibody.plant import MultibodyPlant
 
+from robots.description.model import RobotFileError, RobotModel, load_robot
+from robots.description.robot_file import robot_text
 from robots.drivetrain.stiffening import Stiffening, gear_springs
 from robots.drivetrain.stiffness import CubicSpring, ExponentialSpring, LimitedSpring, SpringRow
-from robots.model import RobotFileError, RobotModel, load_robot
-from robots.modes import ModalAnalysis
-from robots.plant import add_robot
-from robots.robot_file import robot_text
+from robots.dynamics.modes import ModalAnalysis
+from robots.dynamics.plant import add_robot
 
 BENT = np.deg2rad([20.0, -40.0, 60.0, 40.0, 60.0, -25.0])
 CUBIC, LIMITED = CubicSpring(2e4, 2e4), LimitedSpring(2e4, 2e4, 6e4, 1e-3)

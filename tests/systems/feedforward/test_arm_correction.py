@@ -5,8 +5,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from robots.model import load_robot
-from robots.modes import stretched
+from robots.description.model import load_robot
+from robots.dynamics.modes import stretched
 from robots.pose import pose_error
 from systems.feedforward.arm_correction import CORRECTIONS, SigmoidDamping, smoothly_limited
 from systems.feedforward.deformed_arm import DeformedArm

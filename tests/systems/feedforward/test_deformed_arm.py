@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from pydrake.multibody.plant import MultibodyPlant
 
-from robots.model import load_robot
-from robots.plant import add_robot
+from robots.description.model import load_robot
+from robots.dynamics.plant import add_robot
 from systems.feedforward import JointReference
 from systems.feedforward.deformed_arm import DeformedArm
 

@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 from pydrake.multibody.plant import MultibodyPlant
 
-from robots.kinematics import Kinematics
-from robots.model import RobotModel, load_robot
-from robots.modes import stretched
-from robots.plant import add_robot
+from robots.description.model import RobotModel, load_robot
+from robots.dynamics.modes import stretched
+from robots.dynamics.plant import add_robot
+from robots.kinematics.forward import Kinematics
 from robots.pose import pose_error
 from systems.feedforward import (
     ElasticStructureFeedforward,

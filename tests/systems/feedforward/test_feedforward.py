@@ -8,8 +8,8 @@ from pydrake.multibody.plant import MultibodyPlant
 from pydrake.multibody.tree import MultibodyForces
 from scipy.integrate import solve_ivp
 
-from robots.model import load_robot
-from robots.plant import add_robot
+from robots.description.model import load_robot
+from robots.dynamics.plant import add_robot
 from systems.feedforward import (
     FEEDFORWARDS,
     FeedforwardConfig,

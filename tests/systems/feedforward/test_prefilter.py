@@ -7,7 +7,7 @@ import pytest
 from scipy.integrate import solve_ivp
 from scipy.signal import bessel, lsim
 
-from robots.model import load_robot
+from robots.description.model import load_robot
 from systems.feedforward import FEEDFORWARDS, FeedforwardConfig
 from systems.feedforward.prefilter import KINDS, Prefilter, PrefilterConfig
 

@@ -1,0 +1,258 @@
+"""Controller and camera at the other end of their wires, as one station with one clock."""
+
+import math
+from collections.abc import Callable
+
+import numpy as np
+
+from diagrams.scenario.scenario import Scenario
+from robots.description.model import NUM_JOINTS, RobotModel
+from systems.link.abb.channel import steady_time
+from systems.link.abb.client import EgmClient
+from systems.link.abb.messages import Command, Mode, RobotReport
+from systems.link.abb.session import Link
+from systems.link.abb.signal_client import SignalClient
+from systems.link.clock import CameraClock, ClockConfig
+from systems.link.qualisys.receiver import MocapReceiver
+from systems.reference.joint_mover import smooth_motion
+from systems.samples import PoseSample
+
+_APPROACH_SHARE = 0.15  # of the largest joint speeds
+_SETTLE = 0.3  # s at the start point before the path's time begins
+_ARRIVED = math.radians(0.02)  # how near the measured joints must come
+_PATIENCE, _NEARLY = 3.0, math.radians(0.5)  # s after which it is enough to come so near
+_LONGEST_APPROACH = 60.0  # s
+_APPROACH_GAIN = 2.0  # 1/s, where only speeds are sent
+_PHASE_SHARE = 0.02  # of the distance between a stamp and its tick, by which the phase follows
+_SIGNAL_AGE = 0.1  # s, beyond which signals and earlier messages say nothing of the present motion
+_SLICE = 8e-4  # s between two looks at the camera
+_REHEARSAL = 7e-4  # s before the next report is due
+_CLOSE = 3e-4  # s about the time at which it is due: a frame of the camera would delay the reply
+_WATCH = 1e-3  # s after it was due, until which one looks all the time: who sleeps wakes late and cold
+_CYCLE_TOLERANCE = 5e-3  # relative
+
+
+class StationError(RuntimeError):
+    """A station that is not there, or not the one that the scenario describes."""
+
+
+class HardwareLink:
+    """Hears the controller and the camera, and answers the controller."""
+
+    def __init__(
+        self,
+        client: EgmClient,
+        camera: MocapReceiver | None,
+        scenario: Scenario,
+        robot: RobotModel,
+        is_speed_only: bool,
+        now: Callable[[], float] = steady_time,
+        signals: SignalClient | None = None,
+    ) -> None:
+        """Takes over sockets that are open.
+
+        Args:
+            client: of the controller.
+            camera: of the camera server, None to do without.
+            scenario: which cycle and which limits the station has.
+            robot: whose speeds count on the way to the start.
+            is_speed_only: whether the controller is sent speeds without positions.
+            now: the clock of the client's arrivals, in s.
+            signals: of the controller's test signals, None where it sends none.
+        """
+        self._client, self._camera, self._now, self._signals = client, camera, now, signals
+        self._link, self._speed, self._period = scenario.station.link, robot.speed, scenario.station.period
+        self._mode = Mode.JOINT_SPEED_ONLY if is_speed_only else Mode.JOINT_SPEED
+        self.robot_clock = CameraClock(ClockConfig())
+        self.velocity = self.effort = np.zeros(NUM_JOINTS)
+        self.last: RobotReport | None = None
+        self._unlearned: tuple[float, float] | None = None  # stamp and arrival of the last report, in s
+        self.turn_around: list[float] = []  # s, from a report in to its reply out
+        self._sample = PoseSample()
+        self._phase = 0.0  # s, of the newest stamp against its tick
+        self._origin = 0.0  # s of the steady clock: samples exposed before are not of this path
+
+    @property
+    def epoch(self) -> int:
+        """Grows whenever commands must start anew."""
+        return self._client.session.epoch
+
+    @property
+    def sample(self) -> PoseSample:
+        """The newest sample of the camera; its time is of the steady clock."""
+        return self._sample
+
+    @property
+    def arrived(self) -> float:
+        """Steady time at which the newest report came, in s."""
+        return self._client.arrived
+
+    def connect(self, needs_camera: bool) -> None:
+        """Waits for the controller to follow commands, and for the camera. Raises StationError."""
+        link = self._link
+        deadline = self._now() + link.connect
+        if self.wait_until_ready(link.connect) is None:
+            address, port = self._client.channel.address
+            heard = self._client.session.link is not Link.WAITING
+            what = "the controller does not run EGM" if heard else "no message of a controller came in"
+            raise StationError(f"{what}: waited {link.connect:g} s on UDP {address}:{port}")
+        while needs_camera and self._camera is not None and not self._sample.valid:
+            if self._now() > deadline:
+                report = self._camera.report()
+                why = report.last_error or "it does not see the body"
+                raise StationError(f"no pose from the camera within {link.connect:g} s: {why}")
+            self.next_report()
+        self._check_cycle()
+
+    def _check_cycle(self) -> None:
+        """Measures the cycle on a hundred messages. Raises StationError if it is not the scenario's."""
+        first = self.next_report()
+        last, count = first, 0
+        while count < 100 and (report := self.next_report()) is not None and last is not None:
+            count, last = count + (report.seqno - last.seqno) % 2**32, report
+        if first is None or last is None or count < 100:
+            raise StationError("the controller fell silent")
+        cycle = (last.time - first.time) / count
+        if abs(cycle / self._period - 1.0) > _CYCLE_TOLERANCE:
+            raise StationError(
+                f"the controller sends every {1e3 * cycle:.3f} ms, "
+                f"station.period is {1e3 * self._period:g} ms"
+            )
+
+    def wait_until_ready(self, within: float) -> RobotReport | None:
+        """The first report of a robot that follows commands; None if it does not come in time."""
+        deadline = self._now() + within
+        while self._now() < deadline:
+            report = self.next_report(wait=min(0.2, within))
+            if report is not None and report.is_ready:
+                return report
+        return None
+
+    def next_report(
+        self, wait: float | None = None, warm_up: Callable[[], None] | None = None
+    ) -> RobotReport | None:
+        """The next report; None after a silence of ``wait``, by default the one that counts as a break.
+
+        The camera is heard while the controller is silent, so that its frames do not delay the reply.
+
+        Args:
+            wait: longest silence in s.
+            warm_up: called once, shortly before the report is expected, where a processor that has slept
+                would need twice the time for what is new to its caches.
+        """
+        now = self._now()
+        deadline = now + (self._link.break_after if wait is None else wait)
+        expected = self._client.arrived + self._period
+        is_prepared = False
+        self._learn_clock()
+        self._hear_camera()
+        while (report := self._client.poll(_pause(now, expected, deadline, is_prepared))) is None:
+            now = self._now()
+            if now >= deadline:
+                return None
+            if not -_CLOSE < now - expected < _CLOSE:
+                self._hear_camera()
+            if warm_up is not None and now >= expected - _REHEARSAL:
+                warm_up()
+                self._client.warm_up()
+                warm_up, is_prepared = None, True
+        last, self.last = self.last, report
+        self._note_motion(last, report)
+        self._unlearned = (report.time, self._client.arrived)
+        return report
+
+    def ticks_since(self, last: RobotReport) -> int:
+        """How many ticks lie between a report and the newest one.
+
+        The number follows the stamps, but the phase between stamps and ticks may drift: a controller whose
+        cycle is a few ppm off does not skip a tick for it.
+        """
+        assert self.last is not None
+        exact = (self.last.time - last.time) / self._period + self._phase
+        ticks = max(1, round(exact))
+        self._phase = (1.0 - _PHASE_SHARE) * min(0.5, max(-0.5, exact - ticks))
+        return ticks
+
+    def start_path(self) -> None:
+        """What the camera saw before now belongs to another time."""
+        self._origin = self._now()
+        self._phase = 0.0
+
+    def pose_at(self, time: float) -> PoseSample:
+        """The newest sample of the camera on the path's clock, which shows ``time`` at the newest report."""
+        sample, last = self._sample, self.last
+        assert last is not None
+        if not sample.valid or sample.time < self._origin:
+            return PoseSample()
+        # The report left when its stamp says; its own arrival has jitter.
+        reported = self.robot_clock.station_time(round(1e6 * last.time))
+        return PoseSample(time + sample.time - reported, sample.X_WE, sample.valid, sample.residual)
+
+    def send_command(self, position: np.ndarray, velocity: np.ndarray) -> None:
+        """Replies to the newest report, if it may be answered."""
+        if self._client.reply(self._mode, Command(position=position, velocity=velocity)):
+            self.turn_around.append(self._now() - self.arrived)
+
+    def approach(self, goal: np.ndarray) -> None:
+        """Moves the robot smoothly to joint positions and waits until it is there. Raises StationError."""
+        deadline = self._now() + _LONGEST_APPROACH
+        epoch, start, begin = -1, goal, 0.0
+        while self._now() < deadline:
+            report = self.next_report()
+            if report is None or not report.is_ready:
+                report = self.wait_until_ready(self._link.connect)
+                if report is None:
+                    raise StationError("the controller stopped while the robot was on its way to the start")
+            if self.epoch != epoch:
+                epoch, start, begin = self.epoch, report.position, report.time
+            position, velocity, left = smooth_motion(
+                start, goal, report.time - begin, _APPROACH_SHARE * self._speed
+            )
+            if self._mode is Mode.JOINT_SPEED_ONLY:
+                velocity = velocity + _APPROACH_GAIN * (position - report.position)
+            self.send_command(position, velocity)
+            off = float(np.abs(report.position - goal).max())
+            if left <= -_SETTLE and off < (_ARRIVED if left > -_PATIENCE else _NEARLY):
+                return
+        off = np.rad2deg(np.abs(self.last.position - goal).max()) if self.last else math.nan
+        raise StationError(f"the robot did not reach the start of the path: a joint is {off:.2f} deg away")
+
+    def _note_motion(self, last: RobotReport | None, report: RobotReport) -> None:
+        """Speeds and torques: from test signals if there are new ones, else from the messages themselves."""
+        newest = self._signals.newest if self._signals else None
+        is_new = newest is not None and not newest.time < report.time - _SIGNAL_AGE
+        if newest is not None and is_new and newest.velocity is not None:
+            self.velocity = newest.velocity
+        elif last is not None and 0.0 < report.time - last.time < _SIGNAL_AGE:
+            self.velocity = (report.position - last.position) / (report.time - last.time)
+        else:
+            self.velocity = np.zeros(NUM_JOINTS)
+        if newest is not None and is_new and newest.torque is not None:
+            self.effort = newest.torque
+        else:
+            torques = list(report.message.torqueRef.joints)
+            self.effort = np.array(torques) if len(torques) == NUM_JOINTS else np.zeros(NUM_JOINTS)
+
+    def _learn_clock(self) -> None:
+        """Tells the clock of the last report; after the reply, because it may take a while."""
+        if self._unlearned is not None:
+            stamp, arrived = self._unlearned
+            self.robot_clock.observe(round(1e6 * stamp), arrived)
+            self._unlearned = None
+
+    def _hear_camera(self) -> None:
+        if self._signals is not None:
+            self._signals.poll()
+        if self._camera is not None:
+            sample = self._camera.poll(self._now())
+            if sample is not None:
+                self._sample = sample
+
+
+def _pause(now: float, expected: float, deadline: float, is_prepared: bool) -> float:
+    """How long to sleep for a report at most, in s; not at all once everything is prepared for it."""
+    if is_prepared and now < expected + _WATCH:
+        return 0.0
+    until_rehearsal = expected - _REHEARSAL - now
+    longest = until_rehearsal if 0.0 < until_rehearsal < _SLICE else _SLICE
+    return min(longest, max(0.0, deadline - now))

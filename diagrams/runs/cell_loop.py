@@ -1,0 +1,216 @@
+"""Runs a virtual cell in real time behind the sockets of a controller and a camera."""
+
+import gc
+import heapq
+import itertools
+import time
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from diagrams.scenario.scenario import Scenario
+from diagrams.virtual_cell import Exposure, VirtualCell
+from robots.description.model import RobotModel
+from systems.cell.network_faults import FaultyLink
+from systems.link.abb.channel import Buffering, UdpChannel, steady_time
+from systems.link.abb.controller import VirtualController
+from systems.link.abb.session import Address
+from systems.link.abb.signals import ControllerSignals, SignalCodec
+from systems.link.qualisys.server import VirtualCameraServer
+
+_LATE = 1e-3  # s after which a message counts as late
+_LOST_TRACK = 0.25  # s behind after which the schedule is moved instead of being caught up with
+_SPIN = 1.5e-4  # s before an instant in which the loop does not sleep: a system wakes late by that much
+
+
+@dataclass
+class CellStatistics:
+    """How a cell has run."""
+
+    cycles: int = 0
+    late: int = 0  # messages of the robot that left more than a millisecond late
+    worst_lateness: float = 0.0  # s
+    # Stamps in s of the messages that left less than half a cycle after the one before, to catch up.
+    crowded_at: list[float] = field(default_factory=list)
+    schedule_moves: int = 0  # times at which the machine was gone for so long that the schedule moved
+    commands: int = 0  # datagrams that came in
+    camera_frames: int = 0
+    controller: dict[str, int] = field(default_factory=dict)
+    faults: dict[str, dict[str, int]] = field(default_factory=dict)
+
+    def as_dict(self) -> dict[str, Any]:
+        """For a JSON text."""
+        return dict(vars(self))
+
+
+class CellLoop:
+    """Sends what the cell says when it is due, and hears commands at the beginning of every cycle."""
+
+    def __init__(
+        self,
+        scenario: Scenario,
+        robot: RobotModel,
+        target: Address,
+        camera: VirtualCameraServer | None = None,
+        signal_target: Address | None = None,
+        address: str = "127.0.0.1",
+        with_log: bool = True,
+    ) -> None:
+        """Builds the cell and opens its sockets.
+
+        Args:
+            scenario: whose station this is, with the faults.
+            robot: as it is drawn.
+            target: where the robot's messages go.
+            camera: to whom the exposures go.
+            signal_target: where test signals go; None for none.
+            address: of the interface that commands are heard on.
+            with_log: whether the truth will be asked for.
+
+        Raises:
+            ValueError: if a part refuses its configuration or the address cannot be used.
+        """
+        config = scenario.station
+        self._faults, self._body = config.faults, config.link.camera.server.body
+        self.cell = VirtualCell(scenario, robot, with_log)
+        self.controller = VirtualController(robot, config.egm.run)
+        self.statistics = CellStatistics()
+        self._links = {
+            name: FaultyLink(config.faults, period, scenario.seed + offset)
+            for offset, (name, period) in enumerate(
+                (
+                    ("to client", config.period),
+                    ("from client", config.period),
+                    ("camera", config.camera.period),
+                )
+            )
+        }
+        self._codec = SignalCodec(config.link.signals)
+        self._target, self._signal_target, self._camera = target, signal_target, camera
+        self._channel = UdpChannel(0, address, Buffering.NEWEST)
+        self._stranger = UdpChannel(0, address)
+        self._order = itertools.count()
+        self._outbox: list[tuple[float, int, Callable[[], None]]] = []
+        self._inbox: list[tuple[float, int, bytes]] = []
+        self._is_stopped = False
+        self._frame = 0
+
+    def run(self, until: Callable[[float], bool]) -> CellStatistics:
+        """Runs in real time until ``until``, which is given the cell's time in s every cycle, says so."""
+        # A full search for garbage takes tens of milliseconds with Drake loaded.
+        gc.collect()
+        gc.freeze()
+        gc.disable()
+        try:
+            self._run(until)
+        finally:
+            gc.enable()
+            gc.unfreeze()
+        for name, link in self._links.items():
+            self.statistics.faults[name] = dict(link.counts)
+        self.statistics.controller = {
+            name: getattr(self.controller, name) for name in ("restarts", "undecodable", "late", "ignored")
+        }
+        return self.statistics
+
+    def close(self) -> None:
+        """Closes the sockets."""
+        self._channel.close()
+        self._stranger.close()
+
+    def _run(self, until: Callable[[float], bool]) -> None:
+        cell, statistics = self.cell, self.statistics
+        start = steady_time() - cell.time
+        began = start
+        self._post_report()
+        while not until(cell.time):
+            now = cell.time
+            self._hand_out(start, now - 1e-6)
+            _wait_until(start + now)
+            # A controller hears before it speaks: a reply to this cycle's message belongs to the next one.
+            self._hear(now)
+            self._hand_out(start, now)
+            before, began = began, steady_time()
+            if began - before < 0.5 * cell.period:
+                statistics.crowded_at.append(cell.stamp)
+            lateness = began - start - now
+            if lateness > _LOST_TRACK:
+                start += lateness
+                statistics.schedule_moves += 1
+            statistics.cycles += 1
+            statistics.late += lateness > _LATE
+            statistics.worst_lateness = max(statistics.worst_lateness, lateness)
+            if 0.0 <= self._faults.stop_at <= now and not self._is_stopped:
+                self._is_stopped = True
+                self.controller.stop(cell.stamp)
+            self.controller.cycle(cell.stamp, cell.planned)
+            exposures = cell.advance(self.controller)
+            self._post_report()
+            for exposure in exposures:
+                self._post_exposure(exposure)
+
+    def _hand_out(self, start: float, until: float) -> None:
+        """Sends everything that is due until an instant of the cell's time, each thing at its time."""
+        while self._outbox and self._outbox[0][0] <= until + 1e-9:
+            due, _, send = heapq.heappop(self._outbox)
+            _wait_until(start + due)
+            send()
+
+    def _hear(self, now: float) -> None:
+        for data, _ in self._channel.receive():
+            self.statistics.commands += 1
+            for delivery in self._links["from client"].pass_on(now, data):
+                if not delivery.is_foreign:
+                    heapq.heappush(self._inbox, (delivery.time, next(self._order), delivery.data))
+        while self._inbox and self._inbox[0][0] <= now:
+            data = heapq.heappop(self._inbox)[2]
+            self.controller.receive(data, self.cell.stamp, self.cell.planned)
+
+    def _post(self, due: float, send: Callable[[], Any]) -> None:
+        heapq.heappush(self._outbox, (due, next(self._order), send))
+
+    def _post_report(self) -> None:
+        """Puts the robot's message of the cell's time on its way."""
+        now, joints = self.cell.time, self.cell.joints
+        stamp = self.cell.stamp
+        report = self.controller.report(stamp, joints.position, self.cell.planned, joints.effort)
+        for delivery in self._links["to client"].pass_on(now, report):
+            channel = self._stranger if delivery.is_foreign else self._channel
+            self._post(
+                delivery.time,
+                lambda data=delivery.data, channel=channel: channel.send(data, self._target),
+            )
+        if self._signal_target is not None:
+            signals = ControllerSignals(stamp, joints.velocity, joints.effort, joints.position)
+            data, target = self._codec.encode(signals), self._signal_target
+            self._post(now, lambda: self._channel.send(data, target))
+
+    def _post_exposure(self, exposure: Exposure) -> None:
+        camera, sample = self._camera, exposure.sample
+        if camera is None or not np.isfinite(sample.time):
+            return
+        self._frame += 1
+        is_seen = sample.valid and not self._faults.is_body_lost(sample.time)
+        X_WE = sample.X_WE if is_seen else None
+        # The camera has a clock of its own, which began elsewhere and may be faster.
+        stamp = round(1e6 * sample.time * (1.0 + 1e-6 * self._faults.clock_drift_ppm)) + 5_000_000
+        number = self._frame
+
+        def publish() -> None:
+            self.statistics.camera_frames += 1
+            camera.publish(stamp, number, {self._body: X_WE}, {self._body: sample.residual})
+
+        for delivery in self._links["camera"].pass_on(exposure.published, b""):
+            if not delivery.is_foreign and delivery.data == b"":
+                self._post(delivery.time, publish)
+
+
+def _wait_until(instant: float) -> None:
+    """Sleeps, and at the end only looks at the clock."""
+    left = instant - steady_time()
+    if left > _SPIN:
+        time.sleep(left - _SPIN)
+    while steady_time() < instant:
+        pass

@@ -1,0 +1,142 @@
+"""Moves one joint of a real station back and forth and writes down when everything was said and seen."""
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from diagrams.hardware_link import HardwareLink, StationError
+from diagrams.scenario.scenario import Scenario
+from robots.description.model import NUM_JOINTS, RobotModel
+from systems.link.abb.channel import steady_time
+from systems.link.abb.client import EgmClient
+from systems.link.clock import ClockQuality
+from systems.link.qualisys.receiver import MocapReceiver
+
+_FREQUENCIES = (0.15, 0.25, 0.4)  # Hz: so slow that no filter or controller of the drives adds a millisecond
+_RISE = 1.0  # s, in which the motion begins and ends
+
+
+@dataclass
+class LatencyConfig:
+    """How a station is shaken."""
+
+    joint: int = 1
+    amplitude_deg: float = 4.0
+    duration: float = 20.0  # s
+
+
+@dataclass(frozen=True)
+class LatencyRecord:
+    """What was said and seen. Times are of the steady clock of this process, unless they say otherwise."""
+
+    stamp: np.ndarray  # (n,) s, the controller's clock of every message
+    commanded: np.ndarray  # (n,) rad, the joint as it was commanded in reply
+    measured: np.ndarray  # (n,) rad, the joint as the message has it
+    reported: np.ndarray  # (n,) when the message came, without its jitter
+    seen: np.ndarray  # (m,) when a frame of the camera came, without its jitter
+    position: np.ndarray  # (m, 3) m, of the tool
+    turn_around: np.ndarray  # (k,) s
+    robot_clock: ClockQuality
+    camera_clock: ClockQuality | None
+    counters: dict[str, int]
+
+
+def motion(config: LatencyConfig, time: float | np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Displacement in rad and speed in rad/s of the joint: three sines that rise and fall smoothly."""
+    time = np.asarray(time, dtype=float)
+    angles = np.multiply.outer(time, 2.0 * math.pi * np.array(_FREQUENCIES))
+    scale = math.radians(config.amplitude_deg) / len(_FREQUENCIES)
+    wave = scale * np.sin(angles).sum(axis=-1)
+    rate = scale * (np.cos(angles) * (2.0 * math.pi * np.array(_FREQUENCIES))).sum(axis=-1)
+    # A polynomial of fifth degree up, and down again before the end.
+    up, up_rate = _rise(time / _RISE)
+    down, down_rate = _rise((config.duration - time) / _RISE)
+    share, share_rate = up * down, (up_rate * down - up * down_rate) / _RISE
+    return share * wave, share * rate + share_rate * wave
+
+
+def _rise(s: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    s = np.clip(s, 0.0, 1.0)
+    return s**3 * (10.0 - 15.0 * s + 6.0 * s**2), 30.0 * s**2 * (1.0 - s) ** 2
+
+
+def measure_latency(
+    scenario: Scenario,
+    robot: RobotModel,
+    config: LatencyConfig,
+    client: EgmClient,
+    camera: MocapReceiver | None,
+    progress: Callable[[float], None] | None = None,
+    now: Callable[[], float] = steady_time,
+) -> LatencyRecord:
+    """Shakes a station where it stands.
+
+    Args:
+        scenario: which station.
+        robot: whose joint is moved.
+        config: how.
+        client: of the controller.
+        camera: of the camera server; its clock must be set to no delay. None to do without.
+        progress: is called now and then with the share that is done, 0 to 1.
+        now: the clock of the client's arrivals, in s.
+
+    Raises:
+        StationError: if the station is not there or falls silent.
+        ValueError: if there is no such joint, or the motion would leave its range.
+    """
+    if not 1 <= config.joint <= NUM_JOINTS:
+        raise ValueError(f"latency: joint must be 1 to {NUM_JOINTS}, got {config.joint}")
+    if not (config.duration >= 4.0 and 0.0 < config.amplitude_deg <= 20.0):
+        raise ValueError(
+            "latency: duration must be at least 4 s and amplitude_deg in (0, 20], got "
+            f"{config.duration} s and {config.amplitude_deg} deg"
+        )
+    axis = config.joint - 1
+    wire = HardwareLink(client, camera, scenario, robot, False, now)
+    wire.connect(camera is not None)
+    report = wire.last
+    assert report is not None
+    start, began = report.position.copy(), report.time
+    reach = np.array([-1.0, 1.0]) * math.radians(config.amplitude_deg) + start[axis]
+    if reach[0] < robot.lower[axis] or reach[1] > robot.upper[axis]:
+        raise ValueError(
+            f"latency: joint {config.joint} has no room to move by {config.amplitude_deg} deg here"
+        )
+    rows, frames = [], []
+    before = client.session.counters.as_dict()
+    while (time := report.time - began) < config.duration:
+        displacement, speed = motion(config, time)
+        position, velocity = start.copy(), np.zeros(NUM_JOINTS)
+        position[axis] += displacement
+        velocity[axis] = speed
+        wire.send_command(position, velocity)
+        rows.append((report.time, position[axis], report.position[axis]))
+        sample = wire.sample
+        if sample.valid and (not frames or sample.time != frames[-1][0]):
+            frames.append((sample.time, *sample.X_WE.translation()))
+        if progress and len(rows) % 50 == 0:
+            progress(time / config.duration)
+        following = wire.next_report()
+        if following is None or not following.is_ready:
+            raise StationError(
+                "the controller fell silent" if following is None else "the controller stopped"
+            )
+        report = following
+    stamp, commanded, measured = np.array(rows).T
+    reported = np.array([wire.robot_clock.station_time(round(1e6 * each)) for each in stamp])
+    seen = np.array(frames).reshape(-1, 4)
+    counters = client.session.counters.as_dict()
+    return LatencyRecord(
+        stamp,
+        commanded,
+        measured,
+        reported,
+        seen[:, 0],
+        seen[:, 1:],
+        np.array(wire.turn_around),
+        wire.robot_clock.quality(),
+        camera.report().clock if camera else None,
+        {name: number - before[name] for name, number in counters.items()},
+    )

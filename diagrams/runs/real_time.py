@@ -1,0 +1,278 @@
+"""A servo and a real station: the controller's message is the clock, one in, one tick, one out."""
+
+import gc
+import math
+import sys
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from pydrake.systems.framework import Context, Diagram, DiagramBuilder
+
+from diagrams.hardware import HardwareStation
+from diagrams.hardware_link import HardwareLink, StationError
+from diagrams.record.log import RunLog
+from diagrams.record.packed_log import PackedLog
+from diagrams.runs.simulation import guard_events, measured_along, start_position
+from diagrams.scenario.scenario import Scenario, ScenarioError
+from diagrams.servo import Servo
+from robots.description.model import NUM_JOINTS, RobotModel, load_robot
+from systems.guard.guard import KINDS
+from systems.link.abb.channel import steady_time
+from systems.link.abb.client import EgmClient
+from systems.link.abb.messages import RobotReport
+from systems.link.abb.signal_client import SignalClient
+from systems.link.clock import ClockQuality
+from systems.link.qualisys.receiver import MocapReceiver
+from systems.reference.paths import CartesianPath
+from systems.samples import JointSample, PoseSample
+from systems.servo import BLIND_LAWS, LawConfig
+
+__all__ = ["RealTimeRecord", "RealTimeRun", "StationError"]
+
+_WARM_UP = 60  # ticks
+_SWITCH = 5e-4  # s after which another thread, such as that of a progress bar, gives way
+
+
+@dataclass
+class RealTimeRecord:
+    """What a run on a real station leaves behind beside its log."""
+
+    log: RunLog
+    stamps: np.ndarray  # (n,) s, the controller's clock at each tick of the log; NaN where no message came
+    ended: str  # why: "path", or what broke off
+    counters: dict[str, int]
+    camera: dict[str, Any]
+    turn_around: np.ndarray  # (m,) s, from a message in to its reply out
+    camera_clock: ClockQuality | None
+    robot_clock: ClockQuality
+    pauses: list[tuple[float, float]] = field(default_factory=list)  # s: path time, how long it stood still
+
+
+class RealTimeRun:
+    """One law on a real station, from a smooth approach to the end of the dwell."""
+
+    def __init__(self, scenario: Scenario, law: str, robot: RobotModel | None = None) -> None:
+        """Builds the servo and warms it up, before anything is said to a robot.
+
+        Args:
+            scenario: what to do; its ``station.link`` says where the station is.
+            law: which law to use.
+            robot: as the controller knows it; None for the scenario's.
+
+        Raises:
+            ScenarioError: if the robot cannot follow the path.
+            ValueError: if a part refuses its configuration.
+        """
+        self.scenario, self.law = scenario, law
+        self.robot = robot or load_robot(scenario.robot)
+        self.period = scenario.station.period
+        if scenario.servo.feedforward.kind != "none":
+            raise ScenarioError("servo.feedforward.kind must be none on a real station: EGM takes no torques")
+        self._is_speed_only = scenario.servo.laws.get(law, LawConfig()).drive == "velocity"
+        self._uses_camera = law not in BLIND_LAWS
+        builder = DiagramBuilder()
+        self.station = builder.AddNamedSystem("station", HardwareStation())
+        self.servo = builder.AddNamedSystem("servo", Servo(self.robot, scenario, law))
+        for name in ("position_command", "velocity_command"):
+            builder.Connect(self.servo.GetOutputPort(name), self.station.GetInputPort(name))
+        for name in ("joint_sample", "pose_sample"):
+            builder.Connect(self.station.GetOutputPort(name), self.servo.GetInputPort(name))
+        ports = ("position_command", "velocity_command", "correction", "guard_status")
+        self._log = PackedLog(builder, {name: self.servo.GetOutputPort(name) for name in ports}, self.period)
+        self.diagram: Diagram = builder.Build()
+        self.diagram.set_name("truetip")
+        self.path: CartesianPath = self.servo.reference.path
+        self.start = start_position(self.robot, scenario, self.path)
+        self._warm_up()
+        self._context: Context = self.diagram.CreateDefaultContext()
+        self._scratch = self.diagram.CreateDefaultContext()
+        self._next = 0  # the tick that the context stands before
+        self._joint_rows: list[tuple[int, float, np.ndarray, np.ndarray]] = []
+        self._exposures: list[tuple[float, np.ndarray]] = []
+        self._pauses: list[tuple[float, float]] = []
+
+    def run(
+        self,
+        client: EgmClient,
+        camera: MocapReceiver | None,
+        progress: Callable[[float], None] | None = None,
+        now: Callable[[], float] = steady_time,
+        signals: SignalClient | None = None,
+    ) -> RealTimeRecord:
+        """Runs the law on the station at the other end.
+
+        Args:
+            client: of the controller.
+            camera: of the camera server; None for laws that do without.
+            progress: is called now and then with the share that is done, 0 to 1.
+            now: the clock of the client's arrivals, in s.
+            signals: of the controller's test signals, None where it sends none.
+
+        Raises:
+            StationError: if there is no controller or camera, or its cycle is not the scenario's.
+        """
+        collecting, switching = gc.isenabled(), sys.getswitchinterval()
+        # A full search for garbage takes tens of milliseconds with Drake loaded.
+        gc.collect()
+        gc.freeze()
+        gc.disable()
+        sys.setswitchinterval(_SWITCH)
+        before = client.session.counters.as_dict()
+        try:
+            wire = HardwareLink(client, camera, self.scenario, self.robot, self._is_speed_only, now, signals)
+            wire.connect(self._uses_camera)
+            wire.approach(self.start)
+            ended = self._follow(wire, progress or (lambda share: None), now)
+        finally:
+            sys.setswitchinterval(switching)
+            gc.unfreeze()
+            if collecting:
+                gc.enable()
+        counters = {name: number - before[name] for name, number in client.session.counters.as_dict().items()}
+        return self._record(counters, camera, wire, ended)
+
+    def _follow(self, wire: HardwareLink, progress: Callable[[float], None], now: Callable[[], float]) -> str:
+        """Runs the path to its end; returns why it ended."""
+        epoch, tick, shown = wire.epoch, -1, 0.0
+        end = round(self.path.duration / self.period)
+        is_seeding = False
+        last: RobotReport | None = None  # the first message of the path is its tick 0
+        wire.start_path()
+        while tick < end:
+            report = wire.next_report(warm_up=self._rehearse)
+            if report is None or not report.is_ready or wire.epoch != epoch:
+                if self.scenario.station.link.on_break == "end":
+                    return "the controller fell silent" if report is None else "the controller stopped"
+                began = now()
+                report = wire.wait_until_ready(self.scenario.station.link.resume_within)
+                if report is None:
+                    return "the controller did not come back"
+                self._pauses.append((tick * self.period, now() - began))
+                epoch, is_seeding = wire.epoch, True
+                wire.start_path()
+                tick += 1
+            else:
+                tick += wire.ticks_since(last) if last else 1
+            last = report
+            self._tick(wire, report, tick, is_running=not is_seeding)
+            is_seeding = False
+            # Telling people takes time that belongs to the next message.
+            if tick * self.period - shown > 0.5:
+                shown = tick * self.period
+                progress(min(1.0, tick / end))
+        return "path"
+
+    def _tick(self, wire: HardwareLink, report: RobotReport, tick: int, is_running: bool) -> None:
+        """One message in, one tick, one reply out."""
+        for _ in range(self._next, tick):  # those whose message did not come
+            self._update(self._context)
+            self._stand_before_next()
+        time = tick * self.period
+        sample = wire.pose_at(time)
+        joints = JointSample(time, report.position, wire.velocity, wire.effort, is_running)
+        self.station.receive(self._context, joints, sample)
+        if not self._joint_rows:
+            self.diagram.ForcedPublish(self._context)  # here, where the log finds samples to begin with
+        self._update(self._context)
+        wire.send_command(*self.station.command(self._context))
+        self._stand_before_next()
+        self._joint_rows.append((tick, report.time, report.position, wire.effort))
+        if sample.valid and (not self._exposures or sample.time > self._exposures[-1][0]):
+            self._exposures.append((sample.time, sample.X_WE.GetAsMatrix4()))
+
+    def _update(self, context: Context) -> None:
+        """Everything that the servo does at a tick."""
+        context.SetDiscreteState(self.diagram.EvalUniquePeriodicDiscreteUpdate(context))
+
+    def _stand_before_next(self) -> None:
+        """Nothing happens between two ticks, so the time of the next one may begin right after the reply."""
+        self._next += 1
+        self._context.SetTime(self._next * self.period)
+        self.diagram.ForcedPublish(self._context)  # logs what stands before the tick, as a simulation does
+
+    def _warm_up(self) -> None:
+        """Computes ticks on a context that is thrown away, so that the first reply is no slower."""
+        context = self.diagram.CreateDefaultContext()
+        X_WE = self.servo.reference.GetOutputPort("X_WE_desired").Eval(
+            self.servo.reference.GetMyContextFromRoot(context)
+        )
+        zero = np.zeros(NUM_JOINTS)
+        for tick in range(_WARM_UP):
+            time = tick * self.period
+            context.SetTime(time)
+            self.station.receive(
+                context, JointSample(time, self.start, zero, zero, True), PoseSample(time, X_WE, True)
+            )
+            self._update(context)
+            self.station.command(context)
+            self.diagram.ForcedPublish(context)
+
+    def _rehearse(self) -> None:
+        """Computes the next tick beforehand with the last samples, and forgets it.
+
+        What it needs is then in the caches of the processor, and what depends on time alone in those of the
+        context.
+        """
+        self._scratch.SetDiscreteState(self.diagram.EvalUniquePeriodicDiscreteUpdate(self._context))
+        self.station.command(self._scratch)
+
+    def _record(
+        self, counters: dict[str, int], camera: MocapReceiver | None, wire: HardwareLink, ended: str
+    ) -> RealTimeRecord:
+        times, data = self._log.read(self._context)
+        n = len(times)
+        positions, efforts = np.full((n, NUM_JOINTS), np.nan), np.full((n, NUM_JOINTS), np.nan)
+        stamps = np.full(n, np.nan)
+        ticks = np.round(times / self.period).astype(int)
+        row_of = {int(tick): row for row, tick in enumerate(ticks)}
+        for tick, stamp, position, effort in self._joint_rows:
+            row = row_of.get(tick)
+            if row is not None:
+                stamps[row], positions[row], efforts[row] = stamp, position, effort
+        _fill_gaps(positions)
+        _fill_gaps(efforts)
+        exposure_times = np.array([time for time, _ in self._exposures])
+        poses = np.array([X for _, X in self._exposures]).reshape(-1, 4, 4)
+        counts = np.round(data["guard_status"]).astype(int)
+        unknown = np.full((n, 4, 4), np.nan)
+        log = RunLog(
+            law=self.law,
+            seed=self.scenario.seed,
+            time=times,
+            X_WE_desired=self.path.sample(times)[0],
+            X_WE_true=unknown,
+            X_WE_measured=measured_along(self.path, times, exposure_times, poses),
+            joint_position=positions,
+            joint_effort=efforts,
+            link_position=positions,
+            position_command=data["position_command"],
+            velocity_command=data["velocity_command"],
+            correction=data["correction"],
+            guard_counts=dict(zip(KINDS, counts[-1].tolist(), strict=True)),
+            guard_events=guard_events(times, counts),
+            path_start=self.path.path_start,
+            dwell_start=self.path.dwell_start,
+            path_end=self.path.duration,
+            wall_time=float(times[-1]) if n else 0.0,
+        )
+        report = camera.report() if camera else None
+        return RealTimeRecord(
+            log=log,
+            stamps=stamps,
+            ended=ended,
+            counters=counters,
+            camera={**vars(report.wire), **vars(report.samples)} if report else {},
+            turn_around=np.array(wire.turn_around),
+            camera_clock=report.clock if report else None,
+            robot_clock=wire.robot_clock.quality(),
+            pauses=self._pauses,
+        )
+
+
+def _fill_gaps(rows: np.ndarray) -> None:
+    """Where no message came, the last one stands; in place."""
+    for index in range(1, len(rows)):
+        if math.isnan(rows[index, 0]):
+            rows[index] = rows[index - 1]

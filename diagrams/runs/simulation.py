@@ -1,0 +1,225 @@
+"""Joins a station and a servo, advances them, and keeps the record."""
+
+import gc
+import time
+from collections.abc import Callable
+
+import numpy as np
+from pydrake.systems.analysis import Simulator
+from pydrake.systems.framework import DiagramBuilder
+
+from diagrams.integration import Integration
+from diagrams.record.log import GuardEvent, RunLog
+from diagrams.record.packed_log import PackedLog
+from diagrams.scenario.scenario import Scenario, ScenarioError
+from diagrams.servo import Servo
+from diagrams.station import SimulatedStation
+from robots.description.model import RobotModel, load_robot
+from robots.dynamics.newton_inverse import inverse_kinematics
+from systems.guard.guard import KINDS
+from systems.reference.paths import CartesianPath
+from systems.servo import LawConfig
+
+_CHUNK = 0.2  # s of simulated time between two reports of progress
+
+
+def run(
+    scenario: Scenario,
+    law: str,
+    robot: RobotModel | None = None,
+    seed: int | None = None,
+    progress: Callable[[float], None] | None = None,
+) -> RunLog:
+    """Runs one law through a scenario, from rest at the start of the path to the end of the dwell.
+
+    Args:
+        scenario: what to do.
+        law: which law to use.
+        robot: the robot as the controller knows it; None for the one that the scenario names. Unless it is a
+            calibrated one, the true robot is made from it too.
+        seed: of the camera's noise; None for the scenario's.
+        progress: is called now and then with the share that is done, 0 to 1.
+
+    Raises:
+        ScenarioError: if the nominal robot cannot follow the path.
+        ValueError: if a part refuses its configuration.
+    """
+    experiment = Experiment(scenario, law, robot, seed)
+    experiment.advance(progress=progress)
+    return experiment.log()
+
+
+class Experiment:
+    """A station under a servo, ready to be advanced."""
+
+    def __init__(
+        self, scenario: Scenario, law: str, robot: RobotModel | None = None, seed: int | None = None
+    ) -> None:
+        """Builds the diagram and puts everything at rest at the start. Raises what `run` raises."""
+        self.scenario, self.law = scenario, law
+        self.seed = scenario.seed if seed is None else seed
+        drawn = nominal_robot(scenario, robot)
+        robot = robot or drawn
+        builder = DiagramBuilder()
+        drive = scenario.servo.laws.get(law, LawConfig()).drive
+        has_torque = scenario.servo.feedforward.kind != "none"
+        self.station = builder.AddNamedSystem(
+            "station", SimulatedStation(drawn, scenario.station, drive, takes_torque=has_torque)
+        )
+        self.servo = builder.AddNamedSystem("servo", Servo(robot, scenario, law))
+        for name in ("position_command", "velocity_command", "torque_feedforward"):
+            if self.station.HasInputPort(name):
+                builder.Connect(self.servo.GetOutputPort(name), self.station.GetInputPort(name))
+        for name in ("joint_sample", "pose_sample"):
+            builder.Connect(self.station.GetOutputPort(name), self.servo.GetInputPort(name))
+        shown = ("position_command", "velocity_command", "correction", "guard_status")
+        ports = {name: self.servo.GetOutputPort(name) for name in shown}
+        ports |= {name: self.station.GetOutputPort(name) for name in self.station.LOGGED}
+        # In one log: what stands in a diagram costs time at every step of the integrator.
+        self._log = PackedLog(builder, ports, scenario.station.period)
+        self.diagram = builder.Build()
+        self.diagram.set_name("truetip")
+        self.path = self.servo.reference.path
+        self.simulator = Simulator(self.diagram)
+        self.context = self.simulator.get_mutable_context()
+        self.station.set_at_rest(self.context, start_position(robot, scenario, self.path), self.seed)
+        rate = self.station.fastest_rate(self.context)
+        self.integration = Integration(scenario.integrator, scenario.station.period, rate)
+        self.integration.initialize(self.simulator)
+        self._wall_time = 0.0
+
+    def advance(self, until: float | None = None, progress: Callable[[float], None] | None = None) -> None:
+        """Advances to a time in s, or to the end of the path."""
+        end = self.path.duration if until is None else until
+        # Chunks that end on a tick cost nothing: the integrator stops there anyway.
+        ticks = max(1, round(_CHUNK / self.scenario.station.period))
+        started = time.perf_counter()
+        # No cycles of objects arise in a run, but a full search for them takes 40 ms with Drake loaded.
+        collecting = gc.isenabled()
+        gc.disable()
+        try:
+            self._advance(end, ticks, progress)
+        finally:
+            if collecting:
+                gc.enable()
+        self._wall_time += time.perf_counter() - started
+
+    def _advance(self, end: float, ticks: int, progress: Callable[[float], None] | None) -> None:
+        done = round(self.context.get_time() / self.scenario.station.period)
+        while self.context.get_time() < end:
+            done += ticks
+            self.integration.advance(self.simulator, min(end, done * self.scenario.station.period))
+            if progress:
+                progress(self.context.get_time() / end)
+
+    def log(self) -> RunLog:
+        """The record of what has happened so far."""
+        times, data = self._log.read(self.context)
+        record = self.station.record(times, data)
+        counts = np.round(data["guard_status"]).astype(int)
+        return RunLog(
+            law=self.law,
+            seed=self.seed,
+            time=record.time,
+            X_WE_desired=self.path.sample(record.time)[0],
+            X_WE_true=record.X_WE_true,
+            X_WE_measured=measured_along(self.path, record.time, record.exposure_time, record.X_WE_measured),
+            joint_position=record.joint_position,
+            joint_effort=record.joint_effort,
+            link_position=record.link_position,
+            position_command=data["position_command"],
+            velocity_command=data["velocity_command"],
+            correction=data["correction"],
+            guard_counts=dict(zip(KINDS, counts[-1].tolist(), strict=True)),
+            guard_events=guard_events(record.time, counts),
+            path_start=self.path.path_start,
+            dwell_start=self.path.dwell_start,
+            path_end=self.path.duration,
+            wall_time=self._wall_time,
+        )
+
+
+def measured_along(
+    path: CartesianPath, times: np.ndarray, exposure_times: np.ndarray, X_WE: np.ndarray
+) -> np.ndarray:
+    """Measured poses at the times of a log, NaN where there is none, shape (n, 4, 4).
+
+    A pose that was exposed between two times of the log is carried along the path to the nearest one, so
+    that its difference from the wanted pose stays what it was.
+    """
+    poses = np.full((len(times), 4, 4), np.nan)
+    if not len(times) or not len(exposure_times):
+        return poses
+    half = 0.5 * float(np.median(np.diff(times))) if len(times) > 1 else 0.0
+    nearest = np.clip(np.searchsorted(times, exposure_times - half - 1e-9), 0, len(times) - 1)
+    kept = np.abs(times[nearest] - exposure_times) <= half + 1e-9
+    wanted_then, wanted_now = path.sample(exposure_times[kept])[0], path.sample(times[nearest[kept]])[0]
+    seen, now = X_WE[kept], nearest[kept]
+    is_same = np.abs(times[now] - exposure_times[kept]) < 1e-9
+    shift = wanted_now[:, :3, :3] @ wanted_then[:, :3, :3].swapaxes(1, 2)
+    poses[now] = seen
+    moved = now[~is_same]
+    poses[moved, :3, :3] = (shift @ seen[:, :3, :3])[~is_same]
+    poses[moved, :3, 3] = (seen[:, :3, 3] + wanted_now[:, :3, 3] - wanted_then[:, :3, 3])[~is_same]
+    return poses
+
+
+def nominal_robot(scenario: Scenario, robot: RobotModel | None) -> RobotModel:
+    """The robot as it is drawn, from which the true one differs by the station's errors.
+
+    Args:
+        scenario: names it.
+        robot: what the controller knows; a calibrated robot knows the errors, any other one is as drawn.
+
+    Raises:
+        ScenarioError: if the calibrated robot is not the scenario's.
+    """
+    if robot is not None and not robot.calibration.of:
+        return robot
+    if robot is not None and robot.calibration.of != scenario.robot:
+        raise ScenarioError(
+            f"{robot.name} was calibrated on '{robot.calibration.of}', the scenario has '{scenario.robot}'"
+        )
+    return load_robot(scenario.robot)
+
+
+def start_position(robot: RobotModel, scenario: Scenario, path: CartesianPath) -> np.ndarray:
+    """Motor positions in rad at which the robot, as the controller knows it, is off by the initial error.
+
+    The whole path is tried first, so that an unreachable one is refused before anything moves.
+
+    Raises:
+        ScenarioError: if the start or the path is out of reach.
+    """
+    inverse = inverse_kinematics(robot, scenario.station.payload)
+    home = np.deg2rad(scenario.home_deg)
+    times = np.arange(0.0, path.duration, 4e-3)
+    try:
+        q_path = inverse.along(path.sample(times)[0], home)
+        X_WE = path.sample(0.0)[0].copy()
+        # The error is wanted minus true.
+        X_WE[:3, 3] -= 1e-3 * scenario.initial_error_mm
+        return inverse.nearest(X_WE, q_path[0])
+    except ValueError as error:
+        raise ScenarioError(
+            f"{robot.name} cannot follow the path '{scenario.reference.path}': {error}"
+        ) from error
+
+
+def guard_events(times: np.ndarray, counts: np.ndarray) -> list[GuardEvent]:
+    """One event for each unbroken run of ticks in which a kind was counted.
+
+    Args:
+        times: of the ticks in s, shape (n,).
+        counts: of `systems.guard.guard.KINDS` until each tick, shape (n, kinds).
+    """
+    events = []
+    increments = np.diff(counts, axis=0, prepend=0) > 0
+    for column, kind in enumerate(KINDS):
+        edges = np.diff(increments[:, column].astype(int), prepend=0, append=0)
+        for start, stop in zip(np.flatnonzero(edges == 1), np.flatnonzero(edges == -1), strict=True):
+            length = times[stop - 1] - times[start]
+            events.append(
+                GuardEvent(float(times[start]), kind, f"for {1e3 * length:.0f} ms, {stop - start} ticks")
+            )
+    return sorted(events, key=lambda event: event.time)

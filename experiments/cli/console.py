@@ -1,0 +1,86 @@
+"""What all commands share: refusals in one line, progress bars, lists."""
+
+import sys
+import time
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+import typer
+from rich import box
+from rich.console import Console
+from rich.markup import escape
+from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeRemainingColumn
+from rich.table import Table
+
+from experiments.cli.workers import SimulationError
+
+BAD_INPUT, BROKEN_OFF, INTERRUPTED = 2, 1, 130  # exit codes
+
+
+@contextmanager
+def refusing(*refusals: type[Exception]) -> Iterator[None]:
+    """Turns what the user can mend into one line and an exit code; a defect still shows itself."""
+    try:
+        yield
+    except refusals as error:
+        fail(str(error), BAD_INPUT)
+    except SimulationError as error:
+        fail(str(error), BROKEN_OFF)
+    except KeyboardInterrupt:
+        fail("interrupted, nothing was written", INTERRUPTED)
+
+
+def fail(message: str, code: int) -> None:
+    """Says why in one line on stderr and ends the command."""
+    typer.echo(f"truetip: {' '.join(message.split())}", err=True)
+    raise typer.Exit(code)
+
+
+@contextmanager
+def progress_bar(label: str) -> Iterator[Callable[[float], None]]:
+    """A progress bar on stderr, where that is a terminal; gives the function that tells it the share done."""
+    console = Console(stderr=True)
+    columns = (TextColumn("{task.description}"), BarColumn(), TaskProgressColumn(), TimeRemainingColumn())
+    with Progress(*columns, console=console, transient=True, disable=not console.is_terminal) as bar:
+        task = bar.add_task(label, total=1.0)
+        yield lambda share: bar.update(task, completed=share)
+
+
+def print_note(console: Console, note: str) -> None:
+    """What a person should know before they wait for it, if there is anything."""
+    if note:
+        console.print(f"Note: {note}", style="yellow", highlight=False)
+
+
+def wait_for_interrupt(console: Console, message: str) -> None:
+    """Says what goes on and lets it until Ctrl-C; on no terminal, where nobody presses it, ends at once."""
+    if not (sys.stdin.isatty() and sys.stdout.isatty()):
+        return
+    console.print(message)
+    try:
+        while True:
+            time.sleep(1.0)
+    except KeyboardInterrupt:
+        console.print()
+
+
+def print_files(console: Console, *files: str | Path | None) -> None:
+    """Where the results are, a line each; None for a file that was not asked for."""
+    for file in filter(None, files):
+        console.print(escape(str(file)), soft_wrap=True)
+
+
+def print_list(rows: Iterable[tuple[str, str]]) -> None:
+    """Names with a line of text each."""
+    table = Table(box=box.SIMPLE, show_header=False)
+    table.add_column(no_wrap=True, style="bold")
+    table.add_column()
+    for name, text in rows:
+        table.add_row(escape(name), escape(text))
+    Console().print(table)
+
+
+def count(number: int, one: str, many: str = "") -> str:
+    """A number with its noun: 1 run, 12 runs."""
+    return f"{number} {one if number == 1 else many or one + 's'}"

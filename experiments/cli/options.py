@@ -1,0 +1,88 @@
+"""Options that several commands have."""
+
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+from systems.cell.pose_camera import CAMERAS
+from systems.feedforward import FEEDFORWARDS
+
+ScenarioOption = Annotated[
+    str, typer.Option("--scenario", metavar="NAME|FILE", help="A shipped scenario or a YAML file.")
+]
+# Without a name the command chooses one that fits.
+AnyScenarioOption = Annotated[
+    str | None,
+    typer.Option(
+        "--scenario",
+        metavar="NAME|FILE",
+        help="A shipped scenario or a YAML file.",
+        show_default="misaligned; on a station cell",
+    ),
+]
+StationOption = Annotated[
+    str | None,
+    typer.Option(
+        "--station", metavar="NAME", help="simulated, or egm for a controller and a camera on the wire."
+    ),
+]
+WithCellOption = Annotated[
+    bool, typer.Option("--with-cell", help="Start a virtual cell for it, over loopback, in real time.")
+]
+YesOption = Annotated[bool, typer.Option("--yes", help="Do not ask before a real robot moves.")]
+SetOption = Annotated[
+    list[str] | None,
+    typer.Option("--set", metavar="KEY=VALUE", help="Change a value, as station.payload=0; repeatable."),
+]
+RobotOption = Annotated[
+    str | None,
+    typer.Option(
+        "--robot",
+        metavar="NAME|FILE",
+        help="A robot in place of the scenario's, or a calibrated one for the controller.",
+    ),
+]
+# Of a study that takes a robot and no scenario.
+StudiedRobotOption = Annotated[
+    str, typer.Option("--robot", metavar="NAME|FILE", help="A shipped robot or a YAML file.")
+]
+PayloadOption = Annotated[
+    float | None,
+    typer.Option(
+        "--payload", metavar="KG", help="Mass at the flange.", show_default="the largest it may carry"
+    ),
+]
+GridOption = Annotated[int, typer.Option("--grid", metavar="N", help="Positions of axis 2, and of axis 3.")]
+FeedforwardOption = Annotated[
+    str | None,
+    typer.Option(
+        "--feedforward",
+        metavar="NAME",
+        help=f"An inverse model beside the law: none, {', '.join(FEEDFORWARDS)}.",
+        show_default="the scenario's",
+    ),
+]
+CameraOption = Annotated[
+    str | None,
+    typer.Option(
+        "--camera",
+        metavar="NAME",
+        help=f"How the tip is measured: {', '.join(CAMERAS)} (of markers).",
+        show_default="the scenario's",
+    ),
+]
+JobsOption = Annotated[
+    int | None,
+    typer.Option("--jobs", metavar="N", help="Processes at a time.", show_default="one per core"),
+]
+OutOption = Annotated[Path, typer.Option("--out", metavar="DIR", help="Where the results go.")]
+PictureOption = Annotated[Path, typer.Option(metavar="FILE.html", help="The picture.")]  # --out or --report
+
+
+def json_option(text: str) -> Any:
+    """``--json`` with a help text of its own; what it does is in `json_output`."""
+    return typer.Option("--json", metavar="FILE", help=text)
+
+
+JsonOption = Annotated[str | None, json_option("The numbers; - prints them, and nothing else.")]

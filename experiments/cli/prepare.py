@@ -1,0 +1,101 @@
+"""From what was typed to something that can run, or a refusal before anything has run."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+from diagrams.runs.simulation import Experiment, nominal_robot
+from diagrams.scenario.scenario import Scenario, ScenarioError, load_scenario, scenario_text
+from robots.description.model import RobotModel, load_robot
+
+QUICK_SPEEDUP = 4.0  # of the acceleration along the path
+QUICK_SETTLE = 2.0  # s
+
+
+@dataclass(frozen=True)
+class Prepared:
+    """A scenario with its robot, ready to run."""
+
+    title: str  # the scenario's name and how this one differs from it
+    scenario: Scenario
+    robot: RobotModel  # as the controller knows it
+
+    @property
+    def nominal_robot(self) -> RobotModel:
+        """The robot from which the true one differs by the station's errors."""
+        return nominal_robot(self.scenario, self.robot)
+
+    @property
+    def note(self) -> str:
+        """What a person should know before it runs, in a line; empty if there is nothing."""
+        model, true = self.scenario.servo.feedforward.kind, self.scenario.station.elasticity
+        if model == "elastic_structure" and true != "structure":
+            return (
+                f"the feedforward compensates an elastic structure that the robot does not have with "
+                f"station.elasticity={true}"
+            )
+        return ""
+
+    @property
+    def text(self) -> str:
+        """The whole scenario as YAML under its title."""
+        return f"# {self.title}\n{scenario_text(self.scenario)}"
+
+
+def prepare(
+    name: str, settings: Sequence[str] = (), robot: str | None = None, is_quick: bool = False
+) -> Prepared:
+    """Reads a scenario and its robot.
+
+    Args:
+        name: a shipped scenario or the path of a scenario file.
+        settings: changes such as ``"station.payload=0"``.
+        robot: a shipped robot or the path of a robot file; None for the scenario's. A calibrated robot serves
+            the controller alone.
+        is_quick: whether to make it `quick`.
+
+    Raises:
+        ValueError: if something is missing, unknown, out of range or not readable.
+    """
+    scenario = load_scenario(name, list(settings))
+    differences = list(settings)
+    model = load_robot(robot or scenario.robot)
+    if robot is not None:
+        if not model.calibration.of:  # a calibrated one is what the controller knows, not another machine
+            scenario = replace(scenario, robot=robot)
+        differences.append(f"robot={robot}")
+    if is_quick:
+        scenario, note = quick(scenario, settings)
+        differences.append(f"quick: {note}")
+    title = Path(name).stem + (f" ({'; '.join(differences)})" if differences else "")
+    return Prepared(title, scenario, model)
+
+
+def quick(scenario: Scenario, settings: Sequence[str] = ()) -> tuple[Scenario, str]:
+    """A scenario that takes a few seconds in one cycle, and in words what makes it quick.
+
+    The path is run with four times the acceleration after settling for at most 2 s; what ``settings``
+    (``"reference.settle=3"``) name explicitly stays as it is.
+    """
+    named = {setting.partition("=")[0].strip() for setting in settings}
+    reference, notes = scenario.reference, ["one cycle"]
+    if "reference.acceleration" not in named:
+        reference = replace(reference, acceleration=min(100.0, QUICK_SPEEDUP * reference.acceleration))
+        notes.append(f"acceleration {reference.acceleration:g} 1/s^2")
+    if "reference.settle" not in named and reference.settle > QUICK_SETTLE:
+        reference = replace(reference, settle=QUICK_SETTLE)
+        notes.append(f"settling {reference.settle:g} s")
+    return replace(scenario, reference=reference), ", ".join(notes)
+
+
+def check(prepared: Prepared, laws: Sequence[str]) -> None:
+    """Builds the diagram of every law once, so that what cannot run is refused before anything does.
+
+    Raises:
+        ValueError: if the path is out of reach or a part refuses its configuration.
+    """
+    for law in laws:
+        try:
+            Experiment(prepared.scenario, law, prepared.robot)
+        except RuntimeError as error:  # what Drake does not like, such as an unknown integration scheme
+            raise ScenarioError(f"scenario {prepared.title}: {' '.join(str(error).split())}") from error

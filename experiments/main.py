@@ -1,0 +1,280 @@
+"""The command line. What takes more than a page has a module of its own."""
+
+from collections.abc import Mapping, Sequence
+from contextlib import ExitStack
+from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+from rich.console import Console
+from rich.markup import escape
+
+from diagrams.record.log import RunLog
+from diagrams.runs.simulation import Experiment
+from diagrams.scenario.scenario import load_scenario, shipped_scenarios
+from experiments.calibration.calibrate_command import calibrate_command
+from experiments.calibration.design_command import design_command
+from experiments.cameras.command import cameras_app
+from experiments.cli.console import (
+    count,
+    print_list,
+    print_note,
+    progress_bar,
+    refusing,
+    wait_for_interrupt,
+)
+from experiments.cli.json_output import human_console, json_output
+from experiments.cli.option_limits import at_least, positive
+from experiments.cli.options import (
+    AnyScenarioOption,
+    CameraOption,
+    FeedforwardOption,
+    JobsOption,
+    OutOption,
+    RobotOption,
+    ScenarioOption,
+    SetOption,
+    StationOption,
+    WithCellOption,
+    YesOption,
+    json_option,
+)
+from experiments.cli.prepare import Prepared, check, prepare
+from experiments.cli.staging import staged_file, staged_folder
+from experiments.cli.tables import print_summary
+from experiments.cli.workers import usable_cores
+from experiments.comparison.compare import compare, simulating
+from experiments.comparison.results import RESULTS, write_results
+from experiments.diagram.view import write_diagram
+from experiments.drivetrain.command import drivetrain_command
+from experiments.feedforward.command import feedforward_command
+from experiments.frames.commands import align_command, chain_command, frame_command, tool_command
+from experiments.modes.command import modes_command
+from experiments.replay.live import LiveView, advance_live
+from experiments.report.report import verdict
+from experiments.station.cell_command import cell_command
+from experiments.station.guided_command import ask_before_moving, guide, on_station
+from experiments.station.latency_command import latency_command
+from robots.description.model import load_robot, shipped_robots
+from systems.servo import COMPARED_LAWS, LAWS
+
+app = typer.Typer(
+    help="Puts the true tip of an industrial robot on its path: visual-servo laws, simulated and compared.",
+    no_args_is_help=True,
+    add_completion=False,
+    pretty_exceptions_enable=False,
+    context_settings={"help_option_names": ["-h", "--help"]},
+)
+
+LawOption = Annotated[
+    str | None,
+    typer.Option("--law", metavar="NAME", help=f"One of {', '.join(LAWS)}.", show_default="the scenario's"),
+]
+
+
+def main() -> None:
+    """The console command."""
+    app(prog_name="truetip")
+
+
+def _print_version(wanted: bool) -> None:
+    if wanted:
+        try:
+            typer.echo(f"truetip {version('truetip')}")
+        except PackageNotFoundError:
+            typer.echo("truetip, not installed")
+        raise typer.Exit
+
+
+@app.callback()
+def _options(
+    show_version: Annotated[
+        bool,
+        typer.Option("--version", callback=_print_version, is_eager=True, help="Print the version and exit."),
+    ] = False,
+) -> None:
+    pass
+
+
+@app.command("compare")
+def compare_command(
+    scenario: AnyScenarioOption = None,
+    settings: SetOption = None,
+    robot: RobotOption = None,
+    feedforward: FeedforwardOption = None,
+    camera: CameraOption = None,
+    station: StationOption = None,
+    with_cell: WithCellOption = False,
+    yes: YesOption = False,
+    out: OutOption = Path("out"),
+    json_file: Annotated[
+        str | None, json_option("The summary once more; - prints it, and nothing else.")
+    ] = None,
+    is_quick: Annotated[
+        bool, typer.Option("--quick", help="One cycle, a faster path, less settling: a few seconds.")
+    ] = False,
+    cycles: Annotated[
+        int, typer.Option(metavar="N", help="Runs of each law; those after the first serve repeatability.")
+    ] = 3,
+    jobs: JobsOption = None,
+) -> None:
+    """Run the open loop and the three laws on one scenario and compare them."""
+    human = human_console(json_file)
+    with refusing(ValueError, OSError):
+        at_least("--cycles", 1, cycles)
+        at_least("--jobs", 1, jobs)
+        cycles = 1 if is_quick else cycles
+        changes = _settings(settings, None, feedforward, camera)
+        name, changes = on_station(scenario, changes, station, with_cell)
+        prepared = prepare(name, changes, robot, is_quick)
+        check(prepared, list(COMPARED_LAWS))
+        print_note(human, prepared.note)
+        is_guided = prepared.scenario.station.kind == "egm"
+        if is_guided:
+            ask_before_moving(human, prepared, with_cell or yes)
+    with json_output(json_file) as output, refusing(OSError), ExitStack() as stack:
+        stage = stack.enter_context(staged_folder(out))
+        stack.enter_context(output.staged())
+        if is_guided:
+            logs = guide(human, (stage, out), prepared, list(COMPARED_LAWS), cycles, with_cell)
+        else:
+            processes = min(jobs or usable_cores(), cycles * len(COMPARED_LAWS))
+            runs = count(cycles * len(COMPARED_LAWS), "run")
+            with progress_bar(f"{runs} in {count(processes, 'process', 'processes')}") as progress:
+                logs = compare(
+                    prepared.scenario, prepared.robot, list(COMPARED_LAWS), cycles, processes, progress
+                )
+        result = _write(human, stage, prepared, logs)
+        output.write(result)
+    _conclude(human, result, out)
+
+
+@app.command("run")
+def run_command(
+    law: LawOption = None,
+    scenario: AnyScenarioOption = None,
+    settings: SetOption = None,
+    robot: RobotOption = None,
+    feedforward: FeedforwardOption = None,
+    camera: CameraOption = None,
+    station: StationOption = None,
+    with_cell: WithCellOption = False,
+    yes: YesOption = False,
+    out: OutOption = Path("out"),
+    meshcat: Annotated[bool, typer.Option("--meshcat", help="Show it live in a browser.")] = False,
+    realtime: Annotated[
+        float | None,
+        typer.Option(metavar="RATE", help="Simulated seconds per second at most: 1 is real time."),
+    ] = None,
+) -> None:
+    """Run one law."""
+    console = Console()
+    with refusing(ValueError, OSError):
+        positive("--realtime", realtime)
+        changes = _settings(settings, law, feedforward, camera)
+        name, changes = on_station(scenario, changes, station, with_cell)
+        prepared = prepare(name, changes, robot)
+        law = prepared.scenario.law
+        check(prepared, [law])
+        print_note(console, prepared.note)
+        is_guided = prepared.scenario.station.kind == "egm"
+        if is_guided:
+            if meshcat or realtime is not None:
+                raise ValueError("--meshcat and --realtime belong to a simulated station")
+            ask_before_moving(console, prepared, with_cell or yes)
+    with refusing(OSError), ExitStack() as stack:
+        stage = stack.enter_context(staged_folder(out))
+        if is_guided:
+            logs = guide(console, (stage, out), prepared, [law], 1, with_cell)
+            _conclude(console, _write(console, stage, prepared, logs), out)
+            return
+        experiment = Experiment(prepared.scenario, law, prepared.robot)
+        view = LiveView(experiment, prepared.nominal_robot) if meshcat else None
+        if view:
+            console.print(f"Watch it at {view.address}")
+        if realtime is not None:
+            experiment.simulator.set_target_realtime_rate(realtime)
+            experiment.simulator.ResetStatistics()  # the pace counts from here
+        with simulating(law, prepared.scenario.seed), progress_bar(law) as progress:
+            if view:
+                advance_live(experiment, view, progress)
+            else:
+                experiment.advance(progress=progress)
+        result = _write(console, stage, prepared, {law: [experiment.log()]})
+    _conclude(console, result, out)
+    if view:
+        wait_for_interrupt(console, f"Still at {view.address}; Ctrl-C ends it")
+
+
+@app.command("diagram")
+def diagram_command(
+    law: LawOption = None,
+    scenario: ScenarioOption = "misaligned",
+    settings: SetOption = None,
+    robot: RobotOption = None,
+    out: Annotated[
+        Path, typer.Option(metavar="FILE.svg|FILE.dot", help="The picture, or its text for graphviz.")
+    ] = Path("diagram.svg"),
+    depth: Annotated[int, typer.Option(metavar="N", help="Levels of diagrams that are opened.")] = 2,
+) -> None:
+    """Draw the diagram that is simulated."""
+    with refusing(ValueError, OSError):
+        prepared = prepare(scenario, _settings(settings, law, None), robot)
+        experiment = Experiment(prepared.scenario, prepared.scenario.law, prepared.robot)
+        with staged_file(out) as path:
+            write_diagram(path, experiment.diagram, depth)
+    Console().print(f"The diagram: {escape(str(out))}")
+
+
+app.command("cell")(cell_command)
+app.command("latency")(latency_command)
+app.command("modes")(modes_command)
+app.add_typer(cameras_app, name="cameras")
+app.command("feedforward")(feedforward_command)
+app.command("design")(design_command)
+app.command("calibrate")(calibrate_command)
+app.command("drivetrain")(drivetrain_command)
+app.command("frame")(frame_command)
+app.command("chain")(chain_command)
+app.command("tool")(tool_command)
+app.command("align")(align_command)
+
+
+@app.command("scenarios")
+def scenarios_command() -> None:
+    """List the scenarios that come with truetip."""
+    print_list((name, load_scenario(name).description) for name in shipped_scenarios())
+
+
+@app.command("robots")
+def robots_command() -> None:
+    """List the robots that come with truetip."""
+    print_list((name, load_robot(name).name) for name in shipped_robots())
+
+
+def _settings(
+    settings: list[str] | None, law: str | None, feedforward: str | None, camera: str | None = None
+) -> list[str]:
+    """The changes of a scenario that options of their own make, behind those of --set."""
+    own = {"law": law, "servo.feedforward.kind": feedforward, "station.camera.kind": camera}
+    return [*(settings or []), *(f"{key}={value}" for key, value in own.items() if value)]
+
+
+def _write(
+    console: Console, stage: Path, prepared: Prepared, logs: Mapping[str, Sequence[RunLog]]
+) -> dict[str, Any]:
+    with console.status("Writing the report"):
+        return write_results(stage, prepared, logs)
+
+
+def _conclude(console: Console, result: Mapping[str, Any], out: Path) -> None:
+    print_summary(console, result)
+    console.print(escape(verdict(result)))
+    console.print()
+    for name, purpose in RESULTS.items():
+        console.print(f"{escape(str(out / name))}  [dim]{purpose}[/dim]", soft_wrap=True)
+
+
+if __name__ == "__main__":
+    main()

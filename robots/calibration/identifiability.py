@@ -1,0 +1,123 @@
+"""Which error parameters a measurement of the tool can tell apart, and on which of these the others lie."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from robots.description.error_parameters import NUM_PARAMETERS, parameter_names
+from robots.description.model import RobotModel
+from robots.kinematics.error_kinematics import ErrorKinematics
+
+_CONFIGURATIONS = 200  # random ones; 24 would do for 48 columns, the rest makes the gap wide
+# A column that depends on others leaves a residual of rounding, one that does not leaves some share of its
+# length. Between the two there must be an empty gap of this many orders of magnitude.
+_DEPENDENT, _INDEPENDENT = 1e-9, 1e-4
+_NEGLIGIBLE = 1e-9  # a coefficient below this is rounding
+
+
+@dataclass(frozen=True)
+class IdentifiableParameters:
+    """The error parameters, divided into those to identify and those that lie on them.
+
+    To first order the columns of the regressor obey Theta[:, dependent] = Theta[:, independent] combination,
+    so that an error in a dependent parameter looks like errors in independent ones, Probst (2024) eq. (2.55)
+    and table 2.2, corrected: there Theta_un and Theta_ab have changed places.
+    """
+
+    names: tuple[str, ...]  # of all 48
+    independent: np.ndarray  # (rank,) indices into the 48
+    dependent: np.ndarray  # (48 - rank,) indices into the 48
+    combination: np.ndarray  # (rank, 48 - rank), SI units
+
+    @property
+    def rank(self) -> int:
+        """How many parameters can be identified."""
+        return len(self.independent)
+
+    def reduce(self, p: np.ndarray) -> np.ndarray:
+        """Base parameters: the same tool to first order with the dependent parameters zero, shape (48,)."""
+        reduced = np.zeros(NUM_PARAMETERS)
+        reduced[self.independent] = p[self.independent] + self.combination @ p[self.dependent]
+        return reduced
+
+    def explain(self) -> dict[str, dict[str, float]]:
+        """For each dependent parameter its share in independent ones, by name, in SI units."""
+        shares = {}
+        for column, index in enumerate(self.dependent):
+            entries = zip(self.independent, self.combination[:, column], strict=True)
+            shares[self.names[index]] = {
+                self.names[i]: float(share) for i, share in entries if abs(share) > _NEGLIGIBLE
+            }
+        return shares
+
+
+def identifiable_parameters(robot: RobotModel, position_only: bool = False) -> IdentifiableParameters:
+    """Finds the independent parameters of a robot by an orthogonal decomposition of its regressor.
+
+    The columns are taken in the order of the parameters, offsets before translations before rotations and the
+    base before the tool, and one is independent if it adds something to those before it. That keeps what is
+    easiest to correct in a controller, and for the IRB 1200 it gives the lists of Probst (2024), table 2.2.
+    The rank is computed at random configurations within the joint limits.
+
+    Args:
+        robot: any robot; its tool counts.
+        position_only: whether only the position of the tool is measured.
+
+    Raises:
+        ValueError: if a column is neither clearly dependent nor clearly independent of the others, or if the
+            robot is a calibrated one: its axes are no longer exactly parallel, so dependent parameters
+            become independent ones that no measurement can tell apart.
+    """
+    if robot.is_calibrated:
+        raise ValueError(
+            f"error parameters of {robot.name}: it is calibrated already; start from the robot as drawn, "
+            f"{robot.calibration.of or 'the one that was calibrated'}"
+        )
+    model = ErrorKinematics(robot)
+    q = np.random.default_rng(0).uniform(robot.lower, robot.upper, (_CONFIGURATIONS, len(robot.lower)))
+    Theta = model.regressor(q, np.zeros(NUM_PARAMETERS))
+    stacked = (Theta[:, 3:] if position_only else Theta).reshape(-1, NUM_PARAMETERS)
+    names = parameter_names(robot)
+    basis = np.empty((len(stacked), 0))
+    independent, dependent = [], []
+    for index, column in enumerate(stacked.T):
+        size = float(np.linalg.norm(column))
+        residual = column.copy()
+        for _ in range(2):  # once more removes what rounding left of the first projection
+            residual -= basis @ (basis.T @ residual)
+        share = float(np.linalg.norm(residual)) / size if size > 0.0 else 0.0
+        if _DEPENDENT < share < _INDEPENDENT:
+            raise ValueError(
+                f"error parameters of {robot.name}: {names[index]} is neither dependent on the parameters "
+                f"before it nor independent, it adds {share:.1e} of its effect"
+            )
+        if share >= _INDEPENDENT:
+            independent.append(index)
+            basis = np.column_stack([basis, residual / np.linalg.norm(residual)])
+        else:
+            dependent.append(index)
+    combination = np.linalg.lstsq(stacked[:, independent], stacked[:, dependent], rcond=None)[0]
+    combination[np.abs(combination) < _NEGLIGIBLE] = 0.0
+    return IdentifiableParameters(names, np.array(independent), np.array(dependent), combination)
+
+
+def unseen_parameters(Theta: np.ndarray, names: list[str], tolerance: float = 1e-7) -> list[str]:
+    """The parameters that a set of measurements cannot see, or cannot tell from one another.
+
+    Args:
+        Theta: regressors of all measurements on top of each other, shape (rows, columns), in SI units.
+        names: of the columns.
+        tolerance: a direction is unseen if its singular value is smaller than this share of the largest one,
+            with all columns scaled to the same length.
+
+    Returns:
+        The names that take part in unseen directions; none if the columns are independent.
+    """
+    lengths = np.linalg.norm(Theta, axis=0)
+    scale = np.where(lengths > 0.0, lengths, 1.0)
+    rows, columns = Theta.shape
+    padded = np.vstack([Theta / scale, np.zeros((max(0, columns - rows), columns))])
+    _, s, Vt = np.linalg.svd(padded, full_matrices=False)
+    unseen = Vt[s < tolerance * s[0]]
+    involved = np.abs(unseen).max(axis=0, initial=0.0) > 1e-3
+    return [name for name, is_involved in zip(names, involved, strict=True) if is_involved]

@@ -1,0 +1,100 @@
+"""How a true robot differs from its drawing: 48 geometric errors in the units of a scenario file.
+
+The nominal model never changes; a true plant takes these errors into the placement of its frames.
+"""
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from robots.description.error_parameters import (
+    FRAMES,
+    OFFSET,
+    SHIFT,
+    TOOL,
+    ErrorParameter,
+    checked,
+    error_parameters,
+)
+from robots.description.model import NUM_JOINTS, RobotModel
+
+
+@dataclass
+class GeometricErrors:
+    """Deviations of the true geometry, Probst (2024), section 2.3 and table 6.1.
+
+    A true joint stands at the measured position plus its offset, eq. (2.47). The tool's translation and
+    its ZYX Euler angles (alpha, beta, gamma) are added to the nominal ones, eq. (2.48). The other frames are
+    displaced along the axes of their parents (``pl_I0`` to ``pl_56``), and the bodies (``body_0`` to
+    ``body_6``) are turned by small angles about x, y and z, as `error_parameters` says. A turn about the
+    joint's own axis must be zero, because that is the joint's offset.
+    """
+
+    joint_offset_deg: np.ndarray = field(default_factory=lambda: np.zeros(NUM_JOINTS))
+    tool_translation_mm: np.ndarray = field(default_factory=lambda: np.zeros(3))
+    tool_zyx_deg: np.ndarray = field(default_factory=lambda: np.zeros(3))
+    frame_translation_mm: dict[str, np.ndarray] = field(
+        default_factory=lambda: {f"pl_{frame}": np.zeros(3) for frame in FRAMES[:TOOL]}
+    )
+    body_rotation_deg: dict[str, np.ndarray] = field(
+        default_factory=lambda: {f"body_{body}": np.zeros(3) for body in range(TOOL)}
+    )
+
+    def vector(self, robot: RobotModel) -> np.ndarray:
+        """The error parameters in m and rad, in the order of `error_parameters`, shape (48,).
+
+        Raises:
+            ValueError: if a name is unknown, a number is not finite, or a body is turned about the axis of
+                its joint.
+        """
+        defaults = GeometricErrors()
+        for label in ("frame_translation_mm", "body_rotation_deg"):
+            known = getattr(defaults, label)
+            for name in getattr(self, label):
+                if name not in known:
+                    raise ValueError(f"{label} must be one of {', '.join(known)}, got '{name}'")
+        parameters = error_parameters(robot)
+        for parameter in parameters[:NUM_JOINTS]:
+            angle = self._triple(parameter, "body_rotation_deg")[parameter.axis]
+            if angle != 0.0:
+                raise ValueError(
+                    f"body_rotation_deg.body_{parameter.body}: the turn about {'xyz'[parameter.axis]}, the "
+                    f"axis of joint {parameter.body}, must be 0, got {angle} deg; give it as joint_offset_deg"
+                )
+        return checked(np.array([self._value(parameter) for parameter in parameters]))
+
+    @staticmethod
+    def from_vector(robot: RobotModel, p: np.ndarray) -> "GeometricErrors":
+        """The errors whose `vector` is p, shape (48,), in m and rad.
+
+        Raises:
+            ValueError: if p has another shape or is not finite.
+        """
+        errors = GeometricErrors()
+        for parameter, value in zip(error_parameters(robot), checked(p), strict=True):
+            entries, index, unit = errors._slot(parameter)
+            entries[index] = value / unit
+        return errors
+
+    def _value(self, parameter: ErrorParameter) -> float:
+        entries, index, unit = self._slot(parameter)
+        return float(entries[index]) * unit
+
+    def _slot(self, parameter: ErrorParameter) -> tuple[np.ndarray, int, float]:
+        """Where a parameter stands here, and its unit in m or rad."""
+        degree = np.pi / 180.0
+        if parameter.kind == OFFSET:
+            return self.joint_offset_deg, parameter.body - 1, degree
+        if parameter.kind == SHIFT:
+            return self._triple(parameter, "frame_translation_mm"), parameter.axis, 1e-3
+        if parameter.body == TOOL:
+            return self.tool_zyx_deg, 2 - parameter.axis, degree  # alpha, about z, comes first
+        return self._triple(parameter, "body_rotation_deg"), parameter.axis, degree
+
+    def _triple(self, parameter: ErrorParameter, label: str) -> np.ndarray:
+        """The three numbers of a frame or a body; what a file leaves out is zero."""
+        if label == "frame_translation_mm":
+            if parameter.body == TOOL:
+                return self.tool_translation_mm
+            return self.frame_translation_mm.get(f"pl_{FRAMES[parameter.body]}", np.zeros(3))
+        return self.body_rotation_deg.get(f"body_{parameter.body}", np.zeros(3))

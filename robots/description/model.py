@@ -1,0 +1,386 @@
+"""What a six-axis robot is: geometry, limits, masses and drive trains, read from one YAML file.
+
+A robot file is the dataclass tree below, field for field. Every part carries a ``source``: where its
+numbers come from, or the word ``assumed``. Angles in the file are in degrees and say so in the name
+of their field; the arrays that `RobotModel` offers to the rest of the code are in SI units.
+
+Frames: W is the world, B the robot's base, link i is moved by joint i, F is the flange (the frame of
+the last link) and E the tool. At zero joint angles the frame of link i sits at
+``translation`` in the frame of link i-1, turned by ``rotation_zyx_deg``.
+"""
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass, field, fields, is_dataclass
+from importlib.resources import files
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from pydrake.common.yaml import yaml_load_typed
+from pydrake.math import RigidTransform, RotationMatrix
+
+from robots.description.beam import Beam, beam_surrogate
+from robots.description.counterbalance_spring import CounterbalanceSpring
+from robots.drivetrain.counterbalance import Counterbalance
+from robots.drivetrain.stiffening import Stiffening, gear_springs
+from robots.drivetrain.stiffness import SpringRow
+from robots.pose import rotation_from_zyx
+
+NUM_JOINTS = 6
+
+
+class RobotFileError(ValueError):
+    """A robot file is missing, cannot be parsed, or describes an impossible robot."""
+
+
+@dataclass
+class Placement:
+    """A frame in its parent: translation in m, ZYX Euler angles (alpha, beta, gamma) in degrees."""
+
+    translation: np.ndarray = field(default_factory=lambda: np.zeros(3))
+    zyx_deg: np.ndarray = field(default_factory=lambda: np.zeros(3))
+    source: str = ""
+
+    def pose(self) -> RigidTransform:
+        """The placement as a transform, child in parent."""
+        R = RotationMatrix(rotation_from_zyx(np.deg2rad(self.zyx_deg)))
+        return RigidTransform(R, self.translation)
+
+
+@dataclass
+class JointLimits:
+    """Range and largest speed of one joint."""
+
+    lower_deg: float = 0.0
+    upper_deg: float = 0.0
+    speed_deg_s: float = 0.0
+    source: str = ""
+
+
+@dataclass
+class DriveTrain:
+    """Motor, gear and friction of one joint.
+
+    The friction coefficients act on the motor side: a joint-side torque is ``ratio`` times the Coulomb
+    part and ``ratio**2`` times the viscous part, see `RobotModel.joint_viscous_friction`.
+    """
+
+    ratio: float = 1.0
+    rotor_inertia: float = 0.0  # kg m^2, about the motor's axis
+    stiffness: float = 0.0  # N m / rad, joint side, at rest
+    stiffening: Stiffening | None = None  # under load; None for a linear spring
+    damping: float = 0.0  # N m s / rad, joint side, parallel to the stiffness
+    viscous_friction: float = 0.0  # N m s / rad, motor side
+    coulomb_friction: float = 0.0  # N m, motor side
+    coulomb_velocity: float = 0.01  # rad/s on the joint side, width of the tanh transition
+    source: str = ""
+
+
+@dataclass
+class Tilting:
+    """How the bearing of a joint yields across its axis: two springs about two axes square to it.
+
+    Reiner (2010), section 2.4.1. For a joint about z the axes are x and y, about x they are y and z, about y
+    they are z and x.
+    """
+
+    stiffness: list[float] = field(default_factory=list)  # N m / rad, two
+    damping: list[float] = field(default_factory=list)  # N m s / rad, two
+    source: str = ""
+
+
+@dataclass
+class Joint:
+    """A revolute joint and the frame of the link that it moves; without ``tilting`` its bearing is stiff."""
+
+    axis: np.ndarray = field(default_factory=lambda: np.array([0.0, 0.0, 1.0]))
+    placement: Placement = field(default_factory=Placement)
+    limits: JointLimits = field(default_factory=JointLimits)
+    drive_train: DriveTrain = field(default_factory=DriveTrain)
+    tilting: Tilting | None = None
+
+
+@dataclass
+class Link:
+    """A body, rigid without a ``beam``; ``inertia`` holds the principal moments about the centre of mass."""
+
+    mass: float = 0.0  # kg
+    inertia: np.ndarray = field(default_factory=lambda: np.zeros(3))  # kg m^2, along x, y, z
+    source: str = ""
+    center_of_mass: np.ndarray = field(default_factory=lambda: np.zeros(3))  # m, in the link frame
+    center_of_mass_source: str = ""
+    radius: float = 0.05  # m, of the capsules that picture the link
+    radius_source: str = ""
+    beam: Beam | None = None
+
+
+@dataclass
+class PayloadLimits:
+    """The largest mass at the flange, with the centre of mass and the inertia of that mass.
+
+    The inertia of a smaller payload is taken in proportion to its mass.
+    """
+
+    largest_mass: float = 0.0  # kg
+    inertia: np.ndarray = field(default_factory=lambda: np.zeros(3))  # kg m^2, about its centre
+    source: str = ""
+    center_of_mass: np.ndarray = field(default_factory=lambda: np.zeros(3))  # m, in the flange frame
+    center_of_mass_source: str = ""
+
+
+@dataclass
+class Calibration:
+    """What has been measured on one robot, in a file that a calibration wrote; empty for a robot as drawn."""
+
+    of: str = ""  # the robot that was calibrated: what stood in its scenario
+    compliance: list[float] = field(default_factory=lambda: [0.0] * NUM_JOINTS)  # rad per N m of gravity
+    source: str = ""
+
+
+@dataclass
+class RobotModel:
+    """A six-axis serial robot. Load one with `load_robot`."""
+
+    name: str = ""
+    base: Placement = field(default_factory=Placement)
+    joints: list[Joint] = field(default_factory=list)
+    tool: Placement = field(default_factory=Placement)
+    base_link: Link = field(default_factory=Link)
+    links: list[Link] = field(default_factory=list)
+    payload: PayloadLimits = field(default_factory=PayloadLimits)
+    calibration: Calibration = field(default_factory=Calibration)
+    counterbalance: CounterbalanceSpring | None = None
+
+    @property
+    def is_calibrated(self) -> bool:
+        """Whether the geometry is that of one robot, found by a calibration."""
+        return bool(self.calibration.source)
+
+    def _drive_train(self, name: str) -> np.ndarray:
+        return np.array([getattr(joint.drive_train, name) for joint in self.joints])
+
+    def _limit(self, name: str) -> np.ndarray:
+        return np.deg2rad([getattr(joint.limits, name) for joint in self.joints])
+
+    @property
+    def axes(self) -> np.ndarray:
+        """Joint axes in the frames of their links, shape (6, 3)."""
+        return np.array([joint.axis / np.linalg.norm(joint.axis) for joint in self.joints])
+
+    @property
+    def lower(self) -> np.ndarray:
+        """Lower joint limits in rad, shape (6,)."""
+        return self._limit("lower_deg")
+
+    @property
+    def upper(self) -> np.ndarray:
+        """Upper joint limits in rad, shape (6,)."""
+        return self._limit("upper_deg")
+
+    @property
+    def speed(self) -> np.ndarray:
+        """Largest joint speeds in rad/s, shape (6,)."""
+        return self._limit("speed_deg_s")
+
+    @property
+    def gear_ratio(self) -> np.ndarray:
+        """Gear ratios, shape (6,)."""
+        return self._drive_train("ratio")
+
+    @property
+    def reflected_inertia(self) -> np.ndarray:
+        """Rotor inertias seen on the link side of the gear in kg m^2, shape (6,)."""
+        return self.gear_ratio**2 * self._drive_train("rotor_inertia")
+
+    @property
+    def joint_stiffness(self) -> np.ndarray:
+        """Stiffness of the gears at rest in N m / rad, joint side, shape (6,)."""
+        return self._drive_train("stiffness")
+
+    @property
+    def stiffening_gears(self) -> SpringRow | None:
+        """The springs of the six gears where one of them stiffens under load, None if all are linear."""
+        return gear_springs(
+            self.joint_stiffness.tolist(), [joint.drive_train.stiffening for joint in self.joints]
+        )
+
+    @property
+    def joint_damping(self) -> np.ndarray:
+        """Damping of the gears, parallel to their stiffness, in N m s / rad, joint side, shape (6,)."""
+        return self._drive_train("damping")
+
+    @property
+    def joint_viscous_friction(self) -> np.ndarray:
+        """Viscous friction of the motors in N m s / rad on the link side, Probst (2024) eq. (2.63)."""
+        return self.gear_ratio**2 * self._drive_train("viscous_friction")
+
+    @property
+    def joint_coulomb_friction(self) -> np.ndarray:
+        """Coulomb friction of the motors in N m on the link side, Probst (2024) eq. (2.64)."""
+        return self.gear_ratio * self._drive_train("coulomb_friction")
+
+    @property
+    def compliance(self) -> np.ndarray:
+        """Compliances of the joints that a calibration has found in rad / (N m), zero if none has, (6,)."""
+        return np.array(self.calibration.compliance)
+
+    @property
+    def counterbalance_at_axis_2(self) -> Counterbalance | None:
+        """What the counterbalance does about axis 2, None where there is none."""
+        joint = self.joints[1]
+        spring = self.counterbalance
+        return None if spring is None else spring.about_axis(self.axes[1], joint.placement.pose())
+
+    @property
+    def coulomb_velocity(self) -> np.ndarray:
+        """Joint velocity over which the Coulomb friction changes its sign in rad/s, shape (6,)."""
+        return self._drive_train("coulomb_velocity")
+
+
+def shipped_robots() -> list[str]:
+    """The names of the robots that come with the package."""
+    names = [entry.name for entry in _data_folder().iterdir()]
+    return sorted(name.removesuffix(".yaml") for name in names if name.endswith(".yaml"))
+
+
+def load_robot(name: str) -> RobotModel:
+    """Reads a shipped robot by name (``"irb1200"``) or any robot file by its path.
+
+    Raises:
+        RobotFileError: if there is no such robot, or its file is not a valid robot.
+    """
+    path = Path(name) if name.endswith((".yaml", ".yml")) else Path(str(_data_folder() / f"{name}.yaml"))
+    if not path.is_file():
+        raise RobotFileError(
+            f"robot '{name}': no file {path}; "
+            f"give the path of a YAML file or one of {', '.join(shipped_robots())}"
+        )
+    try:
+        robot = yaml_load_typed(schema=RobotModel, filename=str(path))
+    except Exception as error:  # the parser raises a dozen types, all of them about this file
+        raise RobotFileError(f"robot file {path}: {' '.join(str(error).split())}") from error
+    problem = _problem(robot)
+    if problem:
+        raise RobotFileError(f"robot file {path}: {problem}")
+    return robot
+
+
+def _data_folder():
+    return files("robots") / "data"
+
+
+def _problem(robot: RobotModel) -> str:
+    """The first reason why the robot is impossible, or an empty string."""
+    if len(robot.joints) != NUM_JOINTS or len(robot.links) != NUM_JOINTS:
+        return f"needs {NUM_JOINTS} joints and links, got {len(robot.joints)} and {len(robot.links)}"
+    malformed = _malformed_number(robot, "")
+    if malformed:
+        return malformed
+    problems = [_joint_problem(joint, number) for number, joint in enumerate(robot.joints, 1)]
+    if robot.base_link.beam is not None:
+        problems.append("base_link: stands still and takes no beam")
+    bodies = {"base_link": robot.base_link} | {f"link {n}": link for n, link in enumerate(robot.links, 1)}
+    for label, link in bodies.items():
+        problems.append(_not_positive(label, {"mass": link.mass, "radius": link.radius}))
+        problems.append(_inertia_problem(label, link.inertia))
+        problems.append(_beam_problem(label, link))
+    if not any(problems):
+        problems.append(_refusal(lambda: robot.counterbalance_at_axis_2))
+    if len(robot.calibration.compliance) != NUM_JOINTS:
+        problems.append(
+            f"calibration: needs {NUM_JOINTS} compliances, got {len(robot.calibration.compliance)}"
+        )
+    if robot.payload.largest_mass < 0.0:
+        problems.append(f"payload: largest_mass must not be negative, got {robot.payload.largest_mass}")
+    if robot.payload.largest_mass > 0.0:
+        problems.append(_inertia_problem("payload", robot.payload.inertia))
+    return next(filter(None, problems), "")
+
+
+def _malformed_number(part: Any, where: str) -> str:
+    """The first number below ``part`` that is not finite, or vector that is not three long."""
+    if isinstance(part, float) and not math.isfinite(part):
+        return f"{where} must be finite, got {part}"
+    if isinstance(part, np.ndarray) and not (part.shape == (3,) and np.isfinite(part).all()):
+        return f"{where} must be three finite numbers, got {part.tolist()}"
+    below = []
+    if isinstance(part, list):
+        below = [(f"{where}[{number}]", item) for number, item in enumerate(part, 1)]
+    elif is_dataclass(part):
+        below = [(f"{where}.{item.name}".lstrip("."), getattr(part, item.name)) for item in fields(part)]
+    return next(filter(None, (_malformed_number(item, name) for name, item in below)), "")
+
+
+def _joint_problem(joint: Joint, number: int) -> str:
+    limits, train = joint.limits, joint.drive_train
+    if not np.linalg.norm(joint.axis) > 0.0:
+        return f"joint {number}: axis must have a direction, got {joint.axis.tolist()}"
+    if not limits.lower_deg < limits.upper_deg:
+        lower, upper = limits.lower_deg, limits.upper_deg
+        return f"joint {number}: lower limit {lower} deg is not below the upper {upper} deg"
+    for label in ("damping", "viscous_friction", "coulomb_friction"):
+        if getattr(train, label) < 0.0:
+            return f"joint {number}: {label} must not be negative, got {getattr(train, label)}"
+    positive = {
+        "speed_deg_s": limits.speed_deg_s,
+        "ratio": train.ratio,
+        "rotor_inertia": train.rotor_inertia,
+        "stiffness": train.stiffness,
+        "coulomb_velocity": train.coulomb_velocity,
+    }
+    return (
+        _not_positive(f"joint {number}", positive)
+        or _stiffening_problem(f"joint {number}", train)
+        or _tilting_problem(f"joint {number}: tilting", joint)
+    )
+
+
+def _stiffening_problem(where: str, train: DriveTrain) -> str:
+    stiffening = train.stiffening
+    problem = "" if stiffening is None else _refusal(lambda: stiffening.spring(train.stiffness))
+    return problem and f"{where}: {problem}"
+
+
+def _tilting_problem(where: str, joint: Joint) -> str:
+    tilting = joint.tilting
+    if tilting is None:
+        return ""
+    if len(tilting.stiffness) != 2 or len(tilting.damping) != 2:
+        return f"{where} needs two stiffnesses and two dampings, got {tilting.stiffness}, {tilting.damping}"
+    if min(tilting.damping) < 0.0:
+        return f"{where}: damping must not be negative, got {min(tilting.damping)}"
+    return _not_positive(where, {"stiffness": min(tilting.stiffness)})
+
+
+def _beam_problem(where: str, link: Link) -> str:
+    beam = link.beam
+    if beam is None:
+        return ""
+    problem = _refusal(lambda: beam_surrogate(beam, link.mass, link.center_of_mass, link.inertia))
+    return problem and f"{where}: {problem}"
+
+
+def _refusal(build: Callable[[], object]) -> str:
+    try:
+        build()
+    except ValueError as error:
+        return str(error)
+    return ""
+
+
+def _not_positive(where: str, values: dict[str, float]) -> str:
+    for label, value in values.items():
+        if not value > 0.0:
+            return f"{where}: {label} must be positive, got {value}"
+    return ""
+
+
+def _inertia_problem(where: str, inertia: np.ndarray) -> str:
+    # No body has a principal moment larger than the sum of the two others; Drake refuses it as well, later.
+    if inertia.min() > 0.0 and 2.0 * inertia.max() <= inertia.sum() * (1.0 + 1e-9):
+        return ""
+    return (
+        f"{where}: inertia must be three positive moments, none above the sum of the others, "
+        f"got {inertia.tolist()}"
+    )

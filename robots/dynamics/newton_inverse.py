@@ -1,0 +1,202 @@
+"""Inverse kinematics of a robot that is not quite built as the analytic one needs it: Newton's method.
+
+A calibrated robot has axes that do not meet and are not parallel, by tenths of a millimetre and of a degree.
+The ideal robot next to it, with the small deviations left out, has an analytic solution; a few Newton steps
+lead from there to the exact one. It needs no gain and does not drift.
+"""
+
+import math
+from contextlib import suppress
+from dataclasses import replace
+from typing import Protocol
+
+import numpy as np
+
+from robots.description.model import Joint, Placement, RobotModel
+from robots.dynamics.compliant_kinematics import CompliantKinematics
+from robots.kinematics.analytic_inverse import (
+    AXES,
+    FREE_OF_OFFSET,
+    InverseKinematics,
+    JointLimitError,
+    UnreachableError,
+    has_spherical_wrist,
+    seen_from_base,
+    turned_into,
+)
+from robots.kinematics.forward import Kinematics, robust_solve
+from robots.pose import pose_error, zyx_from_rotation
+
+_CLOSE = 0.05  # rad and m; from no farther than this the steps begin where the robot is
+_CONVERGED = 1e-10  # rad; a step of this size leaves an error of its square
+_MOST_STEPS = 25
+_LONGEST_STEP = 0.3  # rad, of all joints together
+_LARGEST_TILT = 0.3  # of direction cosines: what still counts as a deviation
+_LARGEST_OFFSET = 0.05  # m
+
+
+class ForwardKinematics(Protocol):
+    """What a Newton step needs to know of a robot."""
+
+    def forward_and_jacobian(self, q: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Pose (4, 4) and geometric Jacobian (6, 6) at joint positions (6,)."""
+        ...
+
+
+class InverseSolver(Protocol):
+    """Inverse kinematics, whichever way they are solved."""
+
+    def nearest(self, X_WE: np.ndarray, q_near: np.ndarray) -> np.ndarray:
+        """See `InverseKinematics.nearest`."""
+        ...
+
+    def along(self, X_WE: np.ndarray, q_start: np.ndarray) -> np.ndarray:
+        """See `InverseKinematics.along`."""
+        ...
+
+
+def inverse_kinematics(robot: RobotModel, payload: float = 0.0) -> InverseSolver:
+    """The analytic solution where the robot is built for it, Newton's method where it nearly is or yields.
+
+    Args:
+        robot: nominal or calibrated.
+        payload: mass at the flange in kg, under which a robot with compliances bends.
+
+    Raises:
+        ValueError: if the robot is too far from a spherical wrist on a plane arm; the message says where.
+    """
+    if robot.compliance.any():
+        return NewtonInverse(robot, CompliantKinematics(robot, payload))
+    return InverseKinematics(robot) if has_spherical_wrist(robot) else NewtonInverse(robot)
+
+
+def ideal_robot(robot: RobotModel) -> RobotModel:
+    """The robot next to this one that the analytic inverse kinematics can solve.
+
+    Axes are turned to the nearest coordinate axis of the base, offsets that must not be are left out. All
+    frames of the links are parallel to the base at zero joint angles; the joints move as they did.
+
+    Raises:
+        ValueError: if a deviation is too large to be an error of a robot of this kind.
+    """
+    axes, offsets, R_BF = seen_from_base(robot)
+    joints = []
+    for number, (joint, letter, axis, offset) in enumerate(
+        zip(robot.joints, AXES, axes, offsets, strict=True), 1
+    ):
+        unit = np.eye(3)["xyz".index(letter)]
+        unit = unit * np.sign(unit @ axis)
+        if np.abs(axis - unit).max() > _LARGEST_TILT:
+            raise ValueError(
+                f"inverse kinematics of {robot.name}: the axis of joint {number} must nearly point along "
+                f"{letter} at zero joint angles, got {np.round(axis, 3).tolist()} in the base"
+            )
+        offset = offset.copy()
+        for forbidden in FREE_OF_OFFSET.get(number, ""):
+            k = "xyz".index(forbidden)
+            if abs(offset[k]) > _LARGEST_OFFSET:
+                raise ValueError(
+                    f"inverse kinematics of {robot.name}: joint {number} must have nearly no offset along "
+                    f"{forbidden}, got {1e3 * offset[k]:.1f} mm"
+                )
+            offset[k] = 0.0
+        joints.append(Joint(unit, Placement(offset), joint.limits, joint.drive_train))
+    X_FE = robot.tool.pose()
+    R_BE = R_BF @ X_FE.rotation().matrix()
+    tool = Placement(R_BF @ X_FE.translation(), np.rad2deg(zyx_from_rotation(R_BE)))
+    return replace(robot, joints=joints, tool=tool)
+
+
+class NewtonInverse:
+    """Joint positions for poses of a robot's tool in the world."""
+
+    def __init__(self, robot: RobotModel, kinematics: ForwardKinematics | None = None) -> None:
+        """Finds the ideal robot.
+
+        Args:
+            robot: whose limits count and whose geometry is nearly ideal.
+            kinematics: what is inverted; None for the robot's own kinematics.
+
+        Raises:
+            ValueError: as `ideal_robot`.
+        """
+        self.robot = robot
+        self._kinematics = kinematics or Kinematics(robot)
+        self._ideal = InverseKinematics(ideal_robot(robot))
+        self._lower, self._upper = robot.lower.tolist(), robot.upper.tolist()
+
+    def nearest(self, X_WE: np.ndarray, q_near: np.ndarray) -> np.ndarray:
+        """The solution near a configuration if the pose is near it, or else on the nearest ideal branch.
+
+        Args:
+            X_WE: pose of the tool, shape (4, 4) or without the last row (3, 4).
+            q_near: joint positions in rad, shape (6,).
+
+        Returns:
+            Joint positions in rad, shape (6,).
+
+        Raises:
+            UnreachableError, JointLimitError, ValueError: as `InverseKinematics.nearest`.
+        """
+        if not (np.isfinite(X_WE).all() and np.isfinite(q_near).all()):
+            raise ValueError(f"inverse kinematics: not finite: pose {X_WE.tolist()} or {q_near.tolist()}")
+        q = self._iterate(X_WE, q_near, _CLOSE)
+        if q is None:
+            q = self._iterate(X_WE, self._ideal.nearest(X_WE, q_near), np.inf)
+        if q is None:
+            raise UnreachableError("out of reach: the iteration to the exact inverse does not converge")
+        try:
+            return self._within_limits(q)
+        except JointLimitError:
+            other = self._nearest_of_all(X_WE, q_near)
+            if other is None:
+                raise
+            return other
+
+    def _within_limits(self, q: np.ndarray) -> np.ndarray:
+        """The joint positions within the limits, by full turns where that helps."""
+        for i, (angle, lower, upper) in enumerate(zip(q.tolist(), self._lower, self._upper, strict=True)):
+            turned = turned_into(angle, lower, upper)
+            if turned is None:
+                raise JointLimitError(
+                    f"joint {i + 1} would be at {math.degrees(angle):.2f} deg, "
+                    f"allowed are {math.degrees(lower):g} to {math.degrees(upper):g} deg"
+                )
+            q[i] = turned
+        return q
+
+    def _nearest_of_all(self, X_WE: np.ndarray, q_near: np.ndarray) -> np.ndarray | None:
+        """The solution within the limits that is nearest to a configuration, from all ideal branches."""
+        solutions = []
+        for start in self._ideal.all_branches(np.vstack([X_WE[:3], [0.0, 0.0, 0.0, 1.0]])):
+            q = None if np.isnan(start).any() else self._iterate(X_WE, start, np.inf)
+            if q is not None:
+                with suppress(JointLimitError):
+                    solutions.append(self._within_limits(q))
+        return min(solutions, key=lambda q: float(np.sum((q - q_near) ** 2)), default=None)
+
+    def along(self, X_WE: np.ndarray, q_start: np.ndarray) -> np.ndarray:
+        """The joint path for a path of the tool, as `InverseKinematics.along`."""
+        path = np.empty((len(X_WE), len(q_start)))
+        q = q_start
+        for k, X in enumerate(X_WE):
+            try:
+                q = path[k] = self.nearest(X, q)
+            except ValueError as error:
+                raise type(error)(f"sample {k} of {len(X_WE)}: {error}") from error
+        return path
+
+    def _iterate(self, X_WE: np.ndarray, q: np.ndarray, largest_error: float) -> np.ndarray | None:
+        """Newton steps from q; None if they begin with a larger error or do not converge."""
+        for _ in range(_MOST_STEPS):
+            X, J = self._kinematics.forward_and_jacobian(q)
+            error = pose_error(X_WE, X)
+            if error @ error > largest_error**2:
+                return None
+            largest_error = np.inf
+            step = robust_solve(J, error)
+            length = float(np.sqrt(step @ step))
+            q = q + step * min(1.0, _LONGEST_STEP / max(length, _LONGEST_STEP))
+            if length < _CONVERGED:
+                return q
+        return None

@@ -1,0 +1,312 @@
+"""Puts a robot into a MultibodyPlant: rigid or elastic in gears or structure, nominal or as it truly is.
+
+Elastic gears are two coaxial revolute joints in series: ``motor_i`` turns a massless rotor against the
+inertia of the motor, ``deflection_i`` sprung and damped turns the link against the rotor. In these
+coordinates the plant is the flexible-joint model without gyroscopic coupling of the rotors: link
+positions are motor + deflection. A gear that stiffens under load has in the plant the spring that it has at
+rest; `PlantRobot.stiffening_torque` is what it has beyond that.
+
+An elastic structure has more sprung joints behind the gears: ``tilt_a_i``, ``tilt_b_i`` where a bearing
+tilts across its axis, ``beam_i_...`` where a link is a beam.
+"""
+
+from dataclasses import dataclass, field
+
+import numpy as np
+from pydrake.geometry import Capsule, Rgba
+from pydrake.math import RigidTransform, RotationMatrix
+from pydrake.multibody.plant import MultibodyPlant
+from pydrake.multibody.tree import (
+    FixedOffsetFrame,
+    Frame,
+    LinearSpringDamper,
+    MultibodyForces,
+    RevoluteJoint,
+    RevoluteSpring,
+    RigidBody,
+    RotationalInertia,
+    SpatialInertia,
+)
+from pydrake.systems.framework import Context
+
+from robots.description.counterbalance_spring import free_length
+from robots.description.geometric_errors import GeometricErrors
+from robots.description.model import NUM_JOINTS, Joint, Link, RobotModel
+from robots.drivetrain.stiffness import SpringRow
+from robots.dynamics.elastic_structure import (
+    SprungJoints,
+    add_beam_link,
+    add_bearing,
+    add_rigid_link,
+    link_inertia,
+    massless,
+)
+from robots.kinematics.error_kinematics import ErrorKinematics
+
+ELASTICITIES = ("rigid", "joints", "structure")
+_LINK_COLOR = Rgba(0.93, 0.45, 0.13, 1.0)
+_BASE_COLOR = Rgba(0.35, 0.36, 0.38, 1.0)
+
+
+@dataclass(frozen=True)
+class PlantRobot:
+    """The parts of a plant that belong to one robot, in joint order.
+
+    Attributes:
+        deflections: the sprung joints of the gears, empty for a rigid robot.
+        springs: the springs of these joints.
+        tool: frame E.
+        structure: the sprung joints of bearings and beams, empty without an elastic structure.
+        structure_springs: the springs of these joints.
+        has_counterbalance: whether a spring pulls at axis 2.
+        stiffening_gears: the six characteristics of gears that yield and stiffen, None if all are linear.
+    """
+
+    plant: MultibodyPlant
+    motors: list[RevoluteJoint]
+    deflections: list[RevoluteJoint]
+    springs: list[RevoluteSpring]
+    tool: Frame
+    structure: list[RevoluteJoint] = field(default_factory=list)
+    structure_springs: list[RevoluteSpring] = field(default_factory=list)
+    has_counterbalance: bool = False
+    stiffening_gears: SpringRow | None = None
+
+    @property
+    def sprung(self) -> list[RevoluteJoint]:
+        """All sprung joints: those of the gears, then those of the structure."""
+        return [*self.deflections, *self.structure]
+
+    @property
+    def sprung_stiffness(self) -> np.ndarray:
+        """The stiffness of all sprung joints at rest in N m / rad, in the order of `sprung`."""
+        return np.array([spring.default_stiffness() for spring in (*self.springs, *self.structure_springs)])
+
+    def tangent_stiffness(self, deflection: np.ndarray) -> np.ndarray:
+        """The stiffness of all sprung joints in N m / rad at deflections in rad, in the order of `sprung`."""
+        stiffness = self.sprung_stiffness
+        if self.stiffening_gears is not None:
+            stiffness[:NUM_JOINTS] = self.stiffening_gears.stiffness(deflection[:NUM_JOINTS])
+        return stiffness
+
+    def static_deflection(self, load: np.ndarray) -> np.ndarray:
+        """How far all sprung joints yield, in rad, to loads in N m, in the order of `sprung`."""
+        deflection = load / self.sprung_stiffness
+        if self.stiffening_gears is not None:
+            deflection[:NUM_JOINTS] = self.stiffening_gears.deflection(load[:NUM_JOINTS])
+        return deflection
+
+    def stiffening_torque(self, deflection: np.ndarray) -> np.ndarray:
+        """What the gears take beyond the linear springs of the plant, in N m at deflections in rad, (6,)."""
+        assert self.stiffening_gears is not None
+        return self.stiffening_gears.torque(deflection) - self.stiffening_gears.c_0 * deflection
+
+    def motor_indices(self) -> list[int]:
+        """Where motor positions, then motor velocities stand in the plant's state; 12 numbers."""
+        num_positions = self.plant.num_positions()
+        return [joint.position_start() for joint in self.motors] + [
+            num_positions + joint.velocity_start() for joint in self.motors
+        ]
+
+    def link_positions(self, state: np.ndarray) -> np.ndarray:
+        """Link positions in rad from plant states: motors and gears, without what the structure yields.
+
+        Args:
+            state: states or positions of the plant, shape (..., at least num_positions).
+
+        Returns:
+            Shape (..., 6).
+        """
+        q = state[..., [joint.position_start() for joint in self.motors]]
+        if self.deflections:
+            q = q + state[..., [joint.position_start() for joint in self.deflections]]
+        return q
+
+    def tool_poses(self, states: np.ndarray) -> np.ndarray:
+        """Poses of the tool in the world.
+
+        Args:
+            states: states of the plant, shape (n, num_states).
+
+        Returns:
+            Homogeneous matrices, shape (n, 4, 4).
+        """
+        context = self.plant.CreateDefaultContext()
+        poses = np.empty((len(states), 4, 4))
+        for pose, state in zip(poses, states, strict=True):
+            self.plant.SetPositionsAndVelocities(context, state)
+            pose[:] = self.tool.CalcPoseInWorld(context).GetAsMatrix4()
+        return poses
+
+    def load(self, context: Context) -> np.ndarray:
+        """What gravity and the counterbalance do to all joints in N m, shape (num_velocities,)."""
+        if not self.has_counterbalance:
+            return self.plant.CalcGravityGeneralizedForces(context)
+        forces = MultibodyForces(self.plant)
+        self.plant.CalcForceElementsContribution(context, forces)
+        # Springs and dampers of joints act as generalized forces; the load is all that acts on bodies.
+        forces.mutable_generalized_forces()[:] = 0.0
+        return self.plant.CalcGeneralizedForces(context, forces)
+
+    def set_at_rest(self, context: Context, theta: np.ndarray) -> None:
+        """Puts the motors at theta (rad, shape (6,)), still, with gears and structure sagging under load."""
+        positions = np.zeros(self.plant.num_positions())
+        positions[[joint.position_start() for joint in self.motors]] = theta
+        self.plant.SetVelocities(context, np.zeros(self.plant.num_velocities()))
+        self.plant.SetPositions(context, positions)
+        rows = [joint.position_start() for joint in self.sprung]
+        # The sag changes the lever arms by about a thousandth, so each pass gains three digits.
+        for _ in range(6 if rows else 0):
+            positions[rows] = self.static_deflection(self.load(context)[rows])
+            self.plant.SetPositions(context, positions)
+
+
+def add_robot(
+    plant: MultibodyPlant,
+    robot: RobotModel,
+    elasticity: str = "joints",
+    payload: float = 0.0,
+    errors: GeometricErrors | None = None,
+) -> PlantRobot:
+    """Adds a robot to a plant that is not yet finalized. Capsules picture it if there is a SceneGraph.
+
+    Viscous friction of the motors is the damping of their joints, eq. (2.63) of Probst (2024); Coulomb
+    friction is left to the drives, because a continuous plant has none. A counterbalance is a spring between
+    links 1 and 2, whatever is elastic.
+
+    Args:
+        elasticity: ``"rigid"``, ``"joints"`` for elastic gears, ``"structure"`` for bearings and beams too.
+        payload: mass at the flange in kg.
+        errors: how the true geometry differs from the nominal one; None for exact geometry.
+
+    Raises:
+        ValueError: if the elasticity is unknown, the payload is more than the robot may carry, or an error
+            has no place in this robot.
+    """
+    if elasticity not in ELASTICITIES:
+        raise ValueError(f"elasticity must be one of {', '.join(ELASTICITIES)}, got '{elasticity}'")
+    if not 0.0 <= payload <= robot.payload.largest_mass:
+        raise ValueError(
+            f"payload of {robot.name} must be between 0 and {robot.payload.largest_mass} kg, got {payload} kg"
+        )
+    if errors is not None:
+        robot = ErrorKinematics(robot).robot_with_errors(errors.vector(robot))
+    parent = plant.AddRigidBody("base", link_inertia(robot.base_link))
+    plant.WeldFrames(plant.world_frame(), parent.body_frame(), robot.base.pose())
+    _add_capsule(
+        plant, parent, np.zeros(3), robot.joints[0].placement.translation, robot.base_link.radius, _BASE_COLOR
+    )
+    motors, gears, structure = [], SprungJoints(), SprungJoints()
+    bodies = []  # of each link the first body and the last
+    for i, joint in enumerate(robot.joints):
+        socket = plant.AddFrame(
+            FixedOffsetFrame(f"socket_{i + 1}", parent.body_frame(), joint.placement.pose())
+        )
+        carried = _payload_inertia(robot, payload) if i + 1 == NUM_JOINTS and payload > 0.0 else None
+        link = robot.links[i]
+        hinges = SprungJoints()
+        if elasticity == "structure" and link.beam is not None:
+            bodies.append(add_beam_link(plant, hinges, i + 1, link, carried))
+        else:
+            bodies.append(add_rigid_link(plant, i + 1, link, carried))
+        first, parent = bodies[-1]
+        driven = first
+        if elasticity != "rigid":
+            driven = _add_gear(plant, gears, structure, i + 1, joint, first, elasticity == "structure")
+        structure.extend(hinges)
+        motors.append(_add_motor(plant, robot, i, socket, driven))
+        if i + 1 < NUM_JOINTS:
+            _picture_link(plant, bodies[-1], link, robot.joints[i + 1].placement.translation)
+    if robot.counterbalance is not None:
+        _add_counterbalance(plant, robot, bodies[0][1], bodies[1][0])
+    tool = plant.AddFrame(FixedOffsetFrame("tool", parent.body_frame(), robot.tool.pose()))
+    return PlantRobot(
+        plant,
+        motors,
+        gears.joints,
+        gears.springs,
+        tool,
+        structure.joints,
+        structure.springs,
+        robot.counterbalance is not None,
+        None if elasticity == "rigid" else robot.stiffening_gears,
+    )
+
+
+def _add_gear(
+    plant: MultibodyPlant,
+    gears: SprungJoints,
+    structure: SprungJoints,
+    number: int,
+    joint: Joint,
+    link: RigidBody,
+    tilts: bool,
+) -> RigidBody:
+    """Puts the elastic gear, and the bearing if it tilts, before a link; returns the rotor."""
+    rotor = plant.AddRigidBody(f"rotor_{number}", massless())
+    behind = link
+    if tilts and joint.tilting is not None:
+        behind = plant.AddRigidBody(f"gear_{number}", massless())
+    train = joint.drive_train
+    frames = rotor.body_frame(), behind.body_frame()
+    gears.add(plant, f"deflection_{number}", frames, joint.axis, train.stiffness, train.damping)
+    if behind is not link:
+        add_bearing(plant, structure, number, joint, behind, link)
+    return rotor
+
+
+def _add_motor(
+    plant: MultibodyPlant, robot: RobotModel, i: int, socket: Frame, driven: RigidBody
+) -> RevoluteJoint:
+    joint, damping = robot.joints[i], float(robot.joint_viscous_friction[i])
+    name = f"motor_{i + 1}"
+    motor = plant.AddJoint(RevoluteJoint(name, socket, driven.body_frame(), joint.axis, damping))
+    actuator = plant.AddJointActuator(name, motor)
+    actuator.set_default_rotor_inertia(joint.drive_train.rotor_inertia)
+    actuator.set_default_gear_ratio(joint.drive_train.ratio)
+    return motor
+
+
+def _add_counterbalance(plant: MultibodyPlant, robot: RobotModel, base: RigidBody, arm: RigidBody) -> None:
+    spring, part = robot.counterbalance, robot.counterbalance_at_axis_2
+    assert spring is not None
+    assert part is not None
+    plant.AddForceElement(
+        LinearSpringDamper(
+            base, spring.base_pivot, arm, spring.arm_pivot, free_length(part), spring.stiffness, 0.0
+        )
+    )
+
+
+def _payload_inertia(robot: RobotModel, mass: float) -> SpatialInertia:
+    share = mass / robot.payload.largest_mass
+    return SpatialInertia.MakeFromCentralInertia(
+        mass, robot.payload.center_of_mass, RotationalInertia(*map(float, share * robot.payload.inertia))
+    )
+
+
+def _picture_link(
+    plant: MultibodyPlant, bodies: tuple[RigidBody, RigidBody], link: Link, tip: np.ndarray
+) -> None:
+    """Draws a link from its joint to the next one, the halves of a beam apart so that one sees it bend."""
+    first, last = bodies
+    if first is last:
+        _add_capsule(plant, first, np.zeros(3), tip, link.radius, _LINK_COLOR)
+        return
+    _add_capsule(plant, first, np.zeros(3), 0.5 * tip, link.radius, _LINK_COLOR)
+    _add_capsule(plant, last, 0.5 * tip, tip, link.radius, _LINK_COLOR)
+
+
+def _add_capsule(
+    plant: MultibodyPlant, body: RigidBody, start: np.ndarray, end: np.ndarray, radius: float, color: Rgba
+) -> None:
+    """Pictures a stretch of a link; does nothing in a plant without a SceneGraph."""
+    if not plant.geometry_source_is_registered():
+        return
+    direction = np.asarray(end) - start
+    length = float(np.linalg.norm(direction))
+    if length < 1e-6:
+        return
+    R = RotationMatrix.MakeFromOneVector(direction / length, 2)
+    X = RigidTransform(R, 0.5 * (start + end))
+    plant.RegisterVisualGeometry(body, X, Capsule(radius, length), f"{body.name()}_capsule", color.rgba)

@@ -1,0 +1,30 @@
+"""The true pose of the tool, computed from the state of a plant."""
+
+from pydrake.common.value import Value
+from pydrake.math import RigidTransform
+from pydrake.systems.framework import Context, LeafSystem
+
+from robots.dynamics.plant import PlantRobot
+
+
+class TipPose(LeafSystem):
+    """Forward kinematics of a plant, with its deflections and geometric errors.
+
+    Ports:
+        in  ``state``  state of the plant
+        out ``X_WE``   RigidTransform, the tool in the world
+    """
+
+    def __init__(self, robot: PlantRobot) -> None:
+        super().__init__()
+        self._robot, self._num_positions = robot, robot.plant.num_positions()
+        # Scratch memory only: overwritten before every use, so it carries nothing from call to call.
+        self._scratch = robot.plant.CreateDefaultContext()
+        self._state = self.DeclareVectorInputPort("state", robot.plant.num_multibody_states())
+        self.DeclareAbstractOutputPort(
+            "X_WE", lambda: Value(RigidTransform()), self._calc, {self._state.ticket()}
+        )
+
+    def _calc(self, context: Context, output) -> None:
+        self._robot.plant.SetPositions(self._scratch, self._state.Eval(context)[: self._num_positions])
+        output.set_value(self._robot.tool.CalcPoseInWorld(self._scratch))

@@ -1,0 +1,34 @@
+"""Geometric compensation: the path in joint positions of the robot as it is, without a camera."""
+
+import numpy as np
+
+from robots.kinematics.forward import robust_solve
+from systems.servo.law import LawInput, LawOutput, ServoLaw
+from systems.servo.sine_feedback import sine_feedback
+
+
+class Compensation(ServoLaw):
+    """Integrates dq/dt = J^+ L^-1 (L^T V_d + K e-bar), Probst (2024) eq. (4.14) with the corrected L.
+
+    The error e-bar is that of the calibrated kinematics at the integrated positions, so that the integration
+    does not drift, and the robust inverse carries it through singular poses. `OpenLoop` finds the same
+    positions by Newton's method from the analytic inverse and needs no gain; with a calibrated robot it is
+    the other compensation.
+
+    The memory holds the positions and their last velocity (trapezoidal rule).
+    """
+
+    memory_size = 12
+
+    def _start(self, moment: LawInput) -> np.ndarray:
+        return np.concatenate([moment.position, np.zeros(6)])
+
+    def _step(self, moment: LawInput, memory: np.ndarray) -> LawOutput:
+        q, last_velocity = memory[:6], memory[6:]
+        # The wanted pose is that of this tick, so the error is taken where the positions will be by then.
+        rows, J = self._kinematics.rows_and_jacobian(q + self.period * last_velocity)
+        gains = self.config.rotation, self.config.translation
+        feedback = sine_feedback(moment.X_WD, rows, moment.V_WD, *gains)
+        velocity = robust_solve(J, np.add(moment.V_WD, feedback))
+        q = q + 0.5 * self.period * (velocity + last_velocity)
+        return LawOutput(q, velocity, np.zeros(6), np.concatenate([q, velocity]))

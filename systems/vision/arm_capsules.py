@@ -1,0 +1,49 @@
+"""The arm as seen by cameras: capsules along its links, placed in the world by the joint positions."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from robots.description.model import RobotModel
+from robots.kinematics.forward import rotation_about
+
+_SHORTEST = 1e-6  # m, a link without length has no capsule of its own
+
+
+@dataclass(frozen=True)
+class Capsules:
+    """k capsules in the world: all points within ``radius`` of a segment."""
+
+    start: np.ndarray  # m, (k, 3)
+    end: np.ndarray  # m, (k, 3)
+    radius: np.ndarray  # m, (k,)
+
+
+class ArmCapsules:
+    """From joint positions to the capsules of base and links.
+
+    They run from joint to joint, as those that picture the robot do; the last link ends at the flange and has
+    none.
+    """
+
+    def __init__(self, robot: RobotModel) -> None:
+        base = robot.base.pose()
+        placements = [joint.placement.pose() for joint in robot.joints]
+        self._R_WB, self._p_WB = base.rotation().matrix(), base.translation()
+        self._R = [placement.rotation().matrix() for placement in placements]
+        self._p = [placement.translation() for placement in placements]
+        self._axes = robot.axes
+        radius = np.array([robot.base_link.radius, *(link.radius for link in robot.links[:-1])])
+        self._long = np.linalg.norm(self._p, axis=1) > _SHORTEST
+        self._radius = radius[self._long]
+
+    def at(self, q: np.ndarray) -> Capsules:
+        """The capsules in the world at joint positions q (rad, shape (6,))."""
+        R, p = self._R_WB, self._p_WB
+        joints = [p]
+        for placement_R, placement_p, axis, angle in zip(self._R, self._p, self._axes, q, strict=True):
+            p = p + R @ placement_p
+            R = R @ placement_R @ rotation_about(axis, angle)
+            joints.append(p)
+        ends = np.array(joints)
+        return Capsules(ends[:-1][self._long], ends[1:][self._long], self._radius)

@@ -1,0 +1,183 @@
+"""From what the cameras saw of wand and frame to where they stand and how they see.
+
+The cameras are placed one by one (`camera_placement`), then everything is adjusted together
+(`bundle_adjustment`), first the places, then the lenses; pixels that do not belong to the rest are left out,
+and it is adjusted again.
+"""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from robots.metrology.least_squares import UndeterminedError
+from systems.vision.calibration.bundle_adjustment import Adjusted, Scene, adjust
+from systems.vision.calibration.camera_placement import (
+    MINIMUM_FRAME_POINTS,
+    MINIMUM_WAND_POINTS,
+    placed_cameras,
+    triangulated_wand,
+)
+from systems.vision.calibration.wand import CalibrationKit, WandRun
+from systems.vision.camera_model import Cameras
+
+MINIMUM_PLACES = 20
+
+_OUTLIER = 5.0  # sigma
+_ROUNDS = 8  # of leaving out
+_LARGEST_SIGMA = 3.0  # px; no camera is that bad, so points have wrong names or a lens is another one
+
+
+@dataclass(frozen=True)
+class WandCalibration:
+    """The cameras in the frame Q of the L-frame, and how well they are known."""
+
+    cameras: Cameras
+    covariance: np.ndarray  # of the parameters `camera_parameters.NAMES` of each camera, (n, 15, 15)
+    sigma: float  # px, standard deviation of a pixel as the residuals show it
+    points: np.ndarray  # of the wand that each camera saw and that were used, (n,)
+    outliers: np.ndarray  # pixels that were left out, (n,)
+    rms_px: np.ndarray  # root mean square distance of seen and expected pixels, (n,)
+    mean_distance: np.ndarray  # m, from the point to the ray on average, Probst (2024) figure A.10, (n,)
+    wand_lengths: np.ndarray  # m, of each place, by triangulation alone, (f,)
+    wand: np.ndarray  # m, its ends, (f, 2, 3)
+
+    @property
+    def position_sigma(self) -> np.ndarray:
+        """Standard deviation of the places of the cameras along an axis on average in m, (n,)."""
+        return np.sqrt(np.einsum("nii->n", self.covariance[:, 12:, 12:]) / 3.0)
+
+    @property
+    def wand_deviation(self) -> float:
+        """Standard deviation of the wand's length in m."""
+        return float(np.std(self.wand_lengths, ddof=1))
+
+
+def calibrate_with_wand(
+    run: WandRun, kit: CalibrationKit, guess: Cameras, names: list[str], pixel_sigma: float = 0.1
+) -> WandCalibration:
+    """The most likely cameras.
+
+    Args:
+        run: what n cameras saw.
+        kit: wand and frame.
+        guess: the lenses of the n cameras as their data sheets say; poses are not looked at.
+        names: of the cameras, for refusals.
+        pixel_sigma: px, expected along u and v.
+
+    Raises:
+        UndeterminedError: if cameras or points are too few, or do not determine what is asked of them.
+    """
+    seen = ~np.isnan(run.wand_pixels[..., 0])  # (n, f, 2)
+    _refuse_too_little(run, seen, names)
+    # A place of the wand serves if two cameras saw each end of it.
+    places = np.flatnonzero(np.all(seen.sum(0) >= 2, axis=1))
+    if len(places) < MINIMUM_PLACES:
+        raise UndeterminedError(
+            f"wand: two cameras saw both ends in {len(places)} places, needs {MINIMUM_PLACES}"
+        )
+    pixels = run.wand_pixels[:, places]
+    scene = Scene(
+        kit.p_Q,
+        run.frame_pixels,
+        pixels,
+        1e-3 * kit.wand_length_mm,
+        1e-3 * kit.wand_sigma_mm,
+        pixel_sigma,
+        run.frame_exposures,
+    )
+    cameras = placed_cameras(guess, scene, names)
+    everything = ~np.isnan(pixels[..., 0])
+    cameras = _once(cameras, scene, everything, with_lens=False)[0].cameras
+    found, used = _adjusted(cameras, scene, names)
+    if found.sigma > _LARGEST_SIGMA:
+        raise UndeterminedError(
+            f"wand: pixels scatter by {found.sigma:.1f} px, {pixel_sigma:g} px are expected: are ends or "
+            "points exchanged, or lengths or lenses not those of the kit and the cell?"
+        )
+    return _report(found, used, run)
+
+
+def _refuse_too_little(run: WandRun, seen: np.ndarray, names: list[str]) -> None:
+    if len(names) < 2:
+        raise UndeterminedError(f"wand: needs at least two cameras, got {len(names)}")
+    on_frame = np.sum(~np.isnan(run.frame_pixels[..., 0]), axis=1)
+    if np.sum(on_frame >= MINIMUM_FRAME_POINTS) < 2:
+        raise UndeterminedError(
+            f"frame: two cameras must see {MINIMUM_FRAME_POINTS} points of it, "
+            f"{np.sum(on_frame >= MINIMUM_FRAME_POINTS)} did"
+        )
+    for name, count in zip(names, seen.sum((1, 2)), strict=True):
+        if count < MINIMUM_WAND_POINTS:
+            raise UndeterminedError(
+                f"camera {name}: saw {count} points of the wand, needs {MINIMUM_WAND_POINTS}"
+            )
+
+
+def _refuse_contradiction(seen: np.ndarray, used: np.ndarray, names: list[str]) -> None:
+    """Refuses a camera of whose points, (n, f, 2), hardly any belong to the rest."""
+    for name, there, left in zip(names, seen.sum((1, 2)), used.sum((1, 2)), strict=True):
+        if left < MINIMUM_WAND_POINTS:
+            raise UndeterminedError(
+                f"camera {name}: {there - left} of its {there} points contradict the other cameras: are the "
+                "ends of the wand exchanged?"
+            )
+
+
+def _adjusted(cameras: Cameras, scene: Scene, names: list[str]) -> tuple[Adjusted, Scene]:
+    """Adjusts, leaves out what does not belong to the rest, and adjusts again until nothing changes.
+
+    Returns:
+        What was found, and the scene with what was used of it.
+    """
+    used = ~np.isnan(scene.wand_pixels[..., 0])
+    found, some, whole = _once(cameras, scene, used)
+    for _ in range(_ROUNDS):
+        cameras = found.cameras
+        typical = 1.4826 * np.nanmedian(np.abs(found.wand_residual))  # outliers do not move the median
+        seen = scene.wand_pixels[:, whole]
+        off = np.nan_to_num(np.abs(seen - cameras.project(found.wand)).max(-1))
+        far = off > _OUTLIER * max(typical, 1e-9)
+        # Of a point's pixels the worst goes first: it has drawn the point away from the others.
+        worst = off == np.where(used[:, whole], off, 0.0).max(0)
+        now = used.copy()
+        now[:, whole] = ~np.isnan(seen[..., 0]) & ~(far & (worst | ~used[:, whole]))
+        if np.array_equal(now, used):
+            break
+        used = now
+        _refuse_contradiction(~np.isnan(scene.wand_pixels[..., 0]), used, names)
+        found, some, whole = _once(cameras, scene, used)
+    return found, some
+
+
+def _once(
+    cameras: Cameras, scene: Scene, used: np.ndarray, with_lens: bool = True
+) -> tuple[Adjusted, Scene, np.ndarray]:
+    """Adjusts with some pixels; also the scene with only these, and which places of the wand it has."""
+    pixels = np.where(used[..., None], scene.wand_pixels, np.nan)
+    wand = triangulated_wand(cameras, pixels, scene.pixel_sigma)
+    whole = np.isfinite(wand.reshape(len(wand), 6).sum(1))
+    some = replace(scene, wand_pixels=pixels[:, whole])
+    return adjust(cameras, some, wand[whole], with_lens), some, np.flatnonzero(whole)
+
+
+def _report(found: Adjusted, scene: Scene, run: WandRun) -> WandCalibration:
+    cameras, (n, f) = found.cameras, found.wand_residual.shape[:2]
+    off = np.linalg.norm(found.wand_residual, axis=-1).reshape(n, 2 * f)
+    used = ~np.isnan(scene.wand_pixels[..., 0])
+    points = used.sum((1, 2))
+    # A pixel off is an angle off, and that is a length at the point's depth.
+    p_Q = found.wand.reshape(-1, 3)
+    distance = np.linalg.norm(found.wand_residual.reshape(n, 2 * f, 2) / cameras.focal[:, None], axis=-1)
+    ends = triangulated_wand(cameras, scene.wand_pixels, scene.pixel_sigma)
+    lengths = np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1)
+    return WandCalibration(
+        cameras,
+        found.covariance,
+        found.sigma,
+        points,
+        np.sum(~np.isnan(run.wand_pixels[..., 0]), axis=(1, 2)) - points,
+        np.sqrt(np.nanmean(off**2, axis=1)),
+        np.nanmean(distance * cameras.depth(p_Q), axis=1),
+        lengths[~np.isnan(lengths)],
+        found.wand,
+    )

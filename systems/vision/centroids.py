@@ -1,0 +1,113 @@
+"""From pictures to blobs: what is bright, hangs together and looks like a sphere, and where its middle is.
+
+Pixels above a threshold are put together to components by OpenCV. The middle of a component is the mean of
+its pixels weighted by brightness, Probst (2024) eq. (3.41), corrected: the factors 1/K and 1/J in front of
+the sums do not belong there, and the weight is what a pixel is brighter than the threshold. Weighted with
+all of its brightness, a pixel at the edge would count for much or not at all, as noise decides; so it counts
+for nothing at the moment when it drops out.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+
+from systems.vision.camera_model import Cameras
+from systems.vision.rendering import FULL_SCALE, Picture
+from systems.vision.sphere_images import sphere_centers
+
+_LARGEST_LABEL = 32_767  # more components than that are no picture of markers
+
+
+@dataclass
+class CentroidConfig:
+    """What counts as a marker; read from a scenario file."""
+
+    threshold: float = 0.4  # in full scales; Probst (2024), table A.8, has 0.3 to 0.84
+    smallest: int = 8  # px, of the area
+    largest: int = 4000  # px, of the area
+    longest: float = 1.5  # ratio of the axes of the ellipse with the same moments
+    least_filled: float = 0.85  # share of that ellipse's area
+
+
+def check_centroids(config: CentroidConfig) -> None:
+    """Raises ValueError if a number is out of its range."""
+    if not 0.0 < config.threshold < 1.0:
+        raise ValueError(f"centroids: threshold must be between 0 and 1, got {config.threshold}")
+    if not 0 < config.smallest <= config.largest:
+        raise ValueError(
+            f"centroids: smallest must be positive and at most largest, got {config.smallest} and "
+            f"{config.largest} px"
+        )
+    if not config.longest > 1.0:
+        raise ValueError(f"centroids: longest must be above 1, got {config.longest}")
+    if not 0.0 <= config.least_filled < 1.0:
+        raise ValueError(f"centroids: least_filled must be in [0, 1), got {config.least_filled}")
+
+
+def blobs_in(pictures: Sequence[Picture], cameras: Cameras, config: CentroidConfig) -> np.ndarray:
+    """Where the centres of spheres are seen.
+
+    Args:
+        pictures: one of each camera.
+        cameras: n cameras, whose focal lengths tell how far out an ellipse of a size appears.
+        config: what counts as a marker.
+
+    Returns:
+        Pixels, shape (n, b, 2), b at least one, NaN where there is none; in no order that means anything.
+    """
+    found = [centroids(picture, config) for picture in pictures]
+    most = max(1, *(len(area) for _, area in found))
+    middles, areas = np.full((len(found), most, 2), np.nan), np.full((len(found), most), np.nan)
+    for i, (middle, area) in enumerate(found):
+        middles[i, : len(area)], areas[i, : len(area)] = middle, area
+    return sphere_centers(cameras, middles, areas)
+
+
+def centroids(picture: Picture, config: CentroidConfig) -> tuple[np.ndarray, np.ndarray]:
+    """Centroids (k, 2) in px of the whole image, and areas (k,) in px^2, of what looks like a marker.
+
+    A blob at the edge of the window is left out, for it may go on behind it.
+    """
+    pixels, level = picture.pixels, int(config.threshold * FULL_SCALE)
+    if not pixels.size:
+        return np.empty((0, 2)), np.empty(0)
+    _, lit = cv2.threshold(pixels, level, 1, cv2.THRESH_BINARY)
+    count, labels, stats, _ = cv2.connectedComponentsWithStats(lit, connectivity=8, ltype=cv2.CV_32S)
+    if not 1 < count < _LARGEST_LABEL:
+        return np.empty((0, 2)), np.empty(0)
+    left, top, width, height, area = stats.T
+    inside = (left > 0) & (top > 0)
+    inside &= (left + width < pixels.shape[1]) & (top + height < pixels.shape[0])
+    inside &= (area >= config.smallest) & (area <= config.largest)
+    inside[0] = False  # the background
+    places = cv2.findNonZero(lit)[:, 0]
+    u, v = places.T
+    label = labels[v, u]
+    excess = pixels[v, u].astype(float) - level
+    first = _sums(label, count, excess, u, v)
+    second = _sums(label, count, np.ones(len(u)), u, v)
+    is_marker = inside & _is_round(second, config)
+    middle = first[is_marker, 1:3] / first[is_marker, :1]
+    return middle + picture.corner, area[is_marker].astype(float)
+
+
+def _sums(label: np.ndarray, count: int, weight: np.ndarray, u: np.ndarray, v: np.ndarray) -> np.ndarray:
+    """Sums of w, wu, wv, wuu, wuv, wvv over each component, (count, 6)."""
+    wu, wv = weight * u, weight * v
+    terms = (weight, wu, wv, wu * u, wu * v, wv * v)
+    return np.stack([np.bincount(label, term, count) for term in terms], -1)
+
+
+def _is_round(sums: np.ndarray, config: CentroidConfig) -> np.ndarray:
+    """Whether components are filled ellipses that are not too long, by the moments of their areas."""
+    area = np.maximum(sums[:, 0], 1.0)
+    u, v = sums[:, 1] / area, sums[:, 2] / area
+    # A pixel is a square with moments of its own.
+    uu, vv = sums[:, 3] / area - u * u + 1.0 / 12.0, sums[:, 5] / area - v * v + 1.0 / 12.0
+    uv = sums[:, 4] / area - u * v
+    half_trace, half_gap = 0.5 * (uu + vv), np.hypot(0.5 * (uu - vv), uv)
+    small, large = half_trace - half_gap, half_trace + half_gap  # squared half axes over four
+    ellipse = 4.0 * np.pi * np.sqrt(np.maximum(small * large, 0.0))
+    return (large <= config.longest**2 * small) & (area >= config.least_filled * ellipse)

@@ -1,0 +1,93 @@
+"""Delays that are put into a station come out of it."""
+
+import numpy as np
+import pytest
+
+from diagrams.runs.latency import LatencyConfig, measure_latency, motion
+from diagrams.scenario.scenario import load_scenario
+from experiments.station.latency import Latency, delay_between, evaluate
+from experiments.station.latency_command import scenario_with
+from robots.description.model import load_robot
+from tests.diagrams.lockstep import Lockstep
+
+ROBOT = load_robot("irb1200")
+
+
+def measured(*settings: str, **config) -> Latency:
+    scenario = load_scenario("cell", list(settings))
+    wire = Lockstep(scenario)
+    record = measure_latency(
+        scenario,
+        ROBOT,
+        LatencyConfig(**{"duration": 12.0, **config}),
+        wire,  # pyright: ignore[reportArgumentType]
+        wire.camera(),  # pyright: ignore[reportArgumentType]
+        now=wire.now,
+    )
+    return evaluate(record)
+
+
+@pytest.mark.parametrize("dead_time", [0.012, 0.052, 0.14])
+def test_a_dead_time_is_found_to_a_millisecond(dead_time: float):
+    found = measured(f"station.drive.dead_time={dead_time}", duration=20.0)
+    assert found.dead_time == pytest.approx(dead_time, abs=5e-4)
+    assert found.cycle == pytest.approx(4.032e-3)
+    # The camera of this rig tells its exposures themselves.
+    assert found.camera == pytest.approx(0.0, abs=3e-4)
+
+
+def test_lost_and_late_messages_only_add_what_they_cost():
+    """Jitter of up to 3 ms makes a reply miss a cycle now and then, a lost one holds the last command."""
+    found = measured(
+        "station.drive.dead_time=0.052", "station.faults.loss=0.02", "station.faults.jitter=0.003"
+    )
+    assert 0.052 - 5e-4 < found.dead_time < 0.052 + 3e-3
+
+
+def test_a_delay_between_sampled_motions_is_found_to_microseconds():
+    """The effect is a cubic of the cause, sampled at other times; without noise nothing is left."""
+    time = np.arange(0.0, 10.0, 4e-3)
+    cause, _ = motion(LatencyConfig(duration=10.0), time)
+    later = np.arange(0.5, 9.5, 7e-3)
+    moved, _ = motion(LatencyConfig(duration=10.0), later - 0.0371)
+    effect = np.stack([3.0 * moved + 40.0 * moved**2, 1.0 - moved**3], axis=1)
+    delay, rest = delay_between(time, cause, later, effect, 3)
+    assert delay == pytest.approx(0.0371, abs=2e-6)
+    assert rest < 1e-6
+
+
+def test_the_motion_begins_and_ends_at_rest_and_its_speed_is_its_derivative():
+    config, h = LatencyConfig(duration=8.0), 1e-6
+    time = np.linspace(0.0, 8.0, 200)
+    position, speed = motion(config, time)
+    differences = (motion(config, time + h)[0] - motion(config, time - h)[0]) / (2.0 * h)
+    np.testing.assert_allclose(speed, differences, atol=1e-8)
+    np.testing.assert_allclose([position[0], speed[0], position[-1], speed[-1]], 0.0, atol=1e-12)
+    assert np.abs(position).max() <= np.deg2rad(config.amplitude_deg)
+
+
+@pytest.mark.parametrize(
+    ("config", "message"),
+    [
+        ({"joint": 7}, "joint must be 1 to 6, got 7"),
+        ({"duration": 1.0}, "duration must be at least 4 s"),
+        ({"amplitude_deg": 30.0}, r"amplitude_deg in \(0, 20\]"),
+        ({"joint": 2, "amplitude_deg": 20.0}, None),
+    ],
+)
+def test_what_cannot_be_moved_is_refused(config: dict, message: str | None):
+    if message is None:
+        home = ["home_deg=[0, 0, 0, 0, 0, 0]"]
+        assert measured(*home, **config).dead_time < 1e-3  # there is room for that
+    else:
+        with pytest.raises(ValueError, match=message):
+            measured(**config)
+
+
+def test_the_delays_become_a_scenario(tmp_path):
+    found = measured("station.drive.dead_time=0.052")
+    path = tmp_path / "found.yaml"
+    path.write_text(scenario_with("cell", found))
+    scenario = load_scenario(str(path))
+    assert scenario.station.drive.dead_time == pytest.approx(found.dead_time, abs=1e-6)
+    assert scenario.station.interface == "egm"

@@ -1,0 +1,185 @@
+"""Scenario files: the shipped ones, inheritance, settings, and one line for every mistake."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from diagrams.runs.simulation import Experiment
+from diagrams.scenario.scenario import ScenarioError, load_scenario, scenario_text, shipped_scenarios
+
+
+def refusal(name: str, *settings: str) -> str:
+    with pytest.raises(ScenarioError) as caught:
+        load_scenario(name, list(settings))
+    text = str(caught.value)
+    assert "\n" not in text
+    return text
+
+
+def written(folder: Path, text: str, name: str = "mine.yaml") -> str:
+    (folder / name).write_text(text)
+    return str(folder / name)
+
+
+def test_the_shipped_scenarios_load_by_name_and_say_what_they_are():
+    assert shipped_scenarios() == ["cell", "dead-time", "misaligned", "nominal"]
+    for name in shipped_scenarios():
+        assert len(load_scenario(name).description) > 40
+
+
+def test_misaligned_is_the_robot_of_table_6_1():
+    scenario = load_scenario("misaligned")
+    np.testing.assert_array_equal(scenario.station.errors.joint_offset_deg, [1.0, 1.5, 2.0, 2.5, 3.0, 3.5])
+    np.testing.assert_array_equal(scenario.station.errors.tool_translation_mm, [10.0, 10.0, 10.0])
+    np.testing.assert_array_equal(scenario.station.errors.tool_zyx_deg, [0.0, 0.0, 0.1])
+    assert scenario.station.payload == 7.0
+    assert [scenario.servo.laws[law].translation for law in ("numerical_ik", "pbvs", "position_level")] == [
+        7,
+        5,
+        4,
+    ]
+    assert scenario.reference.settle == 4.0
+
+
+def test_dead_time_is_misaligned_with_140_ms_from_command_to_motion():
+    late, base = load_scenario("dead-time"), load_scenario("misaligned")
+    assert late.station.drive.command_delay + late.station.drive.dead_time == pytest.approx(0.14)
+    late.station.drive, late.description = base.station.drive, base.description
+    assert scenario_text(late) == scenario_text(base)
+
+
+@pytest.mark.parametrize("name", ["cell", "dead-time", "misaligned", "nominal"])
+def test_the_text_of_a_scenario_reads_back_as_the_same_scenario(tmp_path: Path, name: str):
+    text = scenario_text(load_scenario(name))
+    assert scenario_text(load_scenario(written(tmp_path, text))) == text
+
+
+def test_a_file_extends_a_shipped_scenario_or_one_beside_it(tmp_path: Path):
+    written(tmp_path, "extends: misaligned\nstation: {payload: 3}\n", "base.yaml")
+    name = written(tmp_path, "extends: base.yaml\nstation: {camera: {delay: 0.02}}\n")
+    scenario = load_scenario(name)
+    assert scenario.station.payload == 3.0
+    assert scenario.station.camera.delay == 0.02
+    assert scenario.station.camera.position_sigma == 50e-6  # of the one at the bottom
+    assert scenario.servo.laws["pbvs"].translation == 5.0
+
+
+def test_settings_come_last_and_are_read_as_yaml():
+    settings = ["station.camera.delay=0.008", "initial_error_mm=[1, 2, 3]", "law=pbvs", "station.payload=0.5"]
+    scenario = load_scenario("nominal", settings)
+    assert scenario.station.camera.delay == 0.008
+    np.testing.assert_array_equal(scenario.initial_error_mm, [1.0, 2.0, 3.0])
+    assert scenario.law == "pbvs"
+    assert scenario.station.payload == 0.5
+    law = load_scenario("nominal", ["servo.laws.pbvs.translation=3"]).servo.laws["pbvs"]
+    assert (law.translation, law.drive) == (3.0, "velocity")  # the rest of the law stays
+
+
+def test_a_small_number_may_be_written_with_an_exponent_and_no_point():
+    """YAML 1.1 takes 50e-6 for a text; whoever sets a spread does not."""
+    scenario = load_scenario("nominal", ["station.camera.position_sigma=50e-6"])
+    assert scenario.station.camera.position_sigma == 50e-6
+
+
+def test_a_scenario_of_nothing_is_the_default(tmp_path: Path):
+    scenario = load_scenario(written(tmp_path, "description: empty\n"))
+    assert (scenario.robot, scenario.station.period, scenario.station.payload) == ("irb1200", 4e-3, 0.0)
+
+
+@pytest.mark.parametrize(
+    ("setting", "words"),
+    [
+        (
+            "station.camera.delayy=0.1",
+            ["unknown key 'station.camera.delayy'", "known here", "position_sigma"],
+        ),
+        ("speed=1", ["unknown key 'speed'", "station", "servo"]),
+        ("servo.laws.pbvs.gain=1", ["unknown key 'servo.laws.pbvs.gain'", "translation"]),
+        ("servo.laws.magic.translation=1", ["unknown key 'servo.laws.magic'", "position_level"]),
+        ("law=magic", ["law must be one of", "numerical_ik", "'magic'"]),
+        ("servo.laws.pbvs.drive=torque", ["servo.laws.pbvs.drive must be one of", "cascade", "'torque'"]),
+        ("station.kind=real", ["station.kind must be one of simulated", "'real'"]),
+        ("station.elasticity=soft", ["station.elasticity must be one of rigid, joints", "'soft'"]),
+        ("station.camera.delay=4", ["station.camera.delay must be between 0 and 1 s", "got 4"]),
+        ("station.drive.command_delay=4", ["station.drive.command_delay must be between", "1 s, got 4"]),
+        ("station.drive.dead_time=140", ["station.drive.dead_time must be between", "1 s, got 140"]),
+        ("station.camera.position_sigma=50", ["station.camera.position_sigma must be between", "m, got 50"]),
+        ("station.camera.delay=.nan", ["station.camera.delay", "nan"]),
+        ("station.period=0", ["station.period must be between", "s, got 0"]),
+        ("servo.laws.pbvs.translation=-1", ["servo.laws.pbvs.translation must be between", "got -1"]),
+        ("station.camera.delay=fast", ["station.camera.delay must be a number", "'fast'"]),
+        ("station.camera.delay=true", ["station.camera.delay must be a number", "True"]),
+        ("station.camera=4", ["station.camera must be a group of", "got 4"]),
+        ("servo.laws=4", ["servo.laws must be a group", "got 4"]),
+        ("seed=1.5", ["seed must be a whole number", "got 1.5"]),
+        ("initial_error_mm=[1, 2]", ["initial_error_mm must be 3 numbers", "[1, 2]"]),
+        ("station.errors.joint_offset_deg=[1,2,3,4,5,x]", ["joint_offset_deg must be 6 numbers", "'x'"]),
+        ("home_deg=0", ["home_deg must be 6 numbers", "got 0"]),
+        ("station.camera.delay", ["--set station.camera.delay", "must look like"]),
+        ("=3", ["--set =3", "must look like"]),
+        ("station.payload.mass=3", ["--set station.payload.mass=3", "'payload' is a value, not a group"]),
+        ("station.camera.delay=[", ["--set station.camera.delay=["]),
+        # What the parts of the diagram would refuse later.
+        ("station.camera.dropout_probability=1.5", ["dropout_probability", "1.5"]),
+        ("station.camera.dropouts=[[0.2, 0.1]]", ["camera: a drop-out must be [start, end]", "[0.2, 0.1]"]),
+        ("servo.guard.speed_share=2", ["speed_share", "2"]),
+        ("station.payload=50", ["payload", "50"]),
+        ("integrator.scheme=magic", ["integrator.scheme", "magic"]),
+        ("servo.laws.numerical_ik.translation=0", ["translation", "got 0"]),
+        ("station.drive.command_delay=0.001", ["command", "0.001"]),
+        ("servo.guard.hold_after=0.9", ["hold_after", "0.9"]),
+        ("reference.path=square", ["path", "square"]),
+        (
+            "reference.waypoints=[{translation_mm: [1, 2]}, {}]",
+            ["reference.waypoints[0].translation_mm", "3 numbers", "[1"],
+        ),
+        ("description=5", ["description", "5"]),
+        ("seed=true", ["seed", "int", "True"]),
+    ],
+)
+def test_refuses_a_mistake_in_one_line_that_says_what_and_where(setting: str, words: list[str]):
+    """When the scenario is read, or at the latest when the diagram is built; always a ValueError."""
+    with pytest.raises(ValueError) as caught:  # noqa: PT011 the words below say which
+        Experiment(load_scenario("misaligned", [setting]), "numerical_ik")
+    text = str(caught.value)
+    assert "\n" not in text
+    for word in words:
+        assert word in text
+
+
+def test_a_refusal_names_the_scenario(tmp_path: Path):
+    name = written(tmp_path, "station: {payload: heavy}\n")
+    assert refusal(name).startswith(f"scenario {name}: station.payload must be a number")
+
+
+@pytest.mark.parametrize("name", ["nothing", "folder/nothing.yaml"])
+def test_a_missing_scenario_is_named_beside_those_that_exist(name: str):
+    text = refusal(name)
+    assert f"scenario '{name}': no file" in text
+    assert "dead-time, misaligned, nominal" in text
+
+
+def test_a_file_that_extends_itself_is_refused(tmp_path: Path):
+    written(tmp_path, "extends: b.yaml\n", "a.yaml")
+    assert "'extends' runs in a circle" in refusal(written(tmp_path, "extends: a.yaml\n", "b.yaml"))
+
+
+@pytest.mark.parametrize("text", ["[1, 2]", "station: [", "", "just words"])
+def test_a_file_that_is_no_mapping_is_refused(tmp_path: Path, text: str):
+    name = written(tmp_path, text)
+    assert f"scenario {name}: " in refusal(name)
+
+
+@pytest.mark.parametrize(
+    ("settings", "words"),
+    [
+        (["initial_error_mm=[3000, 0, 0]"], ["cannot follow the path 'rectangle'", "out of reach"]),
+        (["reference.path=circle", "reference.circle.radius_mm=900"], ["cannot follow the path 'circle'"]),
+    ],
+)
+def test_a_path_out_of_reach_is_refused_before_anything_moves(settings: list[str], words: list[str]):
+    with pytest.raises(ScenarioError) as caught:
+        Experiment(load_scenario("nominal", settings), "pbvs")
+    for word in words:
+        assert word in str(caught.value)

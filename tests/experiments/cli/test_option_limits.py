@@ -1,0 +1,22 @@
+"""Numbers that an option may not have are refused in its name."""
+
+import math
+
+import pytest
+
+from experiments.cli.option_limits import at_least, positive
+
+
+def test_the_least_is_allowed_and_one_less_refused():
+    for allowed in (1, None):  # None: the option was not given
+        at_least("--jobs", 1, allowed)
+    with pytest.raises(ValueError, match=r"^--jobs must be at least 1, got 0$"):
+        at_least("--jobs", 1, 0)
+
+
+@pytest.mark.parametrize("number", [0.0, -2.5, math.inf, math.nan])
+def test_only_positive_and_finite_numbers_are_positive(number: float):
+    for allowed in (1e-300, None):
+        positive("--realtime", allowed)
+    with pytest.raises(ValueError, match=rf"^--realtime must be positive, got {number:g}$"):
+        positive("--realtime", number)

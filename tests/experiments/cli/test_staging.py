@@ -1,0 +1,45 @@
+"""Results appear all at once, or not at all."""
+
+from pathlib import Path
+
+import pytest
+
+from experiments.cli.staging import staged_file, staged_folder
+from tests.experiments.commands import files
+
+
+def test_files_appear_when_the_work_is_done_and_not_before(tmp_path: Path):
+    with staged_folder(tmp_path / "new/results") as stage:
+        (stage / "a.txt").write_text("a")
+        assert not (tmp_path / "new").exists()
+    assert files(tmp_path) == {"new", "new/results", "new/results/a.txt"}
+
+
+def test_work_that_fails_leaves_older_results_as_they_were(tmp_path: Path):
+    (tmp_path / "a.txt").write_text("old")
+
+    def fail() -> None:
+        with staged_folder(tmp_path) as stage:
+            (stage / "a.txt").write_text("new")
+            raise RuntimeError("defect")
+
+    with pytest.raises(RuntimeError, match="defect"):
+        fail()
+    assert files(tmp_path) == {"a.txt"}
+    assert (tmp_path / "a.txt").read_text() == "old"
+
+
+def test_a_file_is_replaced_whole(tmp_path: Path):
+    (tmp_path / "a.txt").write_text("old")
+    with staged_file(tmp_path / "a.txt") as path:
+        path.write_text("new")
+        assert (tmp_path / "a.txt").read_text() == "old"
+    assert (tmp_path / "a.txt").read_text() == "new"
+    assert files(tmp_path) == {"a.txt"}
+
+
+def test_a_place_where_nothing_can_be_written_is_refused_before_the_work(tmp_path: Path):
+    (tmp_path / "file").write_text("")
+    refused = pytest.raises(OSError, match=r"cannot write in folder .*file/results: not a directory")
+    with refused, staged_folder(tmp_path / "file/results"):
+        pytest.fail("the work began")
