@@ -1,6 +1,7 @@
 """The laws of the repository itself: floors, package data, size of files, first words to a newcomer."""
 
 import ast
+import os
 import re
 import shutil
 import subprocess
@@ -21,7 +22,28 @@ DATA = {"robots": "data", "diagrams": "scenario/data"}
 SOURCES = sorted(path for floor in FLOORS for path in (ROOT / floor).rglob("*.py"))
 TESTS = sorted((ROOT / "tests").rglob("*.py"))
 DATA_FILES = sorted(path for floor in FLOORS for path in (ROOT / floor).rglob("*.y*ml"))
+FOLDERS = sorted({path.parent for path in [*SOURCES, *TESTS, *DATA_FILES]})
 ROOT_FILES = [path for path in ROOT.iterdir() if path.suffix in {".md", ".toml"} or path.name == "Makefile"]
+
+# Imports the modules of others once and then each of ours in a process of its own, forked from this one.
+IMPORT_ALONE = """
+import contextlib, gc, importlib, os, sys
+foreign, ours = sys.argv[1].split(), sys.argv[2].split()
+for module in foreign:
+    with contextlib.suppress(ImportError):  # a name within a module
+        importlib.import_module(module)
+assert not set(ours) & set(sys.modules)
+gc.disable()  # a search for garbage would copy the pages that a child shares with this process
+for module in ours:
+    child = os.fork()
+    if child == 0:
+        try:
+            importlib.import_module(module)
+        except BaseException as error:
+            print(f"{module}: {type(error).__name__}: {error}", flush=True)
+        os._exit(0)
+    os.waitpid(child, 0)
+"""
 
 
 def name(path: Path) -> str:
@@ -58,6 +80,33 @@ def test_a_robot_knows_no_time_no_ports_and_no_sockets(path: Path):
 @pytest.mark.parametrize("path", [*SOURCES, *TESTS], ids=name)
 def test_a_file_is_short_enough_to_be_read_in_one_sitting(path: Path):
     assert len(path.read_text().splitlines()) <= 400
+
+
+@pytest.mark.parametrize("folder", FOLDERS, ids=name)
+def test_a_folder_is_small_enough_to_be_one_room(folder: Path):
+    assert len([path for path in folder.iterdir() if path.is_file() and path.name != "__init__.py"]) <= 15
+
+
+def test_the_rooms_import_as_the_contracts_in_pyproject_say():
+    """Floors, the walls between rooms and the order of rooms on a floor; without circles anywhere."""
+    linter = Path(sys.executable).with_name("lint-imports")
+    result = subprocess.run([linter, "--no-cache"], cwd=ROOT, capture_output=True, text=True)
+    assert result.returncode == 0, result.stdout
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(not hasattr(os, "fork"), reason="needs processes that fork")
+def test_every_module_can_be_imported_alone_in_a_fresh_process():
+    """In whichever order a program imports, no module waits for one that waits for it."""
+    modules = [".".join(path.relative_to(ROOT).with_suffix("").parts) for path in SOURCES]
+    foreign = {module for path in SOURCES for module in imports(path) if module.split(".")[0] not in FLOORS}
+    result = subprocess.run(
+        [sys.executable, "-c", IMPORT_ALONE, " ".join(sorted(foreign)), " ".join(modules)],
+        cwd=ROOT,
+        capture_output=True,
+        text=True,
+    )
+    assert (result.returncode, result.stdout) == (0, ""), result.stdout + result.stderr
 
 
 @pytest.mark.parametrize("path", [*SOURCES, *TESTS, *DATA_FILES, *ROOT_FILES], ids=name)

@@ -10,8 +10,8 @@ from typing import Any
 
 import numpy as np
 
+from diagrams.runs.virtual_cell import Exposure, VirtualCell
 from diagrams.scenario.scenario import Scenario
-from diagrams.virtual_cell import Exposure, VirtualCell
 from robots.description.model import RobotModel
 from systems.cell.network_faults import FaultyLink
 from systems.link.abb.channel import Buffering, UdpChannel, steady_time

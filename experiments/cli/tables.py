@@ -8,11 +8,10 @@ from rich.console import Console
 from rich.markup import escape
 from rich.table import Table
 
+from experiments.report.error_rows import AXES, KINDS, error_row, format_cell, is_best, smallest_of_columns
 from experiments.report.style import law_colors, law_title
 
 SOURCES = {"true": "true, what a perfect instrument would see", "measured": "measured, what the camera says"}
-AXES = ("Δx mm", "Δy mm", "Δz mm", "ρx °", "ρy °", "ρz °")
-KINDS = {"max": "largest", "static": "static"}
 
 
 def print_summary(console: Console, result: Mapping[str, Any]) -> None:
@@ -63,26 +62,3 @@ def guard_table(result: Mapping[str, Any]) -> Table:
     for law, run in result["runs"].items():
         table.add_row(escape(law_title(law)), *(str(run["guard"].get(kind, 0)) for kind in kinds))
     return table
-
-
-def error_row(numbers: Mapping[str, Any], kind: str) -> list[float | None]:
-    """Six numbers, mm then degrees; ``kind`` is "max" or "static"."""
-    return [*numbers[f"{kind}_mm"], *numbers[f"{kind}_deg"]]
-
-
-def smallest_of_columns(rows: list[list[float | None]]) -> list[float | None]:
-    """The smallest number of each column, None where a single row leaves nothing to compare."""
-    if len(rows) < 2:
-        return [None] * len(rows[0])
-    columns = ([value for value in column if value is not None] for column in zip(*rows, strict=True))
-    return [min(column, default=None) for column in columns]
-
-
-def is_best(value: float | None, best: float | None) -> bool:
-    """Whether a number shows as the smallest of its column: equal digits are equally good."""
-    return value is not None and best is not None and format_cell(value) == format_cell(best)
-
-
-def format_cell(value: float | None) -> str:
-    """Three digits after the point, a dash where there is no number."""
-    return "–" if value is None else f"{value:.3f}"

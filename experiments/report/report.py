@@ -8,9 +8,9 @@ from typing import Any
 
 from plotly.offline import get_plotlyjs
 
-from experiments.cli.tables import AXES, KINDS, error_row, format_cell, is_best, smallest_of_columns
 from experiments.metrics.run_metrics import Comparison, best_law, judged_by
 from experiments.report.data import norm, plot_data
+from experiments.report.error_rows import AXES, KINDS, error_row, format_cell, is_best, smallest_of_columns
 from experiments.report.files import write_text
 from experiments.report.page import page
 from experiments.report.script import SCRIPT

@@ -12,8 +12,8 @@ from pathlib import Path
 from typing import Any
 
 from diagrams.hardware_link import StationError
+from diagrams.runs.virtual_cell import CellRecord
 from diagrams.scenario.scenario import Scenario, scenario_text
-from diagrams.virtual_cell import CellRecord
 from experiments.cli.workers import SimulationError
 from robots.description.model import RobotModel
 from systems.link.abb.client import EgmClient

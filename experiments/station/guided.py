@@ -8,8 +8,8 @@ import numpy as np
 
 from diagrams.record.log import RunLog
 from diagrams.runs.real_time import RealTimeRecord, RealTimeRun
+from diagrams.runs.virtual_cell import CellRecord
 from diagrams.scenario.scenario import Scenario
-from diagrams.virtual_cell import CellRecord
 from experiments.station.clients import station_clients
 from robots.description.model import RobotModel
 from systems.servo import BLIND_LAWS

@@ -8,8 +8,8 @@ import heapq
 import itertools
 from types import SimpleNamespace
 
+from diagrams.runs.virtual_cell import VirtualCell
 from diagrams.scenario.scenario import Scenario
-from diagrams.virtual_cell import VirtualCell
 from robots.description.model import load_robot
 from systems.cell.network_faults import FaultyLink
 from systems.link.abb.controller import VirtualController
