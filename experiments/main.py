@@ -56,6 +56,7 @@ from experiments.report.report import verdict
 from experiments.station.cell_command import cell_command
 from experiments.station.guided_command import ask_before_moving, guide, on_station
 from experiments.station.latency_command import latency_command
+from experiments.zeros.command import zeros_command
 from robots.description.model import load_robot, shipped_robots
 from systems.servo import COMPARED_LAWS, LAWS
 
@@ -230,6 +231,7 @@ def diagram_command(
 app.command("cell")(cell_command)
 app.command("latency")(latency_command)
 app.command("modes")(modes_command)
+app.command("zeros")(zeros_command)
 app.add_typer(cameras_app, name="cameras")
 app.command("feedforward")(feedforward_command)
 app.command("design")(design_command)

@@ -1,0 +1,1 @@
+"""``truetip zeros``: which robots have an exact inverse, and which do not."""

@@ -1,0 +1,121 @@
+"""``truetip zeros``: where the exact inverse of an elastic robot is unstable."""
+
+from pathlib import Path
+from typing import Annotated
+
+import numpy as np
+import typer
+from rich.markup import escape
+
+from experiments.cli.console import print_files, progress_bar, refusing
+from experiments.cli.json_output import human_console, json_output
+from experiments.cli.options import GridOption, JsonOption, PayloadOption, PictureOption, StudiedRobotOption
+from experiments.cli.staging import staged_file
+from experiments.report.plot_page import Section, html_table, write_plot_page
+from experiments.zeros.plots import beam_figure, plane_figure, workspace_figure
+from experiments.zeros.study import (
+    BEAM_MODES,
+    EXAMPLES,
+    ZeroStudy,
+    example_json,
+    study_zeros,
+    two_joint_arm_limit,
+    two_joint_arm_zeros,
+    zeros_json,
+)
+from robots.description.model import load_robot
+from robots.dynamics.modal_beam import BOUNDARIES, ModalBeam
+
+
+def zeros_command(
+    robot: StudiedRobotOption = "kr210",
+    payload: PayloadOption = None,
+    elasticity: Annotated[
+        str, typer.Option(metavar="NAME", help="structure, or joints for elastic gears alone.")
+    ] = "structure",
+    grid: GridOption = 15,
+    example: Annotated[
+        str | None, typer.Option(metavar="NAME", help=f"In place of a robot: {', '.join(EXAMPLES)}.")
+    ] = None,
+    out: PictureOption = Path("out/zeros.html"),
+    json_file: JsonOption = None,
+) -> None:
+    """Find out whether an elastic robot has a stable exact inverse, and how fast its unstable zeros are."""
+    human = human_console(json_file)
+    with (
+        json_output(json_file) as output,
+        refusing(ValueError, OSError),
+        staged_file(out) as page,
+        output.staged(),
+    ):
+        if example is not None:
+            numbers = example_json(example)
+            verdict = _write_example(page, example)
+        else:
+            model = load_robot(robot)
+            mass = model.payload.largest_mass if payload is None else payload
+            with progress_bar(f"{grid * grid} positions") as progress:
+                study = study_zeros(model, elasticity, mass, grid, progress)
+            numbers = zeros_json(study)
+            verdict = zeros_verdict(study)
+            _write_study(page, study, verdict)
+        output.write(numbers)
+    human.print(escape(verdict))
+    print_files(human, out)
+
+
+def zeros_verdict(study: ZeroStudy) -> str:
+    """What the zeros mean for a feedforward, in a sentence or two."""
+    slowest = study.slowest_rhp
+    unstable, poses = int(np.isfinite(slowest).sum()), len(study.regular)
+    name = f"{study.robot.name}, {study.payload:g} kg, elastic {study.elasticity}"
+    if not unstable:
+        return f"{name}: no unstable zero in any of {poses} positions; the exact inverse is stable."
+    return (
+        f"{name}: zeros in the right half-plane in {unstable} of {poses} positions, so no causal inverse can "
+        f"be exact there; the real part of the slowest is {np.nanmin(slowest):.0f} 1/s at the worst "
+        f"position and {np.nanmedian(slowest):.0f} 1/s in the median."
+    )
+
+
+def _write_study(page: Path, study: ZeroStudy, verdict: str) -> None:
+    sections = []
+    if np.isfinite(study.slowest_rhp).any():
+        note = (
+            "From the motors to the pose of the tool; axis 5 at 40 degrees, axes 1, 4 and 6 at zero. A "
+            "pair that has just crossed the imaginary axis has a small real part at a high frequency."
+        )
+        sections.append(Section("Slowest zero in the right half-plane", note, workspace_figure(study), 560))
+    middle = study.regular[len(study.regular) // 2]
+    sections.append(
+        Section("All zeros of the middle position", "Poles of the exact inverse.", plane_figure(middle))
+    )
+    write_plot_page(page, f"Zeros, {study.robot.name}", verdict, sections)
+
+
+def _write_example(page: Path, example: str) -> str:
+    """Writes the page of an example and returns its verdict."""
+    if example == "beam":
+        head = ("boundary", *(f"{n} modes" for n in BEAM_MODES))
+        rows = [
+            [b, *(f"{ModalBeam(num_modes=n, boundary=b).largest_stable_xi():.3f}" for n in BEAM_MODES)]
+            for b in BOUNDARIES
+        ]
+        one, three = (ModalBeam(num_modes=n).largest_stable_xi() for n in (1, 3))
+        verdict = (
+            f"A driven beam with 0.45 of its mass at the end has a stable inverse for outputs up to "
+            f"{one:.3f} of its length with one mode, {three:.3f} with three."
+        )
+        sections = [Section(f"Output along the beam, {n} modes", "", beam_figure(n), 360) for n in (1, 3)] + [
+            Section("Largest stable output by number of modes", "", html_table(head, rows))
+        ]
+    else:
+        limit, zeros = two_joint_arm_limit(), two_joint_arm_zeros(0.5)
+        rates = ", ".join(f"{value:.2f}" for value in np.real(zeros.values))
+        verdict = (
+            f"The point 0.5 m beyond the centre of mass of the two-joint arm has zeros at {rates} 1/s; "
+            f"the inverse is stable up to {limit:.4f} m."
+        )
+        sections = [Section("Zeros of the two-joint arm, x_l = 0.5 m", "", plane_figure(zeros))]
+    write_plot_page(page, f"Zeros, example {example}", verdict, sections)
+    return verdict

@@ -1,0 +1,56 @@
+"""Pictures of zeros: the slowest unstable one over axes 2 and 3, zeros in the plane, outputs along a beam."""
+
+import numpy as np
+import plotly.graph_objects as go
+
+from experiments.zeros.study import ZeroStudy
+from robots.dynamics.modal_beam import ModalBeam
+from robots.dynamics.transmission_zeros import Zeros
+
+
+def workspace_figure(study: ZeroStudy) -> go.Figure:
+    """Contours of the slowest zero in the right half-plane by real part; white where there is none."""
+    figure = go.Figure(
+        go.Heatmap(
+            x=np.rad2deg(study.axis_2),
+            y=np.rad2deg(study.axis_3),
+            z=np.log10(study.slowest_rhp.T),
+            colorscale="Viridis",
+            colorbar={
+                "title": "1/s",
+                "tickvals": [0, 1, 2, 3, 4, 5],
+                "ticktext": ["1", "10", "100", "1e3", "1e4", "1e5"],
+            },
+            customdata=study.slowest_rhp.T,
+            hovertemplate="axis 2: %{x:.0f}°<br>axis 3: %{y:.0f}°<br>%{customdata:.0f} 1/s<extra></extra>",
+        )
+    )
+    return figure.update_layout(xaxis={"title": "axis 2 in degrees"}, yaxis={"title": "axis 3 in degrees"})
+
+
+def plane_figure(zeros: Zeros) -> go.Figure:
+    """Zeros in the complex plane."""
+    figure = go.Figure(
+        go.Scatter(
+            x=np.real(zeros.values),
+            y=np.imag(zeros.values),
+            mode="markers",
+            marker={"symbol": "circle-open", "size": 10, "line": {"width": 2}},
+            hovertemplate="%{x:.4g} %{y:+.4g}i 1/s<extra></extra>",
+        )
+    )
+    figure.add_vline(x=0.0, line={"dash": "dot", "width": 1})
+    return figure.update_layout(xaxis={"title": "real part in 1/s"}, yaxis={"title": "imaginary part in 1/s"})
+
+
+def beam_figure(num_modes: int, boundary: str = "clamped") -> go.Figure:
+    """The largest real part of the zeros over the place of the output; Reiner (2010), figures 3.4, 3.5."""
+    beam = ModalBeam(num_modes=num_modes, boundary=boundary)
+    xi = np.linspace(0.02, 1.0, 99)
+    largest = [float(np.real(zeros.values).max(initial=0.0)) for zeros in map(beam.zeros, xi)]
+    figure = go.Figure(go.Scatter(x=xi, y=np.maximum(largest, 0.0), mode="lines"))
+    figure.add_vline(x=beam.largest_stable_xi(), line={"dash": "dot", "width": 1})
+    return figure.update_layout(
+        xaxis={"title": "place of the output, share of the length"},
+        yaxis={"title": "largest real part, in sqrt(E I / (m l<sup>3</sup>))"},
+    )

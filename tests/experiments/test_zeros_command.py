@@ -1,0 +1,73 @@
+"""truetip zeros: numbers as published, pages that open, wrong input in one line."""
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from experiments.zeros.study import two_joint_arm_limit, two_joint_arm_zeros
+from tests.experiments.browser import open_page
+from tests.experiments.commands import files, refusal, truetip
+
+
+def run(folder: Path, *arguments: str):
+    return truetip("zeros", f"--out={folder / 'zeros.html'}", *arguments)
+
+
+@pytest.mark.parametrize(("elasticity", "is_stable"), [("structure", False), ("joints", True)])
+def test_a_robot_with_an_elastic_structure_has_no_stable_inverse_anywhere(
+    tmp_path: Path, elasticity: str, is_stable: bool
+):
+    result = run(tmp_path, "--robot=kr210", f"--elasticity={elasticity}", "--grid=3", "--json", "-")
+    assert result.exit_code == 0, result.output
+    numbers = json.loads(result.stdout)
+    assert numbers["poses"] == 9
+    assert numbers["poses_with_unstable_inverse"] == (0 if is_stable else 9)
+    assert (numbers["slowest_rhp"] is None) == is_stable
+    if not is_stable:
+        assert numbers["slowest_rhp"] in [re for re, _ in numbers["zeros"]]
+        assert numbers["slowest_rhp"] == min(min(row) for row in numbers["slowest_rhp_map"])
+
+
+def test_the_examples_give_the_published_figures(tmp_path: Path):
+    arm = json.loads(run(tmp_path, "--example=two_joint_arm", "--json", "-").stdout)
+    assert [re for re, _ in arm["zeros"]] == pytest.approx([-292.19, 305.58], abs=0.01)
+    assert arm["largest_stable_x_l_m"] == pytest.approx(0.0625)
+    beam = json.loads(run(tmp_path, "--example=beam", "--json", "-").stdout)
+    assert beam["largest_stable_xi"]["clamped"]["1"] == pytest.approx(0.89, abs=2e-3)
+
+
+def test_the_page_opens(tmp_path: Path):
+    assert run(tmp_path, "--robot=kr16", "--grid=3").exit_code == 0
+    opened = open_page(tmp_path / "zeros.html")
+    assert opened.console == []
+    assert "js-plotly-plot" in opened.dom
+
+
+def test_the_published_zeros_of_the_two_joint_arm():
+    """Reiner (2010), section 3.5.3; the printed zeros belong to c = 1e6, d = 150, not to c = 1e5, d = 15."""
+    assert np.real(two_joint_arm_zeros(0.5).values) == pytest.approx([-292.1857, 305.5786], abs=1e-3)
+    softer = np.real(two_joint_arm_zeros(0.5, stiffness=1e5, damping=15.0).values)
+    assert softer == pytest.approx([-93.8238, 95.1631], abs=1e-3)
+
+
+def test_the_two_joint_arm_is_minimum_phase_up_to_the_limit_of_the_source():
+    limit = two_joint_arm_limit()
+    assert limit == pytest.approx(0.0625)
+    assert two_joint_arm_zeros(0.999 * limit).is_minimum_phase
+    assert not two_joint_arm_zeros(1.001 * limit).is_minimum_phase
+
+
+REFUSED = {
+    "robot": ("--robot=kr211", "robot 'kr211': no file"),
+    "example": ("--example=bridge", "--example must be one of two_joint_arm, beam, got 'bridge'"),
+    "rigid": ("--elasticity=rigid", "elasticity must be joints or structure"),
+    "grid": ("--grid=1", "--grid must be at least 2, got 1"),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize(("option", "message"), REFUSED.values(), ids=REFUSED)
+def test_wrong_input_is_refused_in_one_line_and_leaves_nothing(tmp_path: Path, option: str, message: str):
+    assert message in refusal(run(tmp_path, option))
+    assert files(tmp_path) == set()
