@@ -3,6 +3,7 @@
 from pydrake.systems.framework import Diagram, DiagramBuilder
 from pydrake.systems.primitives import Adder
 
+from diagrams.scenario.controller_model import controller_model
 from diagrams.scenario.scenario import Scenario
 from robots.description.model import NUM_JOINTS, RobotModel
 from systems.feedforward import FEEDFORWARDS
@@ -32,6 +33,11 @@ class Servo(Diagram):
     def __init__(self, robot: RobotModel, scenario: Scenario, law: str) -> None:
         """Builds the controller of one law.
 
+        Args:
+            robot: as the controller knows it, unless `servo.model` says otherwise.
+            scenario: what to do, and what the controller believes of the station.
+            law: which law to use.
+
         Raises:
             ValueError: if the law is unknown or a part refuses its configuration.
         """
@@ -39,30 +45,19 @@ class Servo(Diagram):
         if law not in LAWS:
             raise ValueError(f"law must be one of {', '.join(LAWS)}, got '{law}'")
         config = scenario.servo.laws.get(law, LawConfig())
-        guard_config, period = scenario.servo.guard, scenario.station.period
-        preview = scenario.reference.preview
+        guard_config = scenario.servo.guard
+        self.model = controller_model(scenario, robot)
         builder = DiagramBuilder()
-        self.reference = builder.AddNamedSystem("reference", Reference(scenario.reference, period))
-        servo = builder.AddNamedSystem(
-            "law",
-            LAWS[law](
-                robot,
-                config,
-                guard_config,
-                period,
-                preview=preview,
-                memory_span=scenario.station.camera.delay + guard_config.hold_after,
-                payload=scenario.station.payload,
-            ),
-        )
+        self.reference = builder.AddNamedSystem("reference", Reference(scenario.reference, self.model.period))
+        servo = builder.AddNamedSystem("law", LAWS[law](self.model, config, guard_config))
         feedforward = scenario.servo.feedforward
         has_torque = feedforward.kind != "none"
         guard = builder.AddNamedSystem(
             "guard",
             CommandGuard(
-                robot,
+                self.model.robot,
                 guard_config,
-                period,
+                self.model.period,
                 config.correction_limit,
                 config.correction_limit_deg,
                 uses_camera=law not in BLIND_LAWS,
@@ -78,7 +73,7 @@ class Servo(Diagram):
         joints = builder.ExportInput(servo.GetInputPort("joint_sample"), "joint_sample")
         commands = {name: servo.GetOutputPort(name) for name in ("position_command", "velocity_command")}
         if has_torque:
-            model = FEEDFORWARDS[feedforward.kind](robot, feedforward, period, scenario.station.payload)
+            model = FEEDFORWARDS[feedforward.kind](self.model, feedforward)
             ahead = builder.AddNamedSystem("feedforward", model)
             for name in ("X_WE", "V_WE", "A_WE"):
                 source = self.reference.GetOutputPort(f"{name}_preview")

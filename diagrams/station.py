@@ -93,9 +93,8 @@ class SimulatedStation(Diagram):
         self.plant = builder.AddNamedSystem("plant", MultibodyPlant(0.0))
         self.robot = add_robot(self.plant, robot, config.elasticity, config.payload, config.errors)
         self.plant.Finalize()
-        self.drive = builder.AddNamedSystem(
-            "drive", Drive(robot, drive, config.drive, config.period, config.payload)
-        )
+        told = config.payload if config.drive.payload is None else config.drive.payload
+        self.drive = builder.AddNamedSystem("drive", Drive(robot, drive, config.drive, config.period, told))
         motor_state = builder.AddNamedSystem("motor_state", motor_state_selector(self.robot))
         builder.Connect(self.plant.get_state_output_port(), motor_state.get_input_port())
         self._connect_drive(builder, motor_state.get_output_port())

@@ -84,7 +84,7 @@ class RealTimeRun:
         self.diagram: Diagram = builder.Build()
         self.diagram.set_name("truetip")
         self.path: CartesianPath = self.servo.reference.path
-        self.start = start_position(self.robot, scenario, self.path)
+        self.start = start_position(self.servo.model, scenario, self.path)
         self._warm_up()
         self._context: Context = self.diagram.CreateDefaultContext()
         self._scratch = self.diagram.CreateDefaultContext()

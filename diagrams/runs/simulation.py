@@ -16,6 +16,7 @@ from diagrams.servo import Servo
 from diagrams.station import SimulatedStation
 from robots.description.model import RobotModel, load_robot
 from robots.dynamics.newton_inverse import inverse_kinematics
+from systems.controller_model import ControllerModel
 from systems.guard.guard import KINDS
 from systems.reference.paths import CartesianPath
 from systems.servo import LawConfig
@@ -82,7 +83,9 @@ class Experiment:
         self.path = self.servo.reference.path
         self.simulator = Simulator(self.diagram)
         self.context = self.simulator.get_mutable_context()
-        self.station.set_at_rest(self.context, start_position(robot, scenario, self.path), self.seed)
+        self.station.set_at_rest(
+            self.context, start_position(self.servo.model, scenario, self.path), self.seed
+        )
         rate = self.station.fastest_rate(self.context)
         self.integration = Integration(scenario.integrator, scenario.station.period, rate)
         self.integration.initialize(self.simulator)
@@ -183,7 +186,7 @@ def nominal_robot(scenario: Scenario, robot: RobotModel | None) -> RobotModel:
     return load_robot(scenario.robot)
 
 
-def start_position(robot: RobotModel, scenario: Scenario, path: CartesianPath) -> np.ndarray:
+def start_position(model: ControllerModel, scenario: Scenario, path: CartesianPath) -> np.ndarray:
     """Motor positions in rad at which the robot, as the controller knows it, is off by the initial error.
 
     The whole path is tried first, so that an unreachable one is refused before anything moves.
@@ -191,7 +194,7 @@ def start_position(robot: RobotModel, scenario: Scenario, path: CartesianPath) -
     Raises:
         ScenarioError: if the start or the path is out of reach.
     """
-    inverse = inverse_kinematics(robot, scenario.station.payload)
+    inverse = inverse_kinematics(model.robot, model.payload)
     home = np.deg2rad(scenario.home_deg)
     times = np.arange(0.0, path.duration, 4e-3)
     try:
@@ -202,7 +205,7 @@ def start_position(robot: RobotModel, scenario: Scenario, path: CartesianPath) -
         return inverse.nearest(X_WE, q_path[0])
     except ValueError as error:
         raise ScenarioError(
-            f"{robot.name} cannot follow the path '{scenario.reference.path}': {error}"
+            f"{model.robot.name} cannot follow the path '{scenario.reference.path}': {error}"
         ) from error
 
 

@@ -11,6 +11,7 @@ from pydrake.systems.framework import DiagramBuilder
 from diagrams.integration import Integration
 from diagrams.record.packed_log import PackedLog
 from diagrams.runs.simulation import start_position
+from diagrams.scenario.controller_model import controller_model
 from diagrams.scenario.scenario import Scenario
 from diagrams.station import SimulatedStation
 from robots.description.model import RobotModel
@@ -83,7 +84,7 @@ class VirtualCell:
         self._simulator = Simulator(builder.Build())
         self._context = self._simulator.get_mutable_context()
         self._station_context = self._station.GetMyContextFromRoot(self._context)
-        start = start_position(robot, scenario, make_path(scenario.reference))
+        start = start_position(controller_model(scenario, robot), scenario, make_path(scenario.reference))
         self._station.set_at_rest(self._context, start, scenario.seed)
         standing = np.full(len(start), np.nan)
         inputs = self._station.GetMyMutableContextFromRoot(self._context)

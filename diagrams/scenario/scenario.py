@@ -18,6 +18,7 @@ from systems.cell.drive import KINDS, DriveConfig
 from systems.cell.marker_camera import MarkerCameraConfig
 from systems.cell.network_faults import SHARES, FaultConfig
 from systems.cell.pose_camera import CAMERAS, CameraConfig
+from systems.controller_model import ControllerModelConfig
 from systems.feedforward import FEEDFORWARDS, FeedforwardConfig
 from systems.guard.guard import GuardConfig
 from systems.link.abb.controller import EgmRunConfig
@@ -77,8 +78,9 @@ class StationConfig:
 
 @dataclass
 class ServoConfig:
-    """The controller: gains of each law, and the guard."""
+    """The controller: what it believes, gains of each law, and the guard."""
 
+    model: ControllerModelConfig = field(default_factory=ControllerModelConfig)
     laws: dict[str, LawConfig] = field(default_factory=lambda: {name: LawConfig() for name in LAWS})
     feedforward: FeedforwardConfig = field(default_factory=FeedforwardConfig)
     guard: GuardConfig = field(default_factory=GuardConfig)
@@ -136,6 +138,10 @@ _RANGES: dict[str, tuple[float, float, str]] = {
     "reference.settle": (0.0, 600.0, "s"),
     "reference.dwell": (0.0, 600.0, "s"),
     "reference.preview": (0.0, 1.0, "s"),
+    "servo.model.mismatch.stiffness": (0.0, 0.9, ""),
+    "servo.model.mismatch.payload": (0.0, 0.9, ""),
+    "servo.model.mismatch.friction": (0.0, 0.9, ""),
+    "servo.model.mismatch.seed": (0, 2**32 - 1, ""),
     "servo.feedforward.stiffness_error": (-0.9, 10.0, ""),
     "servo.feedforward.inertia_error": (-0.9, 10.0, ""),
     "servo.guard.hold_after": (1e-3, 10.0, "s"),
@@ -199,6 +205,9 @@ def _check(scenario: Scenario) -> None:
         _one_of(f"servo.laws.{law}.drive", config.drive, KINDS)
         for label, bounds in _LAW_RANGES.items():
             _in_range(f"servo.laws.{law}.{label}", getattr(config, label), bounds)
+    if scenario.station.drive.payload is not None:
+        _in_range("station.drive.payload", scenario.station.drive.payload, _RANGES["station.payload"])
+    _check_model(scenario.servo.model)
     _one_of("law", scenario.law, LAWS)
     _one_of("servo.feedforward.kind", scenario.servo.feedforward.kind, ("none", *FEEDFORWARDS))
     _one_of("station.kind", scenario.station.kind, STATIONS)
@@ -213,6 +222,21 @@ def _check(scenario: Scenario) -> None:
         _in_range("integrator.accuracy", integrator.accuracy, (1e-12, 1e-1, "relative"))
     if integrator.max_step is not None:
         _in_range("integrator.max_step", integrator.max_step, (1e-6, 0.1, "s"))
+
+
+def _check_model(model: ControllerModelConfig) -> None:
+    if model.payload is not None:
+        _in_range("servo.model.payload", model.payload, _RANGES["station.payload"])
+    for label in ("camera_delay", "command_delay"):
+        if getattr(model, label) is not None:
+            _in_range(f"servo.model.{label}", getattr(model, label), _RANGES["station.camera.delay"])
+    for label in ("stiffness", "friction"):
+        for factor in getattr(model, label):
+            _in_range(f"servo.model.{label}", factor, (0.01, 100.0, ""))
+    if model.structure is not None:
+        _in_range("servo.model.structure", model.structure, (0.01, 100.0, ""))
+    if model.elasticity:
+        _one_of("servo.model.elasticity", model.elasticity, ELASTICITIES)
 
 
 def _in_range(path: str, value: float, bounds: tuple[float, float, str]) -> None:

@@ -11,6 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from diagrams.runs.simulation import start_position
+from diagrams.scenario.controller_model import controller_model
 from diagrams.scenario.scenario import Scenario
 from robots.description.model import RobotModel
 from robots.dynamics.newton_inverse import inverse_kinematics
@@ -42,7 +43,8 @@ class Places:
 def places_on_path(scenario: Scenario, robot: RobotModel, path: CartesianPath, count: int) -> Places:
     """Evenly in time from the start of a path to its end."""
     X_WE = path.sample(np.linspace(path.path_start, path.dwell_start, count))[0]
-    inverse, q = inverse_kinematics(robot), start_position(robot, scenario, path)
+    q = start_position(controller_model(scenario, robot), scenario, path)
+    inverse = inverse_kinematics(robot)
     joints = []
     for X in X_WE:
         q = inverse.nearest(X, q)

@@ -6,12 +6,12 @@ from typing import Any
 
 import numpy as np
 
-from diagrams.scenario.scenario import StationConfig
 from experiments.cli.workers import Progress, SimulationError, in_processes
 from experiments.feedforward.rectangle import Deviation, RectangleTrial
 from experiments.feedforward.tick import tick_time
 from experiments.feedforward.trial import Trial
 from robots.description.model import RobotModel
+from systems.controller_model import ControllerModel
 from systems.feedforward import FEEDFORWARDS, FeedforwardConfig
 
 KINDS: tuple[str, ...] = ("rigid", "flexible_joint", "elastic_structure")
@@ -63,7 +63,7 @@ def study_feedforward(
         raise ValueError(f"--grid must be at least 2, got {grid}")
     configs = {kind: replace(config, kind=kind) for kind in KINDS}
     for each in configs.values():  # what is impossible is refused here and not in a process
-        FEEDFORWARDS[each.kind](robot, each, StationConfig().period, payload)
+        FEEDFORWARDS[each.kind](ControllerModel(robot, payload), each)
     # From everywhere there is room for the largest motion.
     axis_2, axis_3 = np.linspace(robot.lower[1:3], robot.upper[1:3] - np.deg2rad(max(ANGLES_DEG)), grid).T
     starts = [np.array([0.0, q2, q3, 0.0, 0.0, 0.0]) for q2 in axis_2 for q3 in axis_3]

@@ -10,6 +10,7 @@ from pydrake.systems.analysis import Simulator
 from pydrake.systems.framework import DiagramBuilder
 from pydrake.systems.primitives import ConstantValueSource
 
+from diagrams.scenario.controller_model import controller_model
 from experiments.feedforward.rectangle import SETTLE, RectangleTrial, rectangle_scenario
 from systems.feedforward import FEEDFORWARDS
 from systems.reference.reference import Reference
@@ -24,7 +25,7 @@ def tick_time(trial: RectangleTrial) -> float:
     period = scenario.station.period
     builder = DiagramBuilder()
     reference = builder.AddSystem(Reference(scenario.reference, period))
-    model = FEEDFORWARDS[trial.config.kind](trial.robot, trial.config, period, trial.payload)
+    model = FEEDFORWARDS[trial.config.kind](controller_model(scenario, trial.robot), trial.config)
     builder.AddSystem(model)
     start = JointSample(position=np.deg2rad(scenario.home_deg), running=True)
     joints = builder.AddSystem(ConstantValueSource(Value(start)))

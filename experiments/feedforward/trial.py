@@ -15,6 +15,7 @@ from diagrams.scenario.scenario import StationConfig
 from diagrams.station import SimulatedStation
 from experiments.cli.workers import Progress
 from robots.description.model import NUM_JOINTS, RobotModel
+from systems.controller_model import ControllerModel
 from systems.feedforward import FEEDFORWARDS, FeedforwardConfig, JointReference
 from systems.reference.paths import SineSquaredProfile
 
@@ -106,7 +107,8 @@ def references(trial: Trial, times: np.ndarray) -> list[JointReference]:
 
 def commands(trial: Trial, times: np.ndarray, period: float) -> np.ndarray:
     """What the drives are told: positions, velocities and torques, shape (n, 3, 6)."""
-    model = FEEDFORWARDS[trial.config.kind](trial.robot, trial.config, period, trial.payload)
+    believed = ControllerModel(trial.robot, trial.payload, period)
+    model = FEEDFORWARDS[trial.config.kind](believed, trial.config)
     memory, rows = model.fresh_memory(), []
     for reference in references(trial, times):
         answer = model.answer(reference, memory)

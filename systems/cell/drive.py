@@ -55,6 +55,7 @@ class DriveConfig:
     cascade: CascadeGains = field(default_factory=CascadeGains)
     command_delay: float = 4e-3  # s, transport: from the issue of a command to the instant the drive is at it
     dead_time: float = 0.0  # s, of the controller's interface, on top of the transport
+    payload: float | None = None  # kg, the load that the drives are told; None for the station's
 
 
 class Drive(Diagram):

@@ -2,7 +2,8 @@
 
 import numpy as np
 
-from robots.description.model import NUM_JOINTS, RobotModel
+from robots.description.model import NUM_JOINTS
+from systems.controller_model import ControllerModel
 from systems.feedforward.arm_correction import CORRECTIONS, smoothly_limited
 from systems.feedforward.backward_differences import HISTORY, at_rest, with_newest
 from systems.feedforward.config import FeedforwardConfig
@@ -29,9 +30,7 @@ class ElasticStructureFeedforward(FlexibleJointFeedforward):
 
     derivatives = 4
 
-    def __init__(
-        self, robot: RobotModel, config: FeedforwardConfig, period: float, payload: float = 0.0
-    ) -> None:
+    def __init__(self, model: ControllerModel, config: FeedforwardConfig) -> None:
         """Builds the models.
 
         Raises:
@@ -47,13 +46,13 @@ class ElasticStructureFeedforward(FlexibleJointFeedforward):
             raise ValueError(
                 f"feedforward: correction.limit_deg must be positive, got {correction.limit_deg} deg"
             )
-        arm = DeformedArm(robot, payload)
+        arm = DeformedArm(model.robot, model.payload)
         memory = arm.size + HISTORY * (arm.size + NUM_JOINTS)
-        super().__init__(robot, config, period, payload, memory)
+        super().__init__(model, config, memory)
         self._arm, self._size = arm, arm.size
         share = 1.0 + config.stiffness_error
-        self._springs = SprungDeflection(share * self._arm.stiffness, share * self._arm.damping, period)
-        self._correction = CORRECTIONS[correction.method](robot, self._arm)
+        self._springs = SprungDeflection(share * self._arm.stiffness, share * self._arm.damping, model.period)
+        self._correction = CORRECTIONS[correction.method](model.robot, self._arm)
         self._limit = np.deg2rad(correction.limit_deg)
 
     def drive(self, reference: JointReference, memory: np.ndarray) -> Drive:

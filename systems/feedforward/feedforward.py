@@ -7,12 +7,13 @@ from pydrake.multibody.plant import MultibodyPlant
 from pydrake.multibody.tree import MultibodyForces
 from pydrake.systems.framework import Context, DiscreteValues, LeafSystem
 
-from robots.description.model import NUM_JOINTS, RobotModel
+from robots.description.model import NUM_JOINTS
 from robots.dynamics.compliant_kinematics import CompliantKinematics
 from robots.dynamics.newton_inverse import inverse_kinematics
 from robots.dynamics.plant import add_robot
 from robots.kinematics.analytic_inverse import JointLimitError, UnreachableError
 from robots.kinematics.forward import Kinematics, robust_solve
+from systems.controller_model import ControllerModel
 from systems.feedforward.config import FeedforwardConfig
 from systems.feedforward.joint_motion import Answer, Drive, JointReference
 from systems.feedforward.prefilter import Prefilter
@@ -59,25 +60,22 @@ class Feedforward(LeafSystem):
 
     def __init__(
         self,
-        robot: RobotModel,
+        model: ControllerModel,
         config: FeedforwardConfig,
-        period: float,
-        payload: float = 0.0,
         extra_memory: int = 0,
     ) -> None:
         """Builds the rigid model.
 
         Args:
-            robot: the robot as the controller knows it.
-            config: how wrong the model is, and how its reference becomes differentiable.
-            period: tick in s.
-            payload: mass at the flange in kg.
+            model: what the controller believes of the robot and its load.
+            config: how wrong the model is beyond that, and how its reference becomes differentiable.
             extra_memory: numbers that the model remembers beside its class's ``memory_size``.
 
         Raises:
             ValueError: if an error makes a stiffness or a mass vanish, or the prefilter's order is too low.
         """
         super().__init__()
+        robot, period, payload = model.robot, model.period, model.payload
         self._memory_size = NUM_JOINTS + self.memory_size + extra_memory
         for label in ("stiffness_error", "inertia_error"):
             if not -1.0 < getattr(config, label) < np.inf:

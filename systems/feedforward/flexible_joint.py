@@ -2,7 +2,8 @@
 
 import numpy as np
 
-from robots.description.model import NUM_JOINTS, RobotModel
+from robots.description.model import NUM_JOINTS
+from systems.controller_model import ControllerModel
 from systems.feedforward.backward_differences import HISTORY, BackwardDifferences, at_rest, with_newest
 from systems.feedforward.config import FeedforwardConfig
 from systems.feedforward.feedforward import Feedforward
@@ -26,19 +27,17 @@ class FlexibleJointFeedforward(Feedforward):
 
     def __init__(
         self,
-        robot: RobotModel,
+        model: ControllerModel,
         config: FeedforwardConfig,
-        period: float,
-        payload: float = 0.0,
         extra_memory: int = 0,
     ) -> None:
         """Builds the model; arguments and errors as of `Feedforward`."""
-        super().__init__(robot, config, period, payload, extra_memory)
-        springs = robot.stiffening_gears
+        super().__init__(model, config, extra_memory)
+        springs = model.robot.stiffening_gears
         if springs is not None:
             springs = springs.scaled(1.0 + config.stiffness_error)
-        self._gears = SprungDeflection(self._stiffness, self._damping, period, springs)
-        self._differences = BackwardDifferences(period)
+        self._gears = SprungDeflection(self._stiffness, self._damping, model.period, springs)
+        self._differences = BackwardDifferences(model.period)
 
     def _drive(self, reference: JointReference, load: np.ndarray, memory: np.ndarray) -> Drive:
         if np.isnan(memory[0]):

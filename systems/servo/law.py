@@ -10,12 +10,13 @@ from pydrake.common.value import Value
 from pydrake.math import RigidTransform
 from pydrake.systems.framework import Context, DiscreteValues, LeafSystem
 
-from robots.description.model import NUM_JOINTS, RobotModel
+from robots.description.model import NUM_JOINTS
 from robots.dynamics.compliant_kinematics import controller_kinematics
 from robots.dynamics.newton_inverse import InverseSolver, inverse_kinematics
 from robots.kinematics.analytic_inverse import JointLimitError, UnreachableError
 from robots.kinematics.forward import robust_solve, rotation_about
 from robots.pose import Rows, error_of_rows
+from systems.controller_model import ControllerModel
 from systems.guard.guard import GuardConfig
 from systems.samples import JointSample, PoseSample
 
@@ -78,29 +79,16 @@ class ServoLaw(LeafSystem):
                                   when the newest one was exposed (s)
 
     A sample is compared with the path at the instant of its exposure, so that transport delay does not
-    look like an error. For that a law remembers the last ``memory_span`` seconds of the path.
+    look like an error. For that a law remembers the path for as long as a sample may be late and is used.
     """
 
-    def __init__(
-        self,
-        robot: RobotModel,
-        config: LawConfig,
-        guard: GuardConfig,
-        period: float,
-        preview: float = 0.0,
-        memory_span: float = 0.25,
-        payload: float = 0.0,
-    ) -> None:
+    def __init__(self, model: ControllerModel, config: LawConfig, guard: GuardConfig) -> None:
         """Checks the configuration.
 
         Args:
-            robot: the robot as the controller knows it, nominal or calibrated.
+            model: what the controller believes of the robot, its load and the delays.
             config: gains and limits.
             guard: when to use a sample.
-            period: tick of the law in s.
-            preview: how far ahead of time the wanted pose at the input port is, in s.
-            memory_span: the oldest exposure that can still be compared, in s.
-            payload: mass at the flange in kg, under which a robot with compliances bends.
 
         Raises:
             ValueError: if a gain or a limit is not positive.
@@ -109,9 +97,10 @@ class ServoLaw(LeafSystem):
         for label in ("translation", "rotation", "correction_limit", "correction_limit_deg"):
             if not getattr(config, label) > 0.0:
                 raise ValueError(f"servo law: {label} must be positive, got {getattr(config, label)}")
+        robot, period, preview = model.robot, model.period, model.preview
         self.config, self.period = config, period
-        self._kinematics = controller_kinematics(robot, payload)
-        self._inverse = inverse_kinematics(robot, payload)
+        self._kinematics = controller_kinematics(robot, model.payload)
+        self._inverse = inverse_kinematics(robot, model.payload)
         self._lower, self._upper = robot.lower.tolist(), robot.upper.tolist()
         self._gains = [config.rotation] * 3 + [config.translation] * 3
         # From the joints of the last tick, as `_joints_at` has them, to their positions at this one.
@@ -130,6 +119,7 @@ class ServoLaw(LeafSystem):
             self.DeclareDiscreteState(np.zeros(6)),
             self.DeclareDiscreteState(np.array([-np.inf, 0.0, -np.inf])),
         ]
+        memory_span = model.camera_delay + guard.hold_after  # the oldest exposure that is compared
         self.DeclareDiscreteState(
             np.full((int(np.ceil((memory_span + preview) / period)) + 2) * _ENTRY, np.nan)
         )

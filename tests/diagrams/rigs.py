@@ -40,7 +40,7 @@ class PlayedStation:
         robot = load_robot(scenario.robot)
         builder = DiagramBuilder()
         self.servo = builder.AddSystem(Servo(robot, scenario, law))
-        self.start = start_position(robot, scenario, self.servo.reference.path)
+        self.start = start_position(self.servo.model, scenario, self.servo.reference.path)
         still = np.zeros(6)
         signals = {
             "joint_sample": lambda time: JointSample(time, self.start, still, still, True),

@@ -14,6 +14,7 @@ from pydrake.systems.primitives import RandomSource
 from robots.description.model import RobotModel
 from robots.kinematics.forward import Kinematics
 from systems.cell.pose_camera import BLOCK, CameraConfig
+from systems.controller_model import ControllerModel
 from systems.guard.guard import KINDS, CommandGuard, GuardConfig
 from systems.samples import JointSample, PoseSample
 from systems.servo import LAWS, LawConfig
@@ -150,9 +151,8 @@ class LawRig:
         delay: int = 1,
         preview: float = 0.0,
     ) -> None:
-        self.law = LAWS[law](
-            nominal, config or LawConfig(), GuardConfig(), PERIOD, preview=preview, memory_span=0.25
-        )
+        model = ControllerModel(nominal, period=PERIOD, preview=preview, camera_delay=0.2)
+        self.law = LAWS[law](model, config or LawConfig(), GuardConfig())
         self.context = self.law.CreateDefaultContext()
         self.true = Kinematics(true or nominal)
         self.path, self.preview, self.delay = path, preview, delay

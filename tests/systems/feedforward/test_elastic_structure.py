@@ -11,6 +11,7 @@ from robots.dynamics.modes import stretched
 from robots.dynamics.plant import add_robot
 from robots.kinematics.forward import Kinematics
 from robots.pose import pose_error
+from systems.controller_model import ControllerModel
 from systems.feedforward import (
     ElasticStructureFeedforward,
     FeedforwardConfig,
@@ -35,7 +36,7 @@ def still(q: np.ndarray) -> JointReference:
 
 def model(name: str, **settings) -> ElasticStructureFeedforward:
     config = FeedforwardConfig("elastic_structure", **settings)
-    return ElasticStructureFeedforward(load_robot(name), config, PERIOD, ROBOTS[name])
+    return ElasticStructureFeedforward(ControllerModel(load_robot(name), ROBOTS[name], PERIOD), config)
 
 
 def working(robot: RobotModel) -> np.ndarray:
@@ -84,7 +85,7 @@ def test_a_stiff_structure_leaves_the_flexible_joint():
     """Structure a million times stiffer deflects by nanoradians."""
     robot = stiffened(load_robot("kr16"), 1e6)
     found, expected = (
-        kind(robot, FeedforwardConfig(), PERIOD, 16.0)
+        kind(ControllerModel(robot, 16.0, PERIOD), FeedforwardConfig())
         for kind in (ElasticStructureFeedforward, FlexibleJointFeedforward)
     )
     memories, q = [found.fresh_memory(), expected.fresh_memory()], working(robot)
@@ -135,7 +136,7 @@ def test_the_correction_of_a_joint_is_limited():
         model("kr210", correction=CorrectionConfig(limit_deg=limit)).drive(still(q), np.full(500, np.nan))
         for limit in (3.0, 0.01)
     ]
-    gears = FlexibleJointFeedforward(load_robot("kr210"), FeedforwardConfig(), PERIOD, 210.0)
+    gears = FlexibleJointFeedforward(ControllerModel(load_robot("kr210"), 210.0, PERIOD), FeedforwardConfig())
     of_gears = gears.drive(still(q), np.full(gears.memory_size, np.nan)).deflection
     free, limited = (np.abs(each.deflection - of_gears).max() for each in offsets)
     assert free > 5e-4

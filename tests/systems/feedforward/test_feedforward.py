@@ -10,6 +10,7 @@ from scipy.integrate import solve_ivp
 
 from robots.description.model import load_robot
 from robots.dynamics.plant import add_robot
+from systems.controller_model import ControllerModel
 from systems.feedforward import (
     FEEDFORWARDS,
     FeedforwardConfig,
@@ -31,14 +32,13 @@ def swinging(time: float) -> JointReference:
 
 
 def model(stiffness_error: float = 0.0, payload: float = 7.0) -> FlexibleJointFeedforward:
-    return FlexibleJointFeedforward(
-        ROBOT, FeedforwardConfig("flexible_joint", stiffness_error), PERIOD, payload
-    )
+    believed = ControllerModel(ROBOT, payload, PERIOD)
+    return FlexibleJointFeedforward(believed, FeedforwardConfig("flexible_joint", stiffness_error))
 
 
 def played(period: float, end: float = 1.0):
     """The inverse model along the swing: its last answer, and the one before."""
-    inverse = FlexibleJointFeedforward(ROBOT, FeedforwardConfig(), period, 7.0)
+    inverse = FlexibleJointFeedforward(ControllerModel(ROBOT, 7.0, period), FeedforwardConfig())
     memory, drives = np.full(inverse.memory_size, np.nan), []
     for time in np.arange(0.0, end + 0.5 * period, period):
         reference = swinging(time)
@@ -101,7 +101,7 @@ def test_the_elastic_plant_needs_exactly_these_torques():
 
 def test_the_inverse_is_bounded_at_any_tick():
     """The pole at K/D lies beyond the tick's rate for a tick of 50 ms; a step of the load does not ring."""
-    inverse = FlexibleJointFeedforward(ROBOT, FeedforwardConfig(), 0.05, 7.0)
+    inverse = FlexibleJointFeedforward(ControllerModel(ROBOT, 7.0, 0.05), FeedforwardConfig())
     memory, load = np.zeros(inverse.memory_size), np.full(6, 10.0)
     for _ in range(20):
         drive = inverse._drive(STILL, load, memory)
@@ -111,7 +111,7 @@ def test_the_inverse_is_bounded_at_any_tick():
 
 
 def test_the_rigid_model_moves_motors_like_links_and_gives_the_torque_of_inverse_dynamics():
-    inverse = RigidFeedforward(ROBOT, FeedforwardConfig("rigid"), PERIOD, 7.0)
+    inverse = RigidFeedforward(ControllerModel(ROBOT, 7.0, PERIOD), FeedforwardConfig("rigid"))
     reference = swinging(0.3)
     drive = inverse._drive(reference, inverse._load(reference), np.full(1, np.nan))
     assert not drive.deflection.any()
@@ -131,4 +131,4 @@ def test_the_rigid_model_moves_motors_like_links_and_gives_the_torque_of_inverse
 def test_a_model_without_springs_or_masses_is_refused(kind: str, label: str):
     for error in (-1.0, np.inf, np.nan):
         with pytest.raises(ValueError, match=f"{label} must be above -1 and finite, got {error}"):
-            FEEDFORWARDS[kind](ROBOT, replace(FeedforwardConfig(kind), **{label: error}), PERIOD)
+            FEEDFORWARDS[kind](ControllerModel(ROBOT), replace(FeedforwardConfig(kind), **{label: error}))

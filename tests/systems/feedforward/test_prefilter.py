@@ -8,6 +8,7 @@ from scipy.integrate import solve_ivp
 from scipy.signal import bessel, lsim
 
 from robots.description.model import load_robot
+from systems.controller_model import ControllerModel
 from systems.feedforward import FEEDFORWARDS, FeedforwardConfig
 from systems.feedforward.prefilter import KINDS, Prefilter, PrefilterConfig
 
@@ -77,11 +78,11 @@ def test_an_order_too_low_for_the_inverse_is_refused_with_the_reason(kind: str, 
     for order, refused in ((needed - 1, True), (needed, False)):
         config = FeedforwardConfig(kind, prefilter=PrefilterConfig("bessel", order))
         if not refused:
-            assert FEEDFORWARDS[kind](robot, config, PERIOD).delay > 0.0
+            assert FEEDFORWARDS[kind](ControllerModel(robot), config).delay > 0.0
             continue
         message = f"order must be at least {needed}, got {order}: feedforward {kind} takes derivatives"
         with pytest.raises(ValueError, match=message):
-            FEEDFORWARDS[kind](robot, config, PERIOD)
+            FEEDFORWARDS[kind](ControllerModel(robot), config)
 
 
 @pytest.mark.parametrize(

@@ -9,6 +9,7 @@ from robots.dynamics.newton_inverse import inverse_kinematics
 from robots.kinematics.error_kinematics import ErrorKinematics
 from robots.kinematics.forward import Kinematics
 from robots.pose import pose_error
+from systems.controller_model import ControllerModel
 from systems.guard.guard import GuardConfig
 from systems.reference.paths import ReferenceConfig, make_path
 from systems.servo import LAWS, LawConfig
@@ -26,7 +27,8 @@ def calibrated() -> RobotModel:
 
 def commanded(law: str, robot: RobotModel, offset: float = 0.0, gain: float = 5.0) -> np.ndarray:
     """Errors of the calibrated robot's tool at the commanded positions along the path, (n, 6)."""
-    system = LAWS[law](robot, LawConfig(translation=gain, rotation=gain), GuardConfig(), PERIOD)
+    config = LawConfig(translation=gain, rotation=gain)
+    system = LAWS[law](ControllerModel(robot, period=PERIOD), config, GuardConfig())
     times = np.arange(0.0, PATH.duration, PERIOD)
     X, V, _ = PATH.sample(times)
     start = inverse_kinematics(robot).nearest(X[0], HOME) + offset

@@ -11,6 +11,7 @@ from robots.description.model import RobotModel, load_robot
 from robots.kinematics.analytic_inverse import InverseKinematics
 from robots.kinematics.forward import Kinematics, rotation_about
 from robots.pose import pose_error, rotation_from_zyx, sine_error_rate_matrix, sine_pose_error
+from systems.controller_model import ControllerModel
 from systems.guard.guard import GuardConfig
 from systems.reference.paths import ReferenceConfig, make_path
 from systems.samples import PoseSample
@@ -238,4 +239,4 @@ def test_refuses_gains_and_limits_that_are_not_positive(law: str, label: str):
     config = LawConfig()
     setattr(config, label, 0.0)
     with pytest.raises(ValueError, match=f"servo law: {label} must be positive, got 0.0"):
-        LAWS[law](ROBOT, config, GuardConfig(), PERIOD)
+        LAWS[law](ControllerModel(ROBOT), config, GuardConfig())

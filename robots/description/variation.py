@@ -1,0 +1,72 @@
+"""A robot whose springs and friction are by known factors others than those in its file."""
+
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from robots.description.beam import Beam
+from robots.description.model import NUM_JOINTS, DriveTrain, Joint, RobotModel, Tilting
+
+
+@dataclass(frozen=True)
+class Factors:
+    """By what the parameters of a robot are multiplied; all are positive.
+
+    A spring keeps its damping ratio: its damper is multiplied by the same factor.
+    """
+
+    gears: np.ndarray = field(default_factory=lambda: np.ones(NUM_JOINTS))  # stiffness, shape (6,)
+    bearings: np.ndarray = field(default_factory=lambda: np.ones((NUM_JOINTS, 2)))  # of `Tilting`, (6, 2)
+    beams: np.ndarray = field(default_factory=lambda: np.ones((NUM_JOINTS, 3)))  # about x, y, z, (6, 3)
+    friction: np.ndarray = field(default_factory=lambda: np.ones(NUM_JOINTS))  # viscous and Coulomb, (6,)
+
+    def __post_init__(self) -> None:
+        for label in ("gears", "bearings", "beams", "friction"):
+            values = np.asarray(getattr(self, label))
+            if not (np.isfinite(values).all() and values.min() > 0.0):
+                raise ValueError(f"factors of {label} must be positive and finite, got {values.tolist()}")
+
+
+def varied(robot: RobotModel, factors: Factors) -> RobotModel:
+    """A robot with other springs and friction; geometry and masses are the same."""
+    joints = [
+        _varied_joint(joint, float(gear), bearing, float(friction))
+        for joint, gear, bearing, friction in zip(
+            robot.joints, factors.gears, factors.bearings, factors.friction, strict=True
+        )
+    ]
+    links = [
+        link if link.beam is None else replace(link, beam=_varied_beam(link.beam, factor))
+        for link, factor in zip(robot.links, factors.beams, strict=True)
+    ]
+    return replace(robot, joints=joints, links=links)
+
+
+def _varied_joint(joint: Joint, gear: float, bearing: np.ndarray, friction: float) -> Joint:
+    tilting = joint.tilting
+    if tilting is not None:
+        stiffness, damping = (
+            [float(factor * value) for factor, value in zip(bearing, values, strict=True)]
+            for values in (tilting.stiffness, tilting.damping)
+        )
+        tilting = Tilting(stiffness, damping, tilting.source)
+    return replace(joint, drive_train=_varied_drive_train(joint.drive_train, gear, friction), tilting=tilting)
+
+
+def _varied_drive_train(train: DriveTrain, gear: float, friction: float) -> DriveTrain:
+    stiffening = train.stiffening
+    if stiffening is not None:
+        # The same factor at every deflection, see `GearSpring.scaled`.
+        stiffening = replace(stiffening, c_max=gear * stiffening.c_max, sharpness=stiffening.sharpness / gear)
+    return replace(
+        train,
+        stiffness=gear * train.stiffness,
+        stiffening=stiffening,
+        damping=gear * train.damping,
+        viscous_friction=friction * train.viscous_friction,
+        coulomb_friction=friction * train.coulomb_friction,
+    )
+
+
+def _varied_beam(beam: Beam, factor: np.ndarray) -> Beam:
+    return replace(beam, stiffness=factor * beam.stiffness)

@@ -1,0 +1,55 @@
+"""What the controller believes of robot, load and delays: all that a controller system is told of them."""
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from robots.description.model import RobotModel
+
+
+@dataclass(frozen=True)
+class ControllerModel:
+    """Beliefs, which may differ from what the station is; laws, feedforwards and observers are built from it.
+
+    The robot is complete: believed factors of stiffness and friction and the centre of the payload are in it
+    already, so that who asks it for a stiffness or builds a plant from it gets what is believed.
+    """
+
+    robot: RobotModel  # nominal or calibrated, with the believed springs, friction and payload centre
+    payload: float = 0.0  # kg at the flange
+    period: float = 4e-3  # s, between two commands
+    preview: float = 0.0  # s, how far ahead of time the wanted pose is that a law is given
+    camera_delay: float = 0.0  # s, from an exposure to the arrival of its pose
+    command_delay: float = 0.0  # s, from a command to its motion: transport and dead time
+    elasticity: str = "joints"  # what yields: rigid (nothing), joints or structure
+
+    @property
+    def payload_centre(self) -> np.ndarray:
+        """Centre of mass of the payload in the frame of the flange in m, shape (3,)."""
+        return self.robot.payload.center_of_mass
+
+
+@dataclass
+class Mismatch:
+    """Random deviations of the belief from the station, uniform within +- the share; the seed draws them."""
+
+    stiffness: float = 0.0  # of every spring: gears, bearings, beams
+    payload: float = 0.0  # of its mass
+    friction: float = 0.0  # of every joint
+    seed: int = 0
+
+
+@dataclass
+class ControllerModelConfig:
+    """What the controller believes, as a scenario says it; what is left empty is as in the station."""
+
+    robot: str = ""  # a shipped robot or the path of a robot file
+    payload: float | None = None  # kg
+    payload_centre_mm: list[float] = field(default_factory=list)  # three, in the frame of the flange
+    camera_delay: float | None = None  # s
+    command_delay: float | None = None  # s, transport and dead time
+    stiffness: list[float] = field(default_factory=list)  # of the gears: one factor, or six
+    structure: float | None = None  # one factor of all bearings and beams
+    friction: list[float] = field(default_factory=list)  # one factor, or six
+    elasticity: str = ""  # rigid, joints or structure
+    mismatch: Mismatch = field(default_factory=Mismatch)
