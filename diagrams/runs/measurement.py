@@ -24,11 +24,13 @@ class MeasurementProcedure:
 
     speed_share: float = 0.5  # of the robot's largest joint speeds
     settle: float = 0.4  # s, least time of rest before the measurement
-    window: float = 0.2  # s, over which samples are averaged
+    window: float = 0.2  # s, over which samples are averaged; longer if the camera is slow
+    fewest_exposures: int = 3  # in a window, at least 2: with fewer there is no telling whether it is at rest
     # Oscillation in the window that counts as rest, beside the camera's noise.
     stillness: float = 2e-6  # m
     rotation_stillness: float = 4e-6  # rad
-    longest_wait: float = 5.0  # s, after which a measurement is made in spite of an oscillation
+    # s, after which a measurement is made in spite of an oscillation, and left out if too little was seen.
+    longest_wait: float = 5.0
 
 
 @dataclass(frozen=True)
@@ -46,6 +48,10 @@ class MeasurementRun:
         """Builds the diagram. Raises ValueError if a part refuses its configuration."""
         self._procedure = procedure or MeasurementProcedure()
         self._config = scenario.station
+        # Between its first and its last tick a window must see one exposure more than is needed, because the
+        # one that is the newest at its first tick may be from before it.
+        needed = self._procedure.fewest_exposures * scenario.station.camera.period
+        self._window = max(self._ticks(self._procedure.window), self._tick_at(needed) + 1)
         robot = load_robot(scenario.robot)
         builder = DiagramBuilder()
         self._station = builder.AddNamedSystem(
@@ -71,7 +77,8 @@ class MeasurementRun:
             progress: is called after each configuration with the share that is done.
 
         Returns:
-            A row for each configuration at which the camera saw the tool; their numbers begin with one.
+            A row for each configuration at which the camera saw the tool often enough; their numbers begin
+            with one.
 
         Raises:
             ValueError: if the camera saw the tool nowhere.
@@ -115,35 +122,46 @@ class MeasurementRun:
         self._mover.set_at_rest(self._mover.GetMyMutableContextFromRoot(self._context), theta)
 
     def _measure_at(self, goal: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray] | None:
-        """Mean joint and tool positions and rotation at one configuration, None if the tool was not seen."""
+        """Mean joint and tool positions and rotation at one configuration, None if too little was seen."""
         arrival = self._mover.go(self._mover.GetMyMutableContextFromRoot(self._context), goal)
         delays = self._config.drive.command_delay + self._config.drive.dead_time + self._config.camera.delay
         rest = self._tick_at(arrival + delays)
         begin = rest + self._ticks(self._procedure.settle)
         while True:
             joints, poses = self._samples(begin)
-            if not poses:
+            is_last = (begin - rest) * self._config.period > self._procedure.longest_wait
+            is_enough = len(poses) >= self._procedure.fewest_exposures
+            if not poses or (is_last and not is_enough):
                 return None
-            positions = np.array([pose.X_WE.translation() for pose in poses])
-            turns = Rotation.from_matrix([pose.X_WE.rotation().matrix() for pose in poses])
-            swings = (turns * turns[0].inv()).as_rotvec()
-            is_still = _is_still(positions, self._procedure.stillness)
-            is_still = is_still and _is_still(swings, self._procedure.rotation_stillness)
-            if is_still or (begin - rest) * self._config.period > self._procedure.longest_wait:
+            if is_enough and (is_last or self._is_at_rest(poses)):
                 theta = np.mean([joint.position for joint in joints], axis=0)
-                return theta, positions.mean(axis=0), turns.mean().as_matrix()
-            begin += self._ticks(self._procedure.window)
+                position = np.mean([pose.X_WE.translation() for pose in poses], axis=0)
+                return theta, position, _rotations(poses).mean().as_matrix()
+            begin += self._window
+
+    def _is_at_rest(self, poses: list[PoseSample]) -> bool:
+        rotations = _rotations(poses)
+        swings = (rotations * rotations[0].inv()).as_rotvec()
+        positions = np.array([pose.X_WE.translation() for pose in poses])
+        return _is_still(positions, self._procedure.stillness) and _is_still(
+            swings, self._procedure.rotation_stillness
+        )
 
     def _samples(self, begin: int) -> tuple[list[JointSample], list[PoseSample]]:
-        """What the station says from one tick to the end of a window; each exposure counts once."""
+        """What the station says from one tick to the end of a window.
+
+        An exposure counts once, and only if it was made after the window's begin: at the first tick, the
+        newest one of a slow camera may show the robot as it still moved.
+        """
         joints: list[JointSample] = []
         poses: dict[float, PoseSample] = {}
-        for tick in range(begin, begin + self._ticks(self._procedure.window)):
+        earliest = begin * self._config.period - self._config.camera.delay - 1e-9
+        for tick in range(begin, begin + self._window):
             self._integration.advance(self._simulator, tick * self._config.period)
             context = self._station.GetMyContextFromRoot(self._context)
             joints.append(self._station.GetOutputPort("joint_sample").Eval(context))
             pose: PoseSample = self._station.GetOutputPort("pose_sample").Eval(context)
-            if pose.valid:
+            if pose.valid and pose.time >= earliest:
                 poses[pose.time] = pose
         return joints, list(poses.values())
 
@@ -154,10 +172,12 @@ class MeasurementRun:
         return max(1, round(duration / self._config.period))
 
 
+def _rotations(poses: list[PoseSample]) -> Rotation:
+    return Rotation.from_matrix([pose.X_WE.rotation().matrix() for pose in poses])
+
+
 def _is_still(samples: np.ndarray, oscillation: float) -> bool:
-    """Whether samples (n, 3) spread by noise alone, which shows in the steps from one to the next."""
-    if len(samples) < 3:
-        return True
+    """Whether samples (n >= 2, 3) spread by noise alone, which shows in the steps from one to the next."""
     spread = float(samples.var(axis=0, ddof=1).max())
     noise = 0.5 * float(np.square(np.diff(samples, axis=0)).mean(axis=0).max())
     return spread <= 1.6 * noise + oscillation**2

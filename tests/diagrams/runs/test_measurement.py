@@ -36,6 +36,27 @@ def test_without_noise_it_writes_down_the_statics():
     np.testing.assert_array_equal(record.measured.payload, 7.0)
 
 
+@pytest.mark.parametrize("period", [0.11, 0.7, 1.0])
+def test_a_slow_camera_shows_the_robot_at_rest_and_not_on_its_way(period: float):
+    """An exposure from the motion is off by up to 279 mm.
+
+    What is left is an oscillation that the first of a few exposures sees and that dies away before the
+    second: 13 um and 70 urad, a third of it in the mean.
+    """
+    scenario = load_scenario("misaligned", [*QUIET, f"station.camera.period={period}"])
+    record = MeasurementRun(scenario).measure(PLACES)
+    assert record.measured.rows.tolist() == [1, 2, 3]
+    assert np.abs(record.measured.position - record.truth.position).max() < 5e-6
+    assert np.abs(pose_error(record.measured.X_WE, record.truth.X_WE)).max() < 3e-5
+
+
+def test_a_place_that_a_slow_camera_sees_only_once_is_left_out():
+    blind_after = "station.camera.dropouts=[[0.8, 30.0]]"  # exposures at 0.7 s and then from 30.1 s on
+    scenario = load_scenario("misaligned", [*QUIET, "station.camera.period=0.7", blind_after])
+    with pytest.raises(ValueError, match="the camera saw the tool at none of 2 configurations"):
+        MeasurementRun(scenario).measure(PLACES[:2])
+
+
 def test_the_mean_of_a_window_has_the_noise_of_a_mean():
     """50 samples of 50 um leave 7 um; over 3 places and axes the spread is known to a quarter."""
     scenario = load_scenario("misaligned")
