@@ -3,6 +3,10 @@
 A calibrated robot has axes that do not meet and are not parallel, by tenths of a millimetre and of a degree.
 The ideal robot next to it, with the small deviations left out, has an analytic solution; a few Newton steps
 lead from there to the exact one. It needs no gain and does not drift.
+
+Near a singularity the two robots differ by much more than their deviations: where the wrist of one is
+stretched that of the other is bent, and joint 4 stands elsewhere. Newton's steps fail there, and the method
+of Levenberg and Marquardt takes over, from all branches of the ideal robot.
 """
 
 import math
@@ -11,6 +15,7 @@ from dataclasses import replace
 from typing import Protocol
 
 import numpy as np
+from scipy.optimize import least_squares
 
 from robots.description.model import Joint, Placement, RobotModel
 from robots.dynamics.compliant_kinematics import CompliantKinematics
@@ -30,13 +35,20 @@ from robots.pose import pose_error, zyx_from_rotation
 _CLOSE = 0.05  # rad and m; from no farther than this the steps begin where the robot is
 _CONVERGED = 1e-10  # rad; a step of this size leaves an error of its square
 _MOST_STEPS = 25
+_ACCURATE = 1e-9  # m, or of direction cosines: what a solution may be off
+_MOST_EVALUATIONS = 100  # of Levenberg and Marquardt
 _LONGEST_STEP = 0.3  # rad, of all joints together
 _LARGEST_TILT = 0.3  # of direction cosines: what still counts as a deviation
 _LARGEST_OFFSET = 0.05  # m
+_SAMPLES = 64  # configurations at which the ideal robot is compared with the true one
 
 
 class ForwardKinematics(Protocol):
     """What a Newton step needs to know of a robot."""
+
+    def forward(self, q: np.ndarray) -> np.ndarray:
+        """Poses (..., 4, 4) at joint positions (..., 6)."""
+        ...
 
     def forward_and_jacobian(self, q: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Pose (4, 4) and geometric Jacobian (6, 6) at joint positions (6,)."""
@@ -124,6 +136,10 @@ class NewtonInverse:
         self._kinematics = kinematics or Kinematics(robot)
         self._ideal = InverseKinematics(ideal_robot(robot))
         self._lower, self._upper = robot.lower.tolist(), robot.upper.tolist()
+        # A pose so far beyond the reach of the ideal robot may still be within that of the true one.
+        q = np.random.default_rng(0).uniform(robot.lower, robot.upper, (_SAMPLES, len(self._lower)))
+        apart = self._kinematics.forward(q) - Kinematics(self._ideal.robot).forward(q)
+        self._reach_tolerance = 2.0 * float(np.linalg.norm(apart[:, :3, 3], axis=-1).max())
 
     def nearest(self, X_WE: np.ndarray, q_near: np.ndarray) -> np.ndarray:
         """The solution near a configuration if the pose is near it, or else on the nearest ideal branch.
@@ -140,18 +156,21 @@ class NewtonInverse:
         """
         if not (np.isfinite(X_WE).all() and np.isfinite(q_near).all()):
             raise ValueError(f"inverse kinematics: not finite: pose {X_WE.tolist()} or {q_near.tolist()}")
-        q = self._iterate(X_WE, q_near, _CLOSE)
-        if q is None:
-            q = self._iterate(X_WE, self._ideal.nearest(X_WE, q_near), np.inf)
-        if q is None:
-            raise UnreachableError("out of reach: the iteration to the exact inverse does not converge")
+        refusal: ValueError = UnreachableError(
+            "out of reach: the iteration to the exact inverse does not converge"
+        )
         try:
-            return self._within_limits(q)
-        except JointLimitError:
-            other = self._nearest_of_all(X_WE, q_near)
-            if other is None:
-                raise
-            return other
+            q = self._newton(X_WE, q_near, _CLOSE)
+            if q is None:
+                q = self._newton(X_WE, self._ideal.nearest(X_WE, q_near), np.inf)
+            if q is not None:
+                return self._within_limits(q)
+        except (UnreachableError, JointLimitError) as error:
+            refusal = error
+        q = self._nearest_of_all(X_WE, q_near)
+        if q is None:
+            raise refusal
+        return q
 
     def _within_limits(self, q: np.ndarray) -> np.ndarray:
         """The joint positions within the limits, by full turns where that helps."""
@@ -167,13 +186,23 @@ class NewtonInverse:
 
     def _nearest_of_all(self, X_WE: np.ndarray, q_near: np.ndarray) -> np.ndarray | None:
         """The solution within the limits that is nearest to a configuration, from all ideal branches."""
-        solutions = []
-        for start in self._ideal.all_branches(np.vstack([X_WE[:3], [0.0, 0.0, 0.0, 1.0]])):
-            q = None if np.isnan(start).any() else self._iterate(X_WE, start, np.inf)
-            if q is not None:
-                with suppress(JointLimitError):
-                    solutions.append(self._within_limits(q))
-        return min(solutions, key=lambda q: float(np.sum((q - q_near) ** 2)), default=None)
+        X_WE = np.vstack([X_WE[:3], [0.0, 0.0, 0.0, 1.0]])
+        branches = self._ideal.all_branches(X_WE, self._reach_tolerance)
+        starts = branches[~np.isnan(branches).any(axis=1)]
+        if not len(starts):
+            return None
+        # With axes 4 and 6 nearly in line the ideal joint 4 says little about the true one.
+        for turn in (0.0, 0.5 * math.pi):
+            quarter = np.array([0.0, 0.0, 0.0, turn, 0.0, -turn])
+            found = [self._levenberg_marquardt(X_WE, start + quarter) for start in [q_near, *starts]]
+            solutions = []
+            for q in found:
+                if q is not None:
+                    with suppress(JointLimitError):
+                        solutions.append(self._within_limits(q))
+            if solutions:
+                return min(solutions, key=lambda q: float(np.sum((q - q_near) ** 2)))
+        return None
 
     def along(self, X_WE: np.ndarray, q_start: np.ndarray) -> np.ndarray:
         """The joint path for a path of the tool, as `InverseKinematics.along`."""
@@ -186,7 +215,7 @@ class NewtonInverse:
                 raise type(error)(f"sample {k} of {len(X_WE)}: {error}") from error
         return path
 
-    def _iterate(self, X_WE: np.ndarray, q: np.ndarray, largest_error: float) -> np.ndarray | None:
+    def _newton(self, X_WE: np.ndarray, q: np.ndarray, largest_error: float) -> np.ndarray | None:
         """Newton steps from q; None if they begin with a larger error or do not converge."""
         for _ in range(_MOST_STEPS):
             X, J = self._kinematics.forward_and_jacobian(q)
@@ -198,5 +227,34 @@ class NewtonInverse:
             length = float(np.sqrt(step @ step))
             q = q + step * min(1.0, _LONGEST_STEP / max(length, _LONGEST_STEP))
             if length < _CONVERGED:
-                return q
+                # The damped steps at a singularity are short without being near a solution.
+                return q if error @ error < _ACCURATE**2 else None
         return None
+
+    def _levenberg_marquardt(self, X_WE: np.ndarray, q: np.ndarray) -> np.ndarray | None:
+        """The solution to which MINPACK's least squares lead from q; None if they lead to none.
+
+        The residuals are the differences of the first three rows of the poses, which have no singularity.
+        """
+
+        def residuals(q: np.ndarray) -> np.ndarray:
+            return (self._kinematics.forward(q)[:3] - X_WE[:3]).ravel()
+
+        def derivative(q: np.ndarray) -> np.ndarray:
+            X, J = self._kinematics.forward_and_jacobian(q)
+            rows = np.empty((3, 4, len(q)))
+            rows[:, :3] = np.cross(J[:3].T[:, None], X[:3, :3].T[None]).transpose(2, 1, 0)
+            rows[:, 3] = J[3:]
+            return rows.reshape(12, len(q))
+
+        found = least_squares(
+            residuals,
+            q,
+            derivative,
+            method="lm",
+            ftol=1e-15,
+            xtol=1e-15,
+            gtol=1e-15,
+            max_nfev=_MOST_EVALUATIONS,
+        )
+        return found.x if np.abs(found.fun).max() < _ACCURATE else None

@@ -66,13 +66,15 @@ class InverseKinematics:
         self._X_1W = np.linalg.inv(X_W1)
         self._X_EH = np.linalg.inv(X_HF @ robot.tool.pose().GetAsMatrix4())
 
-    def all_branches(self, X_WE: np.ndarray) -> np.ndarray:
+    def all_branches(self, X_WE: np.ndarray, reach_tolerance: float = REACH_TOLERANCE) -> np.ndarray:
         """Every solution, whether within the joint limits or not.
 
         Where an angle is left open (axes 4 and 6 in line, wrist on axis 1) it is set to zero.
 
         Args:
             X_WE: poses of the tool, shape (..., 4, 4).
+            reach_tolerance: for a pose no farther in m than this beyond the reach, the arm is stretched, or
+                folded, towards it.
 
         Returns:
             Joint positions in (-pi, pi], shape (..., 8, 6), rows of NaN where a branch is out of reach. The
@@ -87,7 +89,7 @@ class InverseKinematics:
         l25_squared, direction, area = self._triangle(_ARRAYS, c1 * radius, z)
         l25 = np.sqrt(l25_squared)
         excess = np.maximum(l25 - self._longest, self._shortest - l25)
-        root = np.sqrt(np.where(excess > REACH_TOLERANCE, np.nan, np.maximum(area, 0.0)))
+        root = np.sqrt(np.where(excess > reach_tolerance, np.nan, np.maximum(area, 0.0)))
         q2, q3 = self._upper_arm_and_elbow(_ARRAYS, l25_squared, direction, c2 * root)
         wrist = _wrist_rotation(_ARRAYS, rows, q1, q2 + q3)
         _, (a21, _, _), (a31, _, _) = wrist

@@ -61,6 +61,26 @@ def test_random_poses_are_met_whatever_the_start():
         np.testing.assert_allclose(inverse.nearest(X_WE, q + 0.01), q, atol=1e-9)
 
 
+@pytest.mark.parametrize("away", [0.002, 0.005, 0.02])
+@pytest.mark.parametrize("share", [0.1, 1.0])
+def test_every_pose_near_a_singularity_of_the_wrist_is_met(away: float, share: float):
+    """Within these angles of joint 5 the ideal wrist stands up to a quarter turn from the true one."""
+    robot, rng = wrong(2, 6.0 * share, 0.9 * share), np.random.default_rng(1)
+    kinematics, inverse = Kinematics(robot), NewtonInverse(robot)
+    for _ in range(60):
+        q, start = rng.uniform(0.95 * robot.lower, 0.95 * robot.upper, (2, 6))
+        q[4] = rng.uniform(-away, away)
+        X_WE = kinematics.forward(q)
+        np.testing.assert_allclose(kinematics.forward(inverse.nearest(X_WE, start)), X_WE, atol=1e-9)
+
+
+def test_a_straight_path_through_the_singularity_of_the_wrist_stays_on_its_branch():
+    robot = wrong(5, 0.6, 0.09)
+    q5 = np.linspace(0.3, -0.3, 401)
+    q = np.deg2rad([10.0, 30.0, 20.0, 5.0, 0.0, 10.0]) + q5[:, None] * np.eye(6)[4]
+    np.testing.assert_allclose(NewtonInverse(robot).along(Kinematics(robot).forward(q), q[0]), q, atol=1e-6)
+
+
 def test_what_cannot_be_reached_is_refused_with_the_reason():
     robot = wrong(3)
     inverse, far = NewtonInverse(robot), np.eye(4)
