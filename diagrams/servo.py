@@ -1,7 +1,7 @@
 """The controller as a diagram: the same one against a simulated and against a real station."""
 
-from pydrake.systems.framework import Diagram, DiagramBuilder
-from pydrake.systems.primitives import Adder
+from pydrake.systems.framework import Diagram, DiagramBuilder, OutputPort, System
+from pydrake.systems.primitives import Adder, ConstantVectorSource
 
 from diagrams.scenario.controller_model import controller_model
 from diagrams.scenario.scenario import Scenario
@@ -9,10 +9,11 @@ from robots.description.model import NUM_JOINTS, RobotModel
 from systems.feedforward import FEEDFORWARDS
 from systems.guard.guard import CommandGuard
 from systems.reference.reference import Reference
-from systems.servo import BLIND_LAWS, LAWS, LawConfig
+from systems.servo import LAWS, LawConfig
+from systems.servo.contract import SIZES, check_ports, law_traits
+from systems.servo.sample_watch import SampleWatch
 
-# Laws whose position commands start from where the motors are: the gears are wound up there already.
-_FROM_MOTORS = ("pbvs",)
+_FROM_REFERENCE = {"X_WE_desired": "X_WE_preview", "V_WE_desired": "V_WE_preview", "reference": "reference"}
 
 
 class Servo(Diagram):
@@ -23,81 +24,137 @@ class Servo(Diagram):
         in  ``pose_sample``       PoseSample
         out ``position_command``  vector 6 in rad
         out ``velocity_command``  vector 6 in rad/s
-        out ``torque_feedforward``  vector 6 in N m, only with a feedforward
+        out ``torque_feedforward``  vector 6 in N m, only with a feedforward or a law that knows torques
     and to look at:
         out ``X_WE_desired``      RigidTransform
         out ``correction``        vector 6 in rad and m, rotation first
         out ``guard_status``      counts of `systems.guard.guard.KINDS`
+
+    Attributes:
+        law: the system of the law.
+        traits: what it is.
+        model: what the controller believes.
+        drive: the drive that it commands, ``"position"``, ``"velocity"`` or ``"cascade"``.
+        has_torque: whether there is a torque to feed forward.
     """
 
-    def __init__(self, robot: RobotModel, scenario: Scenario, law: str) -> None:
+    def __init__(self, robot: RobotModel, scenario: Scenario, law: str | type[System] | System) -> None:
         """Builds the controller of one law.
 
         Args:
             robot: as the controller knows it, unless `servo.model` says otherwise.
             scenario: what to do, and what the controller believes of the station.
-            law: which law to use.
+            law: a shipped law by name, ``FILE.py:CLASS``, a class, or any system with the ports of a law.
 
         Raises:
-            ValueError: if the law is unknown or a part refuses its configuration.
+            ValueError: if the law is unknown or has not the ports, or a part refuses its configuration.
         """
         super().__init__()
-        if law not in LAWS:
-            raise ValueError(f"law must be one of {', '.join(LAWS)}, got '{law}'")
-        config = scenario.servo.laws.get(law, LawConfig())
-        guard_config = scenario.servo.guard
+        law = LAWS.find(law) if isinstance(law, str) else law
         self.model = controller_model(scenario, robot)
+        self.traits = law_traits(law)
+        config = law_config(scenario, law)
+        self.drive = config.drive
+        self.law = law(self.model, config, scenario.servo.guard) if isinstance(law, type) else law
+        check_ports(self.law)
         builder = DiagramBuilder()
         self.reference = builder.AddNamedSystem("reference", Reference(scenario.reference, self.model.period))
-        servo = builder.AddNamedSystem("law", LAWS[law](self.model, config, guard_config))
+        builder.AddNamedSystem("law", self.law)
         feedforward = scenario.servo.feedforward
-        has_torque = feedforward.kind != "none"
+        self.has_torque = feedforward.kind != "none" or self.law.HasOutputPort("torque_feedforward")
         guard = builder.AddNamedSystem(
             "guard",
             CommandGuard(
                 self.model.robot,
-                guard_config,
+                scenario.servo.guard,
                 self.model.period,
                 config.correction_limit,
                 config.correction_limit_deg,
-                uses_camera=law not in BLIND_LAWS,
-                passes_torque=has_torque,
+                uses_camera=self.traits.uses_camera,
+                passes_torque=self.has_torque,
                 is_speed_only=config.drive == "velocity",
             ),
         )
-        builder.Connect(self.reference.GetOutputPort("X_WE_preview"), servo.GetInputPort("X_WE_desired"))
-        builder.Connect(self.reference.GetOutputPort("V_WE_preview"), servo.GetInputPort("V_WE_desired"))
-        for name in ("correction", "measurement"):
-            builder.Connect(servo.GetOutputPort(name), guard.GetInputPort(name))
-        builder.Connect(guard.GetOutputPort("deviation"), servo.GetInputPort("deviation"))
-        joints = builder.ExportInput(servo.GetInputPort("joint_sample"), "joint_sample")
-        commands = {name: servo.GetOutputPort(name) for name in ("position_command", "velocity_command")}
-        if has_torque:
+        for name, source in _FROM_REFERENCE.items():
+            if self.law.HasInputPort(name):
+                builder.Connect(self.reference.GetOutputPort(source), self.law.GetInputPort(name))
+        if self.law.HasInputPort("deviation"):
+            builder.Connect(guard.GetOutputPort("deviation"), self.law.GetInputPort("deviation"))
+        joints = builder.ExportInput(guard.GetInputPort("joint_sample"), "joint_sample")
+        builder.ConnectInput(joints, self.law.GetInputPort("joint_sample"))
+        commands = self._connect_camera(builder)
+        for name in ("position_command", "velocity_command", "torque_feedforward"):
+            if self.law.HasOutputPort(name):
+                commands[name] = self.law.GetOutputPort(name)
+        if feedforward.kind != "none":
             model = FEEDFORWARDS[feedforward.kind](self.model, feedforward)
             ahead = builder.AddNamedSystem("feedforward", model)
-            for name in ("X_WE", "V_WE", "A_WE"):
-                source = self.reference.GetOutputPort(f"{name}_preview")
-                builder.Connect(source, ahead.GetInputPort(f"{name}_desired"))
             builder.ConnectInput(joints, ahead.GetInputPort("joint_sample"))
-            offsets = {"velocity_command": "velocity_offset"}
-            if law not in _FROM_MOTORS:
-                offsets["position_command"] = "position_offset"
-            for name, offset in offsets.items():
-                total = builder.AddNamedSystem(f"{name}_with_feedforward", Adder(2, NUM_JOINTS))
-                builder.Connect(commands[name], total.get_input_port(0))
-                builder.Connect(ahead.GetOutputPort(offset), total.get_input_port(1))
-                commands[name] = total.get_output_port()
-            torque = guard.GetInputPort("torque_feedforward")
-            builder.Connect(ahead.GetOutputPort("torque_feedforward"), torque)
-            builder.ExportOutput(guard.GetOutputPort("torque_feedforward"), "torque_feedforward")
+            self._add_feedforward(builder, ahead, commands)
         for name, port in commands.items():
             builder.Connect(port, guard.GetInputPort(name))
-        builder.ConnectInput(joints, guard.GetInputPort("joint_sample"))
-        builder.ExportInput(servo.GetInputPort("pose_sample"), "pose_sample")
-        builder.ExportOutput(guard.GetOutputPort("position_command"), "position_command")
-        builder.ExportOutput(guard.GetOutputPort("velocity_command"), "velocity_command")
+        for name in ("position_command", "velocity_command", "torque_feedforward", "guard_status"):
+            if guard.HasOutputPort(name):
+                builder.ExportOutput(guard.GetOutputPort(name), name)
         builder.ExportOutput(self.reference.GetOutputPort("X_WE_desired"), "X_WE_desired")
-        builder.ExportOutput(servo.GetOutputPort("correction"), "correction")
-        builder.ExportOutput(guard.GetOutputPort("guard_status"), "guard_status")
+        builder.ExportOutput(commands["correction"], "correction")
         builder.BuildInto(self)
         self.set_name("servo")
+
+    def _connect_camera(self, builder: DiagramBuilder) -> dict[str, OutputPort]:
+        """The camera to the law; what the law says of it and of its correction, or what stands for that."""
+        said = {}
+        is_heard = self.law.HasInputPort("pose_sample")
+        if is_heard:
+            samples = builder.ExportInput(self.law.GetInputPort("pose_sample"), "pose_sample")
+        if self.law.HasOutputPort("measurement"):
+            said["measurement"] = self.law.GetOutputPort("measurement")
+        else:
+            watch = builder.AddNamedSystem("sample_watch", SampleWatch(self.model.period))
+            said["measurement"] = watch.get_output_port()
+            if is_heard:
+                builder.ConnectInput(samples, watch.get_input_port())
+            else:
+                builder.ExportInput(watch.get_input_port(), "pose_sample")
+        if self.law.HasOutputPort("correction"):
+            said["correction"] = self.law.GetOutputPort("correction")
+        else:
+            nothing = builder.AddNamedSystem(
+                "no_correction", ConstantVectorSource([0.0] * SIZES["correction"])
+            )
+            said["correction"] = nothing.get_output_port()
+        return said
+
+    def _add_feedforward(
+        self, builder: DiagramBuilder, ahead: System, commands: dict[str, OutputPort]
+    ) -> None:
+        """Puts what an inverse model says on top of the commands, in place."""
+        for name in ("X_WE", "V_WE", "A_WE"):
+            source = self.reference.GetOutputPort(f"{name}_preview")
+            builder.Connect(source, ahead.GetInputPort(f"{name}_desired"))
+        added = {"velocity_command": "velocity_offset", "torque_feedforward": "torque_feedforward"}
+        # Where the motors are, the gears are wound up already.
+        if not self.traits.commands_motors:
+            added["position_command"] = "position_offset"
+        for name, offset in added.items():
+            if name not in commands:
+                commands[name] = ahead.GetOutputPort(offset)
+                continue
+            total = builder.AddNamedSystem(f"{name}_with_feedforward", Adder(2, NUM_JOINTS))
+            builder.Connect(commands[name], total.get_input_port(0))
+            builder.Connect(ahead.GetOutputPort(offset), total.get_input_port(1))
+            commands[name] = total.get_output_port()
+
+
+def law_config(scenario: Scenario, law: type[System] | System) -> LawConfig:
+    """Gains and limits of a law: the scenario's, or those with which its class begins."""
+    kind = law if isinstance(law, type) else type(law)
+    config = scenario.servo.laws.get(LAWS.name_of(kind) or "")
+    return law_traits(kind).Config() if config is None else config
+
+
+def law_name(law: str | type[System] | System) -> str:
+    """What a law is called in logs and results."""
+    if isinstance(law, str):
+        return law
+    return law.__name__ if isinstance(law, type) else type(law).__name__

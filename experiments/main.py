@@ -44,7 +44,7 @@ from experiments.cli.prepare import Prepared, check, prepare
 from experiments.cli.staging import staged_file, staged_folder
 from experiments.cli.tables import print_summary
 from experiments.cli.workers import usable_cores
-from experiments.comparison.compare import compare, simulating
+from experiments.comparison.compare import compare, compared_laws, named_laws, simulating
 from experiments.comparison.results import RESULTS, write_results
 from experiments.diagram.view import write_diagram
 from experiments.drivetrain.command import drivetrain_command
@@ -58,7 +58,7 @@ from experiments.station.guided_command import ask_before_moving, guide, on_stat
 from experiments.station.latency_command import latency_command
 from experiments.zeros.command import zeros_command
 from robots.description.model import load_robot, shipped_robots
-from systems.servo import COMPARED_LAWS, LAWS
+from systems.servo import LAWS
 
 app = typer.Typer(
     help="Puts the true tip of an industrial robot on its path: visual-servo laws, simulated and compared.",
@@ -70,7 +70,21 @@ app = typer.Typer(
 
 LawOption = Annotated[
     str | None,
-    typer.Option("--law", metavar="NAME", help=f"One of {', '.join(LAWS)}.", show_default="the scenario's"),
+    typer.Option(
+        "--law",
+        metavar="NAME|FILE:CLASS",
+        help=f"One of {', '.join(LAWS)}, or my_law.py:MyLaw.",
+        show_default="the scenario's",
+    ),
+]
+LawsOption = Annotated[
+    str | None,
+    typer.Option(
+        "--laws",
+        metavar="A,B,...",
+        help="Which laws, by name or as my_law.py:MyLaw.",
+        show_default=",".join(compared_laws()),
+    ),
 ]
 
 
@@ -100,6 +114,7 @@ def _options(
 
 @app.command("compare")
 def compare_command(
+    laws: LawsOption = None,
     scenario: AnyScenarioOption = None,
     settings: SetOption = None,
     robot: RobotOption = None,
@@ -120,16 +135,17 @@ def compare_command(
     ] = 3,
     jobs: JobsOption = None,
 ) -> None:
-    """Run the open loop and the three laws on one scenario and compare them."""
+    """Run several laws on one scenario, by default the open loop and three others, and compare them."""
     human = human_console(json_file)
     with refusing(ValueError, OSError):
         at_least("--cycles", 1, cycles)
         at_least("--jobs", 1, jobs)
         cycles = 1 if is_quick else cycles
+        chosen = named_laws(laws)
         changes = _settings(settings, None, feedforward, camera)
         name, changes = on_station(scenario, changes, station, with_cell)
         prepared = prepare(name, changes, robot, is_quick)
-        check(prepared, list(COMPARED_LAWS))
+        check(prepared, chosen)
         print_note(human, prepared.note)
         is_guided = prepared.scenario.station.kind == "egm"
         if is_guided:
@@ -138,14 +154,12 @@ def compare_command(
         stage = stack.enter_context(staged_folder(out))
         stack.enter_context(output.staged())
         if is_guided:
-            logs = guide(human, (stage, out), prepared, list(COMPARED_LAWS), cycles, with_cell)
+            logs = guide(human, (stage, out), prepared, chosen, cycles, with_cell)
         else:
-            processes = min(jobs or usable_cores(), cycles * len(COMPARED_LAWS))
-            runs = count(cycles * len(COMPARED_LAWS), "run")
+            processes = min(jobs or usable_cores(), cycles * len(chosen))
+            runs = count(cycles * len(chosen), "run")
             with progress_bar(f"{runs} in {count(processes, 'process', 'processes')}") as progress:
-                logs = compare(
-                    prepared.scenario, prepared.robot, list(COMPARED_LAWS), cycles, processes, progress
-                )
+                logs = compare(prepared.scenario, prepared.robot, chosen, cycles, processes, progress)
         result = _write(human, stage, prepared, logs)
         output.write(result)
     _conclude(human, result, out)

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
-from pydrake.systems.framework import Context, Diagram, DiagramBuilder
+from pydrake.systems.framework import Context, Diagram, DiagramBuilder, System
 
 from diagrams.hardware import HardwareStation
 from diagrams.hardware_link import HardwareLink, StationError
@@ -16,7 +16,7 @@ from diagrams.record.log import RunLog
 from diagrams.record.packed_log import PackedLog
 from diagrams.runs.simulation import guard_events, measured_along, start_position
 from diagrams.scenario.scenario import Scenario, ScenarioError
-from diagrams.servo import Servo
+from diagrams.servo import Servo, law_name
 from robots.description.model import NUM_JOINTS, RobotModel, load_robot
 from systems.guard.guard import KINDS
 from systems.link.abb.channel import steady_time
@@ -27,7 +27,6 @@ from systems.link.clock import ClockQuality
 from systems.link.qualisys.receiver import MocapReceiver
 from systems.reference.paths import CartesianPath
 from systems.samples import JointSample, PoseSample
-from systems.servo import BLIND_LAWS, LawConfig
 
 __all__ = ["RealTimeRecord", "RealTimeRun", "StationError"]
 
@@ -53,28 +52,29 @@ class RealTimeRecord:
 class RealTimeRun:
     """One law on a real station, from a smooth approach to the end of the dwell."""
 
-    def __init__(self, scenario: Scenario, law: str, robot: RobotModel | None = None) -> None:
+    def __init__(
+        self, scenario: Scenario, law: str | type[System] | System, robot: RobotModel | None = None
+    ) -> None:
         """Builds the servo and warms it up, before anything is said to a robot.
 
         Args:
             scenario: what to do; its ``station.link`` says where the station is.
-            law: which law to use.
+            law: a shipped law by name, ``FILE.py:CLASS``, a class, or any system with the ports of a law.
             robot: as the controller knows it; None for the scenario's.
 
         Raises:
             ScenarioError: if the robot cannot follow the path.
             ValueError: if a part refuses its configuration.
         """
-        self.scenario, self.law = scenario, law
+        self.scenario, self.law = scenario, law_name(law)
         self.robot = robot or load_robot(scenario.robot)
         self.period = scenario.station.period
         if scenario.servo.feedforward.kind != "none":
             raise ScenarioError("servo.feedforward.kind must be none on a real station: EGM takes no torques")
-        self._is_speed_only = scenario.servo.laws.get(law, LawConfig()).drive == "velocity"
-        self._uses_camera = law not in BLIND_LAWS
         builder = DiagramBuilder()
         self.station = builder.AddNamedSystem("station", HardwareStation())
         self.servo = builder.AddNamedSystem("servo", Servo(self.robot, scenario, law))
+        self._is_speed_only = self.servo.drive == "velocity"
         for name in ("position_command", "velocity_command"):
             builder.Connect(self.servo.GetOutputPort(name), self.station.GetInputPort(name))
         for name in ("joint_sample", "pose_sample"):
@@ -92,6 +92,11 @@ class RealTimeRun:
         self._joint_rows: list[tuple[int, float, np.ndarray, np.ndarray]] = []
         self._exposures: list[tuple[float, np.ndarray]] = []
         self._pauses: list[tuple[float, float]] = []
+
+    @property
+    def uses_camera(self) -> bool:
+        """Whether the law needs the camera."""
+        return self.servo.traits.uses_camera
 
     def run(
         self,
@@ -122,7 +127,7 @@ class RealTimeRun:
         before = client.session.counters.as_dict()
         try:
             wire = HardwareLink(client, camera, self.scenario, self.robot, self._is_speed_only, now, signals)
-            wire.connect(self._uses_camera)
+            wire.connect(self.uses_camera)
             wire.approach(self.start)
             ended = self._follow(wire, progress or (lambda share: None), now)
         finally:

@@ -6,20 +6,19 @@ from collections.abc import Callable
 
 import numpy as np
 from pydrake.systems.analysis import Simulator
-from pydrake.systems.framework import DiagramBuilder
+from pydrake.systems.framework import DiagramBuilder, System
 
 from diagrams.integration import Integration
 from diagrams.record.log import GuardEvent, RunLog
 from diagrams.record.packed_log import PackedLog
 from diagrams.scenario.scenario import Scenario, ScenarioError
-from diagrams.servo import Servo
+from diagrams.servo import Servo, law_name
 from diagrams.station import SimulatedStation
 from robots.description.model import RobotModel, load_robot
 from robots.dynamics.newton_inverse import inverse_kinematics
 from systems.controller_model import ControllerModel
 from systems.guard.guard import KINDS
 from systems.reference.paths import CartesianPath
-from systems.servo import LawConfig
 
 _CHUNK = 0.2  # s of simulated time between two reports of progress
 
@@ -54,20 +53,28 @@ class Experiment:
     """A station under a servo, ready to be advanced."""
 
     def __init__(
-        self, scenario: Scenario, law: str, robot: RobotModel | None = None, seed: int | None = None
+        self,
+        scenario: Scenario,
+        law: str | type[System] | System,
+        robot: RobotModel | None = None,
+        seed: int | None = None,
     ) -> None:
-        """Builds the diagram and puts everything at rest at the start. Raises what `run` raises."""
-        self.scenario, self.law = scenario, law
+        """Builds the diagram and puts everything at rest at the start. Raises what `run` raises.
+
+        Args:
+            scenario, robot, seed: as of `run`.
+            law: a shipped law by name, ``FILE.py:CLASS``, a class, or any system with the ports of a law.
+        """
+        self.scenario, self.law = scenario, law_name(law)
         self.seed = scenario.seed if seed is None else seed
         drawn = nominal_robot(scenario, robot)
         robot = robot or drawn
         builder = DiagramBuilder()
-        drive = scenario.servo.laws.get(law, LawConfig()).drive
-        has_torque = scenario.servo.feedforward.kind != "none"
+        servo = Servo(robot, scenario, law)
         self.station = builder.AddNamedSystem(
-            "station", SimulatedStation(drawn, scenario.station, drive, takes_torque=has_torque)
+            "station", SimulatedStation(drawn, scenario.station, servo.drive, takes_torque=servo.has_torque)
         )
-        self.servo = builder.AddNamedSystem("servo", Servo(robot, scenario, law))
+        self.servo = builder.AddNamedSystem("servo", servo)
         for name in ("position_command", "velocity_command", "torque_feedforward"):
             if self.station.HasInputPort(name):
                 builder.Connect(self.servo.GetOutputPort(name), self.station.GetInputPort(name))

@@ -208,7 +208,7 @@ def _check(scenario: Scenario) -> None:
     if scenario.station.drive.payload is not None:
         _in_range("station.drive.payload", scenario.station.drive.payload, _RANGES["station.payload"])
     _check_model(scenario.servo.model)
-    _one_of("law", scenario.law, LAWS)
+    LAWS.find(scenario.law)
     _one_of("servo.feedforward.kind", scenario.servo.feedforward.kind, ("none", *FEEDFORWARDS))
     _one_of("station.kind", scenario.station.kind, STATIONS)
     _one_of("station.camera.kind", scenario.station.camera.kind, CAMERAS)

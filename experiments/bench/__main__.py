@@ -29,6 +29,7 @@ from experiments.bench.feedforward import feedforward
 from experiments.bench.images import images
 from experiments.bench.tracking import tracking
 from experiments.bench.wire import wire
+from experiments.comparison.compare import compared_laws
 from experiments.report.files import write_json
 from robots.calibration.identification import identify
 from robots.calibration.measurements import Measurements
@@ -40,7 +41,6 @@ from robots.kinematics.error_kinematics import ErrorKinematics
 from robots.kinematics.forward import Kinematics
 from robots.measurement_design.constraints import AdmissibleConfigurations
 from robots.measurement_design.design import design_measurements
-from systems.servo import COMPARED_LAWS
 
 REPEATS = 3
 SETTLE, SPAN = 0.5, 4.0  # s: standing at the start, then the first edge of the rectangle
@@ -92,7 +92,7 @@ def _on_one_core(rows: Iterator[Row]) -> Iterator[Row]:
 def benchmarks() -> Iterator[Row]:
     """All benchmarks of one process in turn."""
     robot = load_robot(load_scenario("misaligned").robot)
-    for law in COMPARED_LAWS:
+    for law in compared_laws():
         yield from closed_loop(law, robot)
     yield from kinematics(robot)
     yield from calibration(robot)
@@ -100,7 +100,7 @@ def benchmarks() -> Iterator[Row]:
     yield from tracking()
     yield from images()
     yield from cameras()
-    for law in COMPARED_LAWS:
+    for law in compared_laws():
         yield convergence(law, robot)
 
 

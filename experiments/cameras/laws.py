@@ -6,10 +6,11 @@ from typing import Any
 
 from experiments.cli.prepare import prepare
 from experiments.cli.workers import Progress, in_processes
-from experiments.comparison.compare import RunJob, run_job
+from experiments.comparison.compare import RunJob, compared_laws, run_job
 from experiments.metrics.run_metrics import error_metrics
 from systems.cell.pose_camera import CAMERAS
-from systems.servo import COMPARED_LAWS
+from systems.servo import LAWS
+from systems.servo.contract import law_traits
 
 FRAME_RATES = (31.25, 62.5, 125.0, 250.0)  # Hz
 
@@ -37,7 +38,7 @@ def study_laws(
         ValueError: if a scenario is wrong.
         SimulationError: if a run broke off.
     """
-    laws = [law for law in COMPARED_LAWS if law != "open_loop"]
+    laws = [law for law in compared_laws() if law_traits(LAWS[law]).uses_camera]
     rate = 1.0 / prepare(scenario, settings).scenario.station.camera.period
     # Images take longest, so they come first.
     runs = [(law, camera, rate) for camera in reversed(CAMERAS) for law in laws]

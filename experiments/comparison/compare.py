@@ -9,9 +9,8 @@ from diagrams.runs.simulation import run
 from diagrams.scenario.scenario import Scenario
 from experiments.cli.workers import Progress, SimulationError, in_processes
 from robots.description.model import RobotModel
-
-# The longest job comes first, so that no core waits for it at the end.
-SLOWEST_FIRST = ("pbvs", "position_level", "numerical_ik", "open_loop")
+from systems.servo import LAWS
+from systems.servo.contract import law_traits
 
 
 @dataclass(frozen=True)
@@ -53,7 +52,7 @@ def compare(
     """
     jobs = [
         RunJob(scenario, robot, law, scenario.seed + cycle)
-        for law in sorted(laws, key=_slowness)
+        for law in sorted(laws, key=_is_quick)
         for cycle in range(cycles)
     ]
     results = in_processes(run_job, jobs, processes, progress)
@@ -80,5 +79,27 @@ def run_job(job: RunJob, progress: Progress) -> RunLog:
         return run(job.scenario, job.law, job.robot, job.seed, progress)
 
 
-def _slowness(law: str) -> int:
-    return SLOWEST_FIRST.index(law) if law in SLOWEST_FIRST else -1
+def compared_laws() -> list[str]:
+    """The laws that are compared unless others are named."""
+    return [name for name, law in LAWS.items() if law_traits(law).is_compared]
+
+
+def named_laws(text: str | None) -> list[str]:
+    """The laws in a text such as ``"open_loop,my_law.py:MyLaw"``; None stands for `compared_laws`.
+
+    Raises:
+        ValueError: if one is unknown or named twice.
+    """
+    if text is None:
+        return compared_laws()
+    laws = [law.strip() for law in text.split(",")]
+    for law in laws:
+        LAWS.find(law)
+        if laws.count(law) > 1:
+            raise ValueError(f"--laws: '{law}' is there twice")
+    return laws
+
+
+def _is_quick(law: str) -> bool:
+    """Laws without a camera take less time; the longest jobs come first, so that no core waits at the end."""
+    return not law_traits(LAWS.find(law)).uses_camera

@@ -10,9 +10,10 @@ from experiments.feedforward.study import KINDS, FeedforwardStudy
 from experiments.feedforward.trial import RINGING
 from experiments.feedforward.two_joint_arm import TIMES, Solution, TwoJointArm
 from experiments.report.plot_page import Section, html_table, write_plot_page
+from systems.feedforward import FEEDFORWARDS
 
-COLORS = {"rigid": "#c0392b", "flexible_joint": "#e0a030", "elastic_structure": "#0f7cc0"}
-LABELS = {"rigid": "rigid", "flexible_joint": "flexible joint", "elastic_structure": "elastic structure"}
+COLORS = {kind: FEEDFORWARDS[kind].colour for kind in KINDS}
+LABELS = {kind: FEEDFORWARDS[kind].title for kind in KINDS}
 TABLE_HEAD = ("feedforward", "integral", "max", "max mm", "us a tick")
 
 

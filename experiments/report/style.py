@@ -2,39 +2,34 @@
 
 from collections.abc import Iterable
 
-TITLES = {
-    "open_loop": "Open loop",
-    "numerical_ik": "Numerical IK",
-    "pbvs": "PBVS",
-    "position_level": "Position level",
-    "compensation": "Compensation",
-}
+from systems.servo import LAWS
+from systems.servo.contract import LawTraits, law_traits
 
-# From the palette of Okabe and Ito, which colour-blind readers tell apart; the baseline is grey.
-COLORS = {
-    "open_loop": "#8a8f98",
-    "numerical_ik": "#0f7cc0",
-    "pbvs": "#d55e00",
-    "position_level": "#009e73",
-    "compensation": "#b89400",
-}
 _FURTHER_COLORS = ("#c2739f", "#a0522d", "#56b4e9", "#7a5195")
 WANTED_COLOR = "#cc79a7"
 
 
 def law_title(law: str) -> str:
     """The name of a law for people."""
-    return TITLES.get(law, law.replace("_", " "))
+    return _traits(law).title
 
 
 def law_colors(laws: Iterable[str]) -> dict[str, str]:
-    """One colour per law as #rrggbb; laws that are not shipped get further ones in turn."""
+    """One colour per law as #rrggbb; laws that have none of their own get further ones in turn."""
     unknown = 0
     colors = {}
     for law in laws:
-        if law in COLORS:
-            colors[law] = COLORS[law]
-        else:
-            colors[law] = _FURTHER_COLORS[unknown % len(_FURTHER_COLORS)]
+        colour = _traits(law).colour
+        if not colour:
+            colour = _FURTHER_COLORS[unknown % len(_FURTHER_COLORS)]
             unknown += 1
+        colors[law] = colour
     return colors
+
+
+def _traits(law: str) -> LawTraits:
+    """What stands on the law's class; a log may be of a law that is not there any more."""
+    try:
+        return law_traits(LAWS.find(law))
+    except ValueError:
+        return LawTraits(law.rpartition(":")[2].replace("_", " "), "")

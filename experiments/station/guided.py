@@ -12,7 +12,6 @@ from diagrams.runs.virtual_cell import CellRecord
 from diagrams.scenario.scenario import Scenario
 from experiments.station.clients import station_clients
 from robots.description.model import RobotModel
-from systems.servo import BLIND_LAWS
 
 
 @dataclass
@@ -58,7 +57,7 @@ def compare_on_station(
     jobs = [(law, RealTimeRun(scenario, law, robot)) for law in laws for _ in range(cycles)]
     report = progress or (lambda share: None)
     records: dict[str, list[RealTimeRecord]] = {law: [] for law in laws}
-    needs_camera = any(law not in BLIND_LAWS for law in laws)
+    needs_camera = any(run.uses_camera for _, run in jobs)
     with station_clients(scenario, robot, with_cell, needs_camera) as station:
         for number, (law, run) in enumerate(jobs):
             record = run.run(

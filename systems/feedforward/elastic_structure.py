@@ -28,6 +28,8 @@ class ElasticStructureFeedforward(FlexibleJointFeedforward):
     corrections of the last three.
     """
 
+    title = "elastic structure"
+    colour = "#0f7cc0"
     derivatives = 4
 
     def __init__(self, model: ControllerModel, config: FeedforwardConfig) -> None:
@@ -77,7 +79,7 @@ class ElasticStructureFeedforward(FlexibleJointFeedforward):
         )
         structure = (deflection, rate[:size], acceleration[:size])
         load = self._inertia * self._arm.gear_load(corrected, structure)
-        drive = self._drive(corrected, load, of_gears)
+        drive = self.drive_under(corrected, load, of_gears)
         history = with_newest(newest, history)
         return Drive(
             drive.deflection - turn,

@@ -32,7 +32,7 @@ _OUTPUTS = {  # before the first tick, and out of reach
 
 
 class Feedforward(LeafSystem):
-    """The frame of an inverse model; a model adds `_drive`.
+    """The frame of an inverse model; a model adds `drive_under`.
 
     Ports:
         in  ``X_WE_desired``        RigidTransform, the wanted pose at t + preview
@@ -55,6 +55,8 @@ class Feedforward(LeafSystem):
     more preview makes up for it.
     """
 
+    title = "feedforward"  # for people
+    colour = ""  # in figures, #rrggbb
     memory_size = 0  # how many numbers a model remembers
     derivatives = 2  # the highest derivative of the joint positions on which the outputs depend
 
@@ -142,9 +144,9 @@ class Feedforward(LeafSystem):
 
     def drive(self, reference: JointReference, memory: np.ndarray) -> Drive:
         """What the motors shall do; the memory is the model's, of the last tick, NaN at the first one."""
-        return self._drive(reference, self._load(reference), memory)
+        return self.drive_under(reference, self.link_load(reference), memory)
 
-    def _drive(self, reference: JointReference, load: np.ndarray, memory: np.ndarray) -> Drive:
+    def drive_under(self, reference: JointReference, load: np.ndarray, memory: np.ndarray) -> Drive:
         """What the motors shall do.
 
         Args:
@@ -214,7 +216,7 @@ class Feedforward(LeafSystem):
         moved = self._sag.gravity_torque(reference.position + _SMALL_TURN * reference.velocity)
         return self._compliance * torque, self._compliance * (moved - torque) / _SMALL_TURN
 
-    def _load(self, reference: JointReference) -> np.ndarray:
+    def link_load(self, reference: JointReference) -> np.ndarray:
         """Inverse dynamics of the links: inertia, Coriolis and gravity, without rotors and friction."""
         self._plant.SetPositionsAndVelocities(
             self._context, np.concatenate([reference.position, reference.velocity])
@@ -229,7 +231,7 @@ class Feedforward(LeafSystem):
         self._plant.SetPositions(self._context, motors)
         return -self._parts.load(self._context)
 
-    def _motor_torque(self, velocity: np.ndarray, acceleration: np.ndarray, load: np.ndarray) -> np.ndarray:
+    def motor_torque(self, velocity: np.ndarray, acceleration: np.ndarray, load: np.ndarray) -> np.ndarray:
         """Torque of motors that carry a load: rotor inertia, viscous and Coulomb friction (2.63), (2.64)."""
         friction = self._viscous * velocity + self._coulomb * np.tanh(velocity / self._coulomb_velocity)
         return self._rotor * acceleration + friction + load

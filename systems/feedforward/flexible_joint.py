@@ -22,6 +22,8 @@ class FlexibleJointFeedforward(Feedforward):
     The memory holds the load of the last tick and the deflections of the last three.
     """
 
+    title = "flexible joint"
+    colour = "#e0a030"
     memory_size = (1 + HISTORY) * NUM_JOINTS
     derivatives = 3
 
@@ -39,7 +41,8 @@ class FlexibleJointFeedforward(Feedforward):
         self._gears = SprungDeflection(self._stiffness, self._damping, model.period, springs)
         self._differences = BackwardDifferences(model.period)
 
-    def _drive(self, reference: JointReference, load: np.ndarray, memory: np.ndarray) -> Drive:
+    def drive_under(self, reference: JointReference, load: np.ndarray, memory: np.ndarray) -> Drive:
+        """Motors that turn ahead by what the load deflects."""
         if np.isnan(memory[0]):
             deflection = self._gears.at_rest(load)
             history = at_rest(deflection)
@@ -48,6 +51,6 @@ class FlexibleJointFeedforward(Feedforward):
             deflection = self._gears.step(history[0], memory[:NUM_JOINTS], load)
         rate, acceleration = self._differences.derivatives(deflection, history)
         velocity = reference.velocity - rate
-        torque = self._motor_torque(velocity, reference.acceleration - acceleration, load)
+        torque = self.motor_torque(velocity, reference.acceleration - acceleration, load)
         history = with_newest(deflection, history)
         return Drive(deflection, rate, torque, np.concatenate([load, history.ravel()]))

@@ -9,7 +9,11 @@ from systems.feedforward.joint_motion import Drive, JointReference
 class RigidFeedforward(Feedforward):
     """Motors and links move alike; the torque is that of inverse dynamics with friction."""
 
-    def _drive(self, reference: JointReference, load: np.ndarray, memory: np.ndarray) -> Drive:
+    title = "rigid"
+    colour = "#c0392b"
+
+    def drive_under(self, reference: JointReference, load: np.ndarray, memory: np.ndarray) -> Drive:
+        """Motors that turn as their links."""
         zero = np.zeros_like(load)
-        torque = self._motor_torque(reference.velocity, reference.acceleration, load)
+        torque = self.motor_torque(reference.velocity, reference.acceleration, load)
         return Drive(zero, zero, torque, memory)

@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Callable
+from dataclasses import dataclass
 
 import numpy as np
 from pydrake.common.value import AbstractValue, Value
@@ -13,6 +14,31 @@ from systems.reference.paths import CartesianPath, ReferenceConfig, make_path
 _Moment = tuple[RigidTransform, np.ndarray, np.ndarray]  # pose, twist, acceleration
 
 
+@dataclass(frozen=True)
+class PathAhead:
+    """The path and its timing, for a law that looks further ahead than the preview.
+
+    Slowing down, for whatever reason, changes the path time and never the path.
+    """
+
+    path: CartesianPath
+
+    def path_time(self, t: float) -> float:
+        """The time on the path in s that belongs to a time of the station in s, as planned now."""
+        return t
+
+    def sample(self, t: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Where the tool shall be at times of the station.
+
+        Args:
+            t: s, shape (n,).
+
+        Returns:
+            X_WE (n, 4, 4), V_WE (n, 6) in rad/s and m/s, A_WE (n, 6) in rad/s^2 and m/s^2.
+        """
+        return self.path.sample(t)
+
+
 class Reference(LeafSystem):
     """Plays a path against the time of the context.
 
@@ -21,6 +47,7 @@ class Reference(LeafSystem):
         out ``V_WE_desired``  vector 6, its spatial velocity in rad/s and m/s
         out ``A_WE_desired``  vector 6, its spatial acceleration in rad/s^2 and m/s^2
         out ``X_WE_preview``, ``V_WE_preview``, ``A_WE_preview``  the same ``preview`` seconds later
+        out ``reference``     PathAhead, for any time ahead
 
     The path is at rest before it begins and after it ends. It can be asked for at any time; multiples of
     the period are computed beforehand, all at once.
@@ -42,6 +69,13 @@ class Reference(LeafSystem):
         now = self._moments_from(0.0)
         self._declare_ports("desired", now)
         self._declare_ports("preview", self._moments_from(config.preview) if config.preview > 0.0 else now)
+        ahead = PathAhead(self._path)
+        self.DeclareAbstractOutputPort(
+            "reference",
+            lambda: Value[object](ahead),
+            lambda context, output: output.set_value(ahead),
+            {self.nothing_ticket()},
+        )
 
     @property
     def path(self) -> CartesianPath:

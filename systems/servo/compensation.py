@@ -18,15 +18,20 @@ class Compensation(ServoLaw):
     The memory holds the positions and their last velocity (trapezoidal rule).
     """
 
+    title = "Compensation"
+    colour = "#b89400"
+    uses_camera = False
     memory_size = 12
 
-    def _start(self, moment: LawInput) -> np.ndarray:
+    def initial_state(self, moment: LawInput) -> np.ndarray:
+        """At the measured positions, at rest."""
         return np.concatenate([moment.position, np.zeros(6)])
 
-    def _step(self, moment: LawInput, memory: np.ndarray) -> LawOutput:
+    def step(self, moment: LawInput, memory: np.ndarray) -> LawOutput:
+        """One step of the trapezoidal rule."""
         q, last_velocity = memory[:6], memory[6:]
         # The wanted pose is that of this tick, so the error is taken where the positions will be by then.
-        rows, J = self._kinematics.rows_and_jacobian(q + self.period * last_velocity)
+        rows, J = self.kinematics.rows_and_jacobian(q + self.period * last_velocity)
         gains = self.config.rotation, self.config.translation
         feedback = sine_feedback(moment.X_WD, rows, moment.V_WD, *gains)
         velocity = robust_solve(J, np.add(moment.V_WD, feedback))

@@ -2,7 +2,6 @@
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
@@ -19,6 +18,7 @@ from robots.pose import Rows, error_of_rows
 from systems.controller_model import ControllerModel
 from systems.guard.guard import GuardConfig
 from systems.samples import JointSample, PoseSample
+from systems.servo.law_config import LawConfig
 
 _ENTRY = 19  # a moment of the path: time, the rows of the 3 x 4 pose matrix, the twist
 # rad in one tick: ten times what the fastest joint can do, far less than from branch to branch
@@ -27,18 +27,6 @@ _JOINTS_SIZE = 18  # positions, velocities, velocities of the tick before
 _NEWTON_STEP = 5e-5  # rad; what one such step leaves is its square, a few nanometres
 _DAMPED = 1e-10  # rad and m that a step leaves which was not damped
 _NO_COMMAND = np.full(NUM_JOINTS, np.nan)
-
-
-@dataclass
-class LawConfig:
-    """Gains and limits of a law; read from a scenario file."""
-
-    translation: float = 5.0  # 1/s
-    rotation: float = 5.0  # 1/s
-    drive: str = "position"  # the drive that the law commands: position, velocity or cascade
-    correction_limit: float = 0.1  # m, the largest correction of the position
-    correction_limit_deg: float = 20.0  # the largest correction of the orientation
-    correction_speed_limit_deg_s: float = 30.0  # of one joint, where a law corrects velocities
 
 
 class LawInput(NamedTuple):
@@ -63,7 +51,9 @@ class LawOutput(NamedTuple):
 
 
 class ServoLaw(LeafSystem):
-    """The frame of a visual-servo law on the nominal kinematics; a law adds `_step` and may add `_start`.
+    """The frame of a visual-servo law on the kinematics that the controller knows.
+
+    A law adds `step` and may add `initial_state`.
 
     Ports:
         in  ``X_WE_desired``      RigidTransform, the wanted pose at t + preview
@@ -80,7 +70,21 @@ class ServoLaw(LeafSystem):
 
     A sample is compared with the path at the instant of its exposure, so that transport delay does not
     look like an error. For that a law remembers the path for as long as a sample may be late and is used.
+
+    What a law is stands on its class, see `systems.servo.contract.LawTraits`. What it works with:
+        ``kinematics``  of the robot as the controller knows it, compliant if that knows its compliances
+        ``config``      gains and limits, ``gains`` of the six parts of an error (rotation first) in 1/s
+        ``period``      of a tick in s
+        ``angle_limit`` of the correction in rad
     """
+
+    title = "Law"  # for people
+    colour = ""  # in reports, #rrggbb; empty to be given one
+    uses_camera = True
+    commands_motors = False  # whether positions start from the motors': gears are wound up in them already
+    is_compared = False  # whether a comparison has it unless told otherwise
+    Config = LawConfig
+    memory_size = NUM_JOINTS  # how many numbers a law remembers
 
     def __init__(self, model: ControllerModel, config: LawConfig, guard: GuardConfig) -> None:
         """Checks the configuration.
@@ -99,13 +103,13 @@ class ServoLaw(LeafSystem):
                 raise ValueError(f"servo law: {label} must be positive, got {getattr(config, label)}")
         robot, period, preview = model.robot, model.period, model.preview
         self.config, self.period = config, period
-        self._kinematics = controller_kinematics(robot, model.payload)
+        self.kinematics = controller_kinematics(robot, model.payload)
         self._inverse = inverse_kinematics(robot, model.payload)
         self._lower, self._upper = robot.lower.tolist(), robot.upper.tolist()
-        self._gains = [config.rotation] * 3 + [config.translation] * 3
-        # From the joints of the last tick, as `_joints_at` has them, to their positions at this one.
+        self.gains = [config.rotation] * 3 + [config.translation] * 3
+        # From the joints of the last tick, as `joints_at` has them, to their positions at this one.
         self._prediction = np.kron([1.0, 1.5 * period, -0.5 * period], np.eye(NUM_JOINTS))
-        self._angle_limit = math.radians(config.correction_limit_deg)
+        self.angle_limit = math.radians(config.correction_limit_deg)
         self._guard, self._preview = guard, preview
         self._smallest_trace = 1.0 + 2.0 * math.cos(math.radians(guard.largest_deviation_deg))
         self._X_WD = self.DeclareAbstractInputPort("X_WE_desired", Value(RigidTransform()))
@@ -130,14 +134,12 @@ class ServoLaw(LeafSystem):
             self.DeclareStateOutputPort(name, state)
         self.DeclarePeriodicDiscreteUpdateEvent(period, 0.0, self._tick)
 
-    memory_size = NUM_JOINTS  # how many numbers a law remembers
-
-    def _start(self, moment: LawInput) -> np.ndarray:
+    def initial_state(self, moment: LawInput) -> np.ndarray:
         """The memory with which the law begins; where a law says nothing else, the measured positions."""
         return moment.position
 
-    def _step(self, moment: LawInput, memory: np.ndarray) -> LawOutput:
-        """One tick of the law."""
+    def step(self, moment: LawInput, memory: np.ndarray) -> LawOutput:
+        """One tick of the law; the memory is that of the last one."""
         raise NotImplementedError
 
     def _tick(self, context: Context, discrete_state: DiscreteValues) -> None:
@@ -167,9 +169,11 @@ class ServoLaw(LeafSystem):
 
         moment = LawInput(X_WD.tolist(), V_WD.tolist(), joints.position, measured)
         first_tick = math.isnan(path[(tick - 1) % len(path), 0])
-        memory = self._start(moment) if first_tick else context.get_discrete_state(self._memory).value()
+        memory = (
+            self.initial_state(moment) if first_tick else context.get_discrete_state(self._memory).value()
+        )
         try:
-            step = self._step(moment, memory)
+            step = self.step(moment, memory)
         except (UnreachableError, JointLimitError):
             # No command is an answer too: the guard holds the robot and counts it.
             correction = context.get_discrete_state(self._outputs[2]).value()
@@ -180,7 +184,7 @@ class ServoLaw(LeafSystem):
         discrete_state.set_value(3, np.array([last_used, refused, newest]))
         discrete_state.set_value(5, step.memory)
 
-    def _joints_at(self, X_WE: Rows, V_WE: Sequence[float], last: np.ndarray) -> np.ndarray:
+    def joints_at(self, X_WE: Rows, V_WE: Sequence[float], last: np.ndarray) -> np.ndarray:
         """The joints for a pose and a twist, next to those of the last tick.
 
         The last velocities lead so close that one Newton step is enough; where they do not, or close to a
@@ -197,7 +201,7 @@ class ServoLaw(LeafSystem):
             UnreachableError, JointLimitError: as `followed_branch`.
         """
         predicted = self._prediction.dot(last)
-        rows, J = self._kinematics.rows_and_jacobian(predicted)
+        rows, J = self.kinematics.rows_and_jacobian(predicted)
         twists = np.array((error_of_rows(X_WE, rows), V_WE)).T  # columns that LAPACK need not copy
         rates = robust_solve(J, twists)
         step = rates[:, 0]
@@ -211,13 +215,13 @@ class ServoLaw(LeafSystem):
             or not all(lower <= angle <= upper for lower, angle, upper in inside)
         ):
             joints[:6] = followed_branch(self._inverse, np.array(X_WE), last[:6])
-            joints[6:12] = robust_solve(self._kinematics.jacobian(joints[:6]), twists[:, 1])
+            joints[6:12] = robust_solve(self.kinematics.jacobian(joints[:6]), twists[:, 1])
         return joints
 
-    def _within_limits(self, twist: list[float], correction: Sequence[float]) -> list[float]:
+    def within_limits(self, twist: list[float], correction: Sequence[float]) -> list[float]:
         """The twist that a law adds; where the correction stands at its limit, it may only shrink."""
         a, b, c, x, y, z = correction
-        if a * a + b * b + c * c >= self._angle_limit**2:
+        if a * a + b * b + c * c >= self.angle_limit**2:
             u, v, w = twist[:3]
             if a * u + b * v + c * w > 0.0:
                 twist[:3] = 0.0, 0.0, 0.0
@@ -239,7 +243,7 @@ class ServoLaw(LeafSystem):
             return None
         # A law that commands speeds does so from where the joints are, any other from where they shall be.
         led = commanded if self.config.drive == "velocity" else commanded + deviation
-        forward = self._kinematics.forward
+        forward = self.kinematics.forward
         return forward(led)[:3], forward(led - deviation)[:3]
 
     def pose_error_at_exposure(

@@ -19,22 +19,27 @@ class NumericalIk(ServoLaw):
     their last velocity (trapezoidal rule).
     """
 
+    title = "Numerical IK"
+    colour = "#0f7cc0"
+    is_compared = True
     memory_size = 18
 
-    def _start(self, moment: LawInput) -> np.ndarray:
+    def initial_state(self, moment: LawInput) -> np.ndarray:
+        """Both at the measured positions, at rest."""
         return np.concatenate([moment.position, moment.position, np.zeros(6)])
 
-    def _step(self, moment: LawInput, memory: np.ndarray) -> LawOutput:
+    def step(self, moment: LawInput, memory: np.ndarray) -> LawOutput:
+        """One step of the trapezoidal rule, with feedback of the pose error where there is a sample."""
         q_d, q, last_velocity = memory[:6], memory[6:12], memory[12:]
         # Where both will be at this tick, to which the wanted pose and twist belong.
         halfway = 0.5 * (q + q_d) + self.period * last_velocity
-        rows, J = self._kinematics.rows_and_jacobian(halfway)
+        rows, J = self.kinematics.rows_and_jacobian(halfway)
         correction = J.dot(q - q_d)
         twist = moment.V_WD
         if moment.measured is not None:
             gains = self.config.rotation, self.config.translation
             feedback = sine_feedback(*moment.measured, moment.V_WD, *gains)
-            added = self._within_limits(feedback, correction.tolist())
+            added = self.within_limits(feedback, correction.tolist())
             twist = [wanted + more for wanted, more in zip(twist, added, strict=True)]
         # Columns that LAPACK need not copy.
         rates = robust_solve(J, np.array((error_of_rows(moment.X_WD, rows), twist)).T)

@@ -11,11 +11,17 @@ class OpenLoop(ServoLaw):
     The memory holds the joints of the last tick.
     """
 
+    title = "Open loop"
+    colour = "#8a8f98"
+    uses_camera = False
+    is_compared = True
     memory_size = 18
 
-    def _start(self, moment: LawInput) -> np.ndarray:
+    def initial_state(self, moment: LawInput) -> np.ndarray:
+        """At the measured positions, at rest."""
         return np.concatenate([moment.position, np.zeros(12)])
 
-    def _step(self, moment: LawInput, memory: np.ndarray) -> LawOutput:
-        joints = self._joints_at(moment.X_WD, moment.V_WD, memory)
+    def step(self, moment: LawInput, memory: np.ndarray) -> LawOutput:
+        """The joints for the wanted pose."""
+        joints = self.joints_at(moment.X_WD, moment.V_WD, memory)
         return LawOutput(joints[:6], joints[6:12], np.zeros(6), joints)

@@ -19,17 +19,23 @@ class Pbvs(ServoLaw):
     q_d, the nominal joint positions on the path, carried on by their velocity and one Newton step a tick.
     """
 
-    def _step(self, moment: LawInput, memory: np.ndarray) -> LawOutput:
-        rows, J = self._kinematics.rows_and_jacobian(memory)
+    title = "PBVS"
+    colour = "#d55e00"
+    commands_motors = True
+    is_compared = True
+
+    def step(self, moment: LawInput, memory: np.ndarray) -> LawOutput:
+        """A velocity along the path and towards it, from where the joints are."""
+        rows, J = self.kinematics.rows_and_jacobian(memory)
         # Columns that LAPACK need not copy.
         rates = robust_solve(J, np.array((error_of_rows(moment.X_WD, rows), moment.V_WD)).T)
         refuse_jump(rates[:, 0])
         velocity = rates[:, 1]
         q_d = memory + rates[:, 0] + self.period * velocity
-        rows, J = self._kinematics.rows_and_jacobian(moment.position)
+        rows, J = self.kinematics.rows_and_jacobian(moment.position)
         correction = error_of_rows(rows, moment.X_WD)
         if moment.measured is not None:
-            twist = self._within_limits(self._feedback(*moment.measured), correction)
+            twist = self.within_limits(self._feedback(*moment.measured), correction)
             added = robust_solve(J, np.array(twist))
             fastest = math.radians(self.config.correction_speed_limit_deg_s)
             largest = max(map(abs, added.tolist()))
@@ -40,4 +46,4 @@ class Pbvs(ServoLaw):
         zyx = zyx_angles(seen)
         w = angular_velocity(zyx, euler_difference(zyx_angles(wanted), zyx))
         v = (wanted_row[3] - row[3] for wanted_row, row in zip(wanted, seen, strict=True))
-        return [gain * part for gain, part in zip(self._gains, (*w, *v), strict=True)]
+        return [gain * part for gain, part in zip(self.gains, (*w, *v), strict=True)]

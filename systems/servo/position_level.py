@@ -20,17 +20,22 @@ class PositionLevel(ServoLaw):
     last tick.
     """
 
+    title = "Position level"
+    colour = "#009e73"
+    is_compared = True
     memory_size = 24
 
-    def _start(self, moment: LawInput) -> np.ndarray:
-        rows, _ = self._kinematics.rows_and_jacobian(moment.position)
+    def initial_state(self, moment: LawInput) -> np.ndarray:
+        """c at minus the initial error, the joints where they are measured."""
+        rows, _ = self.kinematics.rows_and_jacobian(moment.position)
         return np.concatenate([_euler_difference(rows, moment.X_WD), moment.position, np.zeros(12)])
 
-    def _step(self, moment: LawInput, memory: np.ndarray) -> LawOutput:
+    def step(self, moment: LawInput, memory: np.ndarray) -> LawOutput:
+        """Integrates the correction and commands the joints for the corrected pose."""
         c, rate = memory[:6].tolist(), [0.0] * 6
         if moment.measured is not None:
             difference = _euler_difference(*moment.measured)
-            rate = [gain * part for gain, part in zip(self._gains, difference, strict=True)]
+            rate = [gain * part for gain, part in zip(self.gains, difference, strict=True)]
         c = self._limited([part + self.period * speed for part, speed in zip(c, rate, strict=True)])
         turn, shift = c[:3], c[3:]
 
@@ -44,7 +49,7 @@ class PositionLevel(ServoLaw):
         *turning, dx, dy, dz = rate
         zyx_rates = [a + b for a, b in zip(turning, euler_rates(wanted_zyx, wanted_w), strict=True)]
         V_WC = (*angular_velocity(zyx, zyx_rates), x + dx, y + dy, z + dz)
-        joints = self._joints_at(X_WC, V_WC, memory[6:])
+        joints = self.joints_at(X_WC, V_WC, memory[6:])
         correction = np.array([*angular_velocity(zyx, turn), *shift])
         return LawOutput(joints[:6], joints[6:12], correction, np.concatenate([c, joints]))
 
@@ -52,7 +57,7 @@ class PositionLevel(ServoLaw):
         """A correction, angle and length cut to their limits."""
         limited = []
         for part, limit in (
-            (correction[:3], self._angle_limit),
+            (correction[:3], self.angle_limit),
             (correction[3:], self.config.correction_limit),
         ):
             size = math.hypot(*part)

@@ -13,8 +13,9 @@ from experiments.cli.tables import print_summary
 from experiments.metrics.run_metrics import summary, timing
 from experiments.replay.replay import write_replay
 from experiments.report.report import verdict, write_report
-from experiments.report.style import TITLES, law_colors, law_title
+from experiments.report.style import law_colors, law_title
 from robots.description.model import load_robot
+from systems.servo import LAWS
 from tests.experiments.browser import open_page, screenshot
 from tests.experiments.synthetic import comparison, displaced, make_log, rectangle
 
@@ -167,5 +168,5 @@ def test_the_table_fits_a_terminal_of_100_columns(logs):
 
 
 def test_every_law_has_its_own_colour():
-    colors = law_colors([*TITLES, "mine", "yours"])
-    assert len(set(colors.values())) == len(TITLES) + 2
+    colors = law_colors([*LAWS, "mine", "yours"])
+    assert len(set(colors.values())) == len(LAWS) + 2

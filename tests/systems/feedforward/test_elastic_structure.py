@@ -12,13 +12,10 @@ from robots.dynamics.plant import add_robot
 from robots.kinematics.forward import Kinematics
 from robots.pose import pose_error
 from systems.controller_model import ControllerModel
-from systems.feedforward import (
-    ElasticStructureFeedforward,
-    FeedforwardConfig,
-    FlexibleJointFeedforward,
-    JointReference,
-)
+from systems.feedforward import FeedforwardConfig, JointReference
 from systems.feedforward.config import CorrectionConfig
+from systems.feedforward.elastic_structure import ElasticStructureFeedforward
+from systems.feedforward.flexible_joint import FlexibleJointFeedforward
 
 PERIOD = 4e-3
 ROBOTS = {"irb1200": 7.0, "kr16": 16.0, "kr210": 210.0}
@@ -115,7 +112,7 @@ def test_through_singular_positions_the_outputs_stay_bounded(method: str, pose: 
         memory = answer.memory
         if tick < 5:  # the velocity begins with a jump, which the differences remember so long
             continue
-        rigid = max(rigid, np.abs(inverse._load(reference)).max())
+        rigid = max(rigid, np.abs(inverse.link_load(reference)).max())
         assert np.abs(answer.position_offset).max() < 0.03
         assert np.abs(answer.velocity_offset).max() < 1.0
         assert np.abs(answer.torque).max() < 2.0 * rigid + 3e3

@@ -11,13 +11,9 @@ from scipy.integrate import solve_ivp
 from robots.description.model import load_robot
 from robots.dynamics.plant import add_robot
 from systems.controller_model import ControllerModel
-from systems.feedforward import (
-    FEEDFORWARDS,
-    FeedforwardConfig,
-    FlexibleJointFeedforward,
-    JointReference,
-    RigidFeedforward,
-)
+from systems.feedforward import FEEDFORWARDS, FeedforwardConfig, JointReference
+from systems.feedforward.flexible_joint import FlexibleJointFeedforward
+from systems.feedforward.rigid import RigidFeedforward
 
 ROBOT = load_robot("irb1200")
 PERIOD = 4e-3
@@ -50,10 +46,10 @@ def played(period: float, end: float = 1.0):
 def test_at_rest_the_springs_carry_the_weight():
     load = np.array([0.0, 40.0, 15.0, 1.0, 2.0, 0.0])
     fresh = np.full(FlexibleJointFeedforward.memory_size, np.nan)
-    drive = model()._drive(STILL, load, fresh)
+    drive = model().drive_under(STILL, load, fresh)
     np.testing.assert_allclose(drive.deflection, -load / ROBOT.joint_stiffness)
     np.testing.assert_allclose(drive.torque, load)
-    stiffer = model(stiffness_error=0.25)._drive(STILL, load, fresh)
+    stiffer = model(stiffness_error=0.25).drive_under(STILL, load, fresh)
     np.testing.assert_allclose(stiffer.deflection, drive.deflection / 1.25)
 
 
@@ -62,10 +58,10 @@ def test_deflections_obey_their_differential_equation():
     inverse, end = model(), 1.0
 
     def rate(time: float, deflection: np.ndarray) -> np.ndarray:
-        load = inverse._load(swinging(time))
+        load = inverse.link_load(swinging(time))
         return -(ROBOT.joint_stiffness * deflection + load) / ROBOT.joint_damping
 
-    start = -inverse._load(swinging(0.0)) / ROBOT.joint_stiffness
+    start = -inverse.link_load(swinging(0.0)) / ROBOT.joint_stiffness
     exact = solve_ivp(rate, (0.0, end), start, "Radau", rtol=1e-9, atol=1e-12).y[:, -1]
     deflection = played(PERIOD)[0].deflection
     np.testing.assert_allclose(deflection, exact, atol=1e-7)
@@ -104,7 +100,7 @@ def test_the_inverse_is_bounded_at_any_tick():
     inverse = FlexibleJointFeedforward(ControllerModel(ROBOT, 7.0, 0.05), FeedforwardConfig())
     memory, load = np.zeros(inverse.memory_size), np.full(6, 10.0)
     for _ in range(20):
-        drive = inverse._drive(STILL, load, memory)
+        drive = inverse.drive_under(STILL, load, memory)
         memory = drive.memory
         assert (np.abs(drive.deflection) <= 1.0001 * load / ROBOT.joint_stiffness).all()
     np.testing.assert_allclose(drive.deflection, -load / ROBOT.joint_stiffness)
@@ -113,7 +109,7 @@ def test_the_inverse_is_bounded_at_any_tick():
 def test_the_rigid_model_moves_motors_like_links_and_gives_the_torque_of_inverse_dynamics():
     inverse = RigidFeedforward(ControllerModel(ROBOT, 7.0, PERIOD), FeedforwardConfig("rigid"))
     reference = swinging(0.3)
-    drive = inverse._drive(reference, inverse._load(reference), np.full(1, np.nan))
+    drive = inverse.drive_under(reference, inverse.link_load(reference), np.full(1, np.nan))
     assert not drive.deflection.any()
     plant = MultibodyPlant(0.0)
     add_robot(plant, ROBOT, "rigid", 7.0)

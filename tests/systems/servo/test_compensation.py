@@ -35,8 +35,8 @@ def commanded(law: str, robot: RobotModel, offset: float = 0.0, gain: float = 5.
     memory, positions = None, []
     for X_WD, V_WD in zip(X, V, strict=True):
         moment = LawInput(X_WD[:3].tolist(), V_WD.tolist(), start, None)
-        memory = system._start(moment) if memory is None else memory
-        step = system._step(moment, memory)
+        memory = system.initial_state(moment) if memory is None else memory
+        step = system.step(moment, memory)
         memory = step.memory
         positions.append(step.position)
     return pose_error(X, Kinematics(robot).forward(np.array(positions)))

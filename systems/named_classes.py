@@ -1,0 +1,78 @@
+"""Classes by name: those that come with truetip, and ``my_file.py:MyClass`` from a file of one's own."""
+
+import hashlib
+import importlib
+import importlib.util
+import sys
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+from types import ModuleType
+
+
+class NamedClasses(Mapping[str, type]):
+    """The classes of one kind that come with truetip, each imported when it is first asked for.
+
+    A new one is one line more; nothing that is not used is loaded, and no room imports another to list it.
+    """
+
+    def __init__(self, kind: str, places: Mapping[str, str]) -> None:
+        """Lists them.
+
+        Args:
+            kind: what they are, for messages: ``"law"``.
+            places: by name the module and the class: ``"systems.servo.pbvs:Pbvs"``.
+        """
+        self._kind, self._places = kind, dict(places)
+
+    def __getitem__(self, name: str) -> type:
+        module, _, class_name = self._places[name].partition(":")
+        return getattr(importlib.import_module(module), class_name)
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._places)
+
+    def __len__(self) -> int:
+        return len(self._places)
+
+    def name_of(self, kind: type) -> str | None:
+        """The name of a class; None if it does not come with truetip."""
+        place = f"{kind.__module__}:{kind.__qualname__}"
+        return next((name for name, listed in self._places.items() if listed == place), None)
+
+    def find(self, name: str) -> type:
+        """The class of a name, or of ``FILE.py:CLASS``.
+
+        Raises:
+            ValueError: if there is no such name, file or class, or the file cannot be imported; one line.
+        """
+        if name in self._places:
+            return self[name]
+        file, colon, class_name = name.rpartition(":")
+        if not (colon and file.endswith(".py")):
+            raise ValueError(f"{self._kind} must be one of {', '.join(self)}, or FILE.py:CLASS, got '{name}'")
+        found = getattr(_module_of(file, self._kind), class_name, None)
+        if not isinstance(found, type):
+            raise ValueError(f"{self._kind}: {file} has no class '{class_name}'")
+        return found
+
+
+def _module_of(file: str, kind: str) -> ModuleType:
+    """The module that a file holds, imported once a process. Raises ValueError, one line."""
+    path = Path(file).resolve()
+    # Two files of the same name are two modules; registered, so that its objects can travel to processes.
+    name = f"{path.stem}_{hashlib.sha256(str(path).encode()).hexdigest()[:8]}"
+    if name in sys.modules:
+        return sys.modules[name]
+    if not path.is_file():
+        raise ValueError(f"{kind}: there is no file {file}")
+    spec = importlib.util.spec_from_file_location(name, path)
+    if spec is None or spec.loader is None:
+        raise ValueError(f"{kind}: {file} is no Python file")
+    module = importlib.util.module_from_spec(spec)
+    sys.modules[name] = module
+    try:
+        spec.loader.exec_module(module)
+    except Exception as error:  # whatever the file of somebody else does when it is imported
+        del sys.modules[name]
+        raise ValueError(f"{kind}: {file}: {type(error).__name__}: {' '.join(str(error).split())}") from error
+    return module
