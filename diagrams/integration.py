@@ -1,8 +1,10 @@
 """How the plant is integrated: fast, and right to less than a micrometre at the tip."""
 
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 from pydrake.systems.analysis import ApplySimulatorConfig, Simulator, SimulatorConfig
+from pydrake.systems.framework import Context
 
 # Beyond this rate the explicit runge_kutta3 with its tiny steps takes longer than the implicit radau3.
 _EXPLICIT_RATE_LIMIT = 4000.0  # 1/s
@@ -29,17 +31,29 @@ class IntegratorConfig:
     max_step: float | None = None  # s
 
 
+@dataclass(frozen=True)
+class Change:
+    """What happens to the parameters of a plant at a time."""
+
+    time: float  # s
+    apply: Callable[[Context, float], None]  # to the root context, at that time
+
+
 class Integration:
     """Advances simulators of one plant and its drives."""
 
-    def __init__(self, config: IntegratorConfig, period: float, rate: float) -> None:
+    def __init__(
+        self, config: IntegratorConfig, period: float, rate: float, changes: Sequence[Change] = ()
+    ) -> None:
         """Chooses what the configuration leaves open.
 
         Args:
             config: what is wanted.
             period: the tick of the controller in s.
             rate: the largest eigenvalue of plant and drives in 1/s.
+            changes: in the order of their times; a simulator stops there and goes on with the changed plant.
         """
+        self._changes = changes
         scheme = config.scheme
         if scheme == "auto":
             scheme = "runge_kutta3" if rate < _EXPLICIT_RATE_LIMIT else "radau3"
@@ -60,6 +74,13 @@ class Integration:
 
     def advance(self, simulator: Simulator, until: float) -> None:
         """Advances a simulator to a time in s."""
+        for change in self._changes:
+            if simulator.get_context().get_time() < change.time <= until:
+                self._advance(simulator, change.time)
+                change.apply(simulator.get_mutable_context(), change.time)
+        self._advance(simulator, until)
+
+    def _advance(self, simulator: Simulator, until: float) -> None:
         if simulator.get_context().get_time() < _PULLING_IN:
             simulator.AdvanceTo(min(until, _PULLING_IN))
         if simulator.get_context().get_time() < until:

@@ -1,6 +1,6 @@
 """The robot cell as a diagram with the ports of the contract."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from pydrake.common import RandomDistribution, RandomGenerator
@@ -14,10 +14,24 @@ from pydrake.systems.primitives import (
     SelectorParams,
 )
 
+from diagrams.integration import Change
 from diagrams.scenario.scenario import StationConfig
+from diagrams.true_robot import true_robot, with_payload_centre
 from robots.description.model import NUM_JOINTS, RobotModel
+from robots.dynamics.payload_change import carried_inertia
 from robots.dynamics.plant import PlantRobot, add_robot
 from systems.cell.drive import Drive
+from systems.cell.encoders import Encoders, SteppedReading, eccentric_discs
+from systems.cell.events.changing_delay import ChangingDelay, shortest_dead_time
+from systems.cell.events.displaced_view import DisplacedView
+from systems.cell.events.station_events import (
+    CameraShift,
+    DeadTimeChange,
+    PayloadChange,
+    camera_losses,
+    of_kind,
+)
+from systems.cell.events.true_geometry import TrueGeometry
 from systems.cell.joint_sensor import JointSensor
 from systems.cell.marker_camera import MarkerCamera
 from systems.cell.pose_camera import BLOCK, PoseCamera
@@ -73,7 +87,8 @@ class SimulatedStation(Diagram):
         """Builds the cell.
 
         Args:
-            robot: the nominal robot; the true one differs from it by ``config.errors``.
+            robot: the nominal robot; the true one differs from it by ``config.errors``, ``config.variation``
+                and ``config.payload_centre_mm``.
             config: the station part of a scenario.
             drive: ``"position"``, ``"velocity"`` or ``"cascade"``; under EGM, where ``"velocity"``
                 follows speeds alone, there is no other difference.
@@ -85,23 +100,38 @@ class SimulatedStation(Diagram):
         super().__init__()
         builder = DiagramBuilder()
         self._motion = None
+        self._config, self._nominal = config, robot
+        self._delay = _changing_delay(config)
+        if self._delay:
+            builder.AddNamedSystem("changing_delay", self._delay)
         if config.interface == "egm":
             # The controller plans the motion; its drives follow positions, whatever it is told.
             motion = EgmMotion(config.egm.motion, config.period, takes_position=drive != "velocity")
             self._motion = builder.AddNamedSystem("egm", motion)
             drive, takes_torque = "cascade", False
         self.plant = builder.AddNamedSystem("plant", MultibodyPlant(0.0))
-        self.robot = add_robot(self.plant, robot, config.elasticity, config.payload, config.errors)
+        self._true_robot = true_robot(robot, config)
+        self.robot = add_robot(self.plant, self._true_robot, config.elasticity, config.payload, config.errors)
         self.plant.Finalize()
+        self._geometry = TrueGeometry(self.robot, config.events, config.link_growth_ppm_per_hour)
+        drive_config = replace(
+            config.drive, dead_time=shortest_dead_time(config.events, config.drive.dead_time)
+        )
         told = config.payload if config.drive.payload is None else config.drive.payload
-        self.drive = builder.AddNamedSystem("drive", Drive(robot, drive, config.drive, config.period, told))
-        motor_state = builder.AddNamedSystem("motor_state", motor_state_selector(self.robot))
-        builder.Connect(self.plant.get_state_output_port(), motor_state.get_input_port())
-        self._connect_drive(builder, motor_state.get_output_port())
-        self._connect_torque_feedforward(builder, config, takes_torque)
+        self.drive = builder.AddNamedSystem("drive", Drive(robot, drive, drive_config, config.period, told))
+        selector = builder.AddNamedSystem("motor_state", motor_state_selector(self.robot))
+        builder.Connect(self.plant.get_state_output_port(), selector.get_input_port())
+        motor_state = selector.get_output_port()
+        self._encoders = Encoders(robot, config.encoder)
+        if self._encoders.is_eccentric:
+            discs = builder.AddNamedSystem("eccentric_discs", eccentric_discs(self._encoders))
+            builder.Connect(motor_state, discs.get_input_port())
+            motor_state = discs.get_output_port()
+        self._connect_drive(builder, motor_state)
+        self._connect_torque_feedforward(builder, replace(config, drive=drive_config), takes_torque)
         runaway = _RUNAWAY * float(robot.speed.max())
-        self._add_joint_sensor(builder, motor_state.get_output_port(), runaway)
-        self._noise = self._add_camera(builder, _camera(robot, config), motor_state.get_output_port(), config)
+        self._add_joint_sensor(builder, motor_state, runaway)
+        self._noise = self._add_camera(builder, _camera(robot, config), selector.get_output_port(), config)
         builder.ExportOutput(self.plant.get_state_output_port(), "truth.state")
         builder.ExportOutput(self.drive.GetOutputPort("motor_torque"), "truth.motor_torque")
         builder.BuildInto(self)
@@ -112,7 +142,11 @@ class SimulatedStation(Diagram):
         for name in ("position_command", "velocity_command"):
             if self._motion:
                 builder.Connect(self._motion.GetOutputPort(name), self.drive.GetInputPort(name))
-            builder.ExportInput((self._motion or self.drive).GetInputPort(name), name)
+            port = (self._motion or self.drive).GetInputPort(name)
+            if self._delay:
+                builder.Connect(self._delay.GetOutputPort(name), port)
+                port = self._delay.GetInputPort(name)
+            builder.ExportInput(port, name)
         builder.Connect(motor_state, self.drive.GetInputPort("motor_state"))
         builder.Connect(self.drive.GetOutputPort("joint_torque"), self.plant.get_actuation_input_port())
         if self.robot.stiffening_gears is not None:
@@ -129,13 +163,22 @@ class SimulatedStation(Diagram):
             # As late as the positions that it belongs to. The delay takes one period to read its input.
             delay = round((config.drive.command_delay + config.drive.dead_time) / config.period) - 1
             late = builder.AddNamedSystem("torque_delay", DiscreteTimeDelay(config.period, delay, NUM_JOINTS))
-            builder.ExportInput(late.get_input_port(), "torque_feedforward")
+            port = late.get_input_port()
+            if self._delay:
+                builder.Connect(self._delay.GetOutputPort("torque_feedforward"), port)
+                port = self._delay.GetInputPort("torque_feedforward")
+            builder.ExportInput(port, "torque_feedforward")
             builder.Connect(late.get_output_port(), ahead)
         else:
             no_torque = builder.AddNamedSystem("no_feedforward", ConstantVectorSource(np.zeros(NUM_JOINTS)))
             builder.Connect(no_torque.get_output_port(), ahead)
 
     def _add_joint_sensor(self, builder: DiagramBuilder, motor_state: OutputPort, runaway: float) -> None:
+        if self._encoders.has_steps:
+            reading = SteppedReading(self._encoders, self._config.period)
+            builder.AddNamedSystem("stepped_reading", reading)
+            builder.Connect(motor_state, reading.get_input_port())
+            motor_state = reading.get_output_port()
         sensor = builder.AddNamedSystem("joint_sensor", JointSensor(runaway))
         builder.Connect(motor_state, sensor.GetInputPort("motor_state"))
         builder.Connect(self.drive.GetOutputPort("motor_torque"), sensor.GetInputPort("motor_torque"))
@@ -150,9 +193,15 @@ class SimulatedStation(Diagram):
     ) -> RandomSource:
         """The camera, what it looks at, and the source of its noise, which is returned."""
         builder.AddNamedSystem("camera", camera)
-        tip = builder.AddNamedSystem("tip", TipPose(self.robot))
+        changes = None if self._geometry.is_constant else self._geometry.apply
+        tip = builder.AddNamedSystem("tip", TipPose(self.robot, changes))
         builder.Connect(self.plant.get_state_output_port(), tip.GetInputPort("state"))
-        builder.Connect(tip.GetOutputPort("X_WE"), camera.GetInputPort("X_WE"))
+        seen = tip.GetOutputPort("X_WE")
+        if of_kind(config.events, CameraShift):
+            view = builder.AddNamedSystem("displaced_view", DisplacedView(config.events))
+            builder.Connect(seen, view.get_input_port())
+            seen = view.get_output_port()
+        builder.Connect(seen, camera.GetInputPort("X_WE"))
         if camera.HasInputPort("motor_state"):  # of the arm, which hides markers
             builder.Connect(motor_state, camera.GetInputPort("motor_state"))
         port = camera.GetInputPort("noise")
@@ -168,12 +217,32 @@ class SimulatedStation(Diagram):
         """Puts the motors at theta (rad, shape (6,)), everything at rest, and seeds the camera's noise."""
         self.robot.set_at_rest(self.plant.GetMyMutableContextFromRoot(root_context), theta)
         self.drive.set_at_rest(root_context, theta)
+        if self._delay:
+            self._delay.set_at_rest(self._delay.GetMyMutableContextFromRoot(root_context), theta)
         if self._motion:
             self._motion.set_at_rest(self._motion.GetMyMutableContextFromRoot(root_context), theta)
         # Not SetRandomContext of the diagram: that would draw the friction parameters too.
         self._noise.SetRandomContext(
             self._noise.GetMyMutableContextFromRoot(root_context), RandomGenerator(seed)
         )
+
+    def changes(self) -> list[Change]:
+        """What a run has to do to the context of the plant at times of events; the rest happens by itself."""
+        times = {event.at for event in of_kind(self._config.events, PayloadChange)}
+        return [Change(time, self._change) for time in sorted(times.union(self._geometry.change_times))]
+
+    def _change(self, root_context: Context, time: float) -> None:
+        context = self.plant.GetMyMutableContextFromRoot(root_context)
+        self._geometry.apply(context, time)
+        for event in of_kind(self._config.events, PayloadChange):
+            if event.at == time:
+                self._load(context, event)
+
+    def _load(self, context: Context, event: PayloadChange) -> None:
+        """Puts another load at the flange, in a context of the plant."""
+        robot = with_payload_centre(self._true_robot, event.centre_mm)
+        inertia = carried_inertia(robot, self._config.elasticity, event.payload)
+        self.robot.tool.body().SetSpatialInertiaInBodyFrame(context, inertia)
 
     def planned_position(self, root_context: Context) -> np.ndarray:
         """Where the controller wanted the joints to be at its last cycle, in rad, shape (6,).
@@ -186,8 +255,20 @@ class SimulatedStation(Diagram):
         return self._motion.planned_position(self._motion.GetMyContextFromRoot(root_context))
 
     def fastest_rate(self, root_context: Context) -> float:
-        """The largest eigenvalue in magnitude of plant and drive, linearised about rest, in 1/s."""
-        context = self.plant.GetMyContextFromRoot(root_context)
+        """The largest eigenvalue in magnitude of plant and drive, linearised about rest, in 1/s.
+
+        With every load that the robot will carry: an empty wrist is stiffer than a loaded one.
+        """
+        context = self.plant.CreateDefaultContext()
+        context.SetTimeStateAndParametersFrom(self.plant.GetMyContextFromRoot(root_context))
+        rates = [self._rate(context)]
+        for event in of_kind(self._config.events, PayloadChange):
+            self._load(context, event)
+            rates.append(self._rate(context))
+        return max(rates)
+
+    def _rate(self, context: Context) -> float:
+        """Of a context of the plant."""
         stiffness, damping = self.drive.linear_gains()
         motors = [joint.position_start() for joint in self.robot.motors]
         n = self.plant.num_positions()
@@ -211,22 +292,34 @@ class SimulatedStation(Diagram):
         """
         state = logged["truth.state"]
         exposure_time, X_WE_measured = _exposures(logged["truth.exposure"])
+        theta = state[:, self.robot.motor_indices()[:NUM_JOINTS]]
+        if self._geometry.is_constant:
+            X_WE_true = self.robot.tool_poses(state)
+        else:
+            X_WE_true = self._geometry.tool_poses(self.robot, times, state)
         return StationRecord(
             time=times,
-            joint_position=state[:, self.robot.motor_indices()[:NUM_JOINTS]],
+            joint_position=self._encoders.rounded(self._encoders.angle(theta)),
             joint_effort=logged["truth.motor_torque"],
             exposure_time=exposure_time,
             X_WE_measured=X_WE_measured,
-            X_WE_true=self.robot.tool_poses(state),
+            X_WE_true=X_WE_true,
             link_position=self.robot.link_positions(state),
         )
 
 
 def _camera(robot: RobotModel, config: StationConfig) -> PoseCamera | MarkerCamera:
     """Whichever the scenario asks for. Raises ValueError if it refuses its configuration."""
-    if config.camera.kind == "pose":
-        return PoseCamera(config.camera)
-    return MarkerCamera(config.camera, config.markers, robot, config.camera.kind)
+    camera = replace(config.camera, dropouts=[*config.camera.dropouts, *camera_losses(config.events)])
+    if camera.kind == "pose":
+        return PoseCamera(camera)
+    return MarkerCamera(camera, config.markers, robot, camera.kind)
+
+
+def _changing_delay(config: StationConfig) -> ChangingDelay | None:
+    if not of_kind(config.events, DeadTimeChange):
+        return None
+    return ChangingDelay(config.events, config.drive.dead_time, config.period)
 
 
 def _exposures(logged: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

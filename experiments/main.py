@@ -53,6 +53,7 @@ from experiments.frames.commands import align_command, chain_command, frame_comm
 from experiments.modes.command import modes_command
 from experiments.replay.live import LiveView, advance_live
 from experiments.report.report import verdict
+from experiments.robustness.command import robustness_command
 from experiments.station.cell_command import cell_command
 from experiments.station.guided_command import ask_before_moving, guide, on_station
 from experiments.station.latency_command import latency_command
@@ -251,6 +252,7 @@ app.command("feedforward")(feedforward_command)
 app.command("design")(design_command)
 app.command("calibrate")(calibrate_command)
 app.command("drivetrain")(drivetrain_command)
+app.command("robustness")(robustness_command)
 app.command("frame")(frame_command)
 app.command("chain")(chain_command)
 app.command("tool")(tool_command)

@@ -39,4 +39,5 @@ class RunLog:
     path_start: float  # s
     dwell_start: float  # s
     path_end: float  # s
+    lap_starts: tuple[float, ...] = ()  # s, of the laps if the path is run several times, else empty
     wall_time: float = field(default=0.0, compare=False)  # s, of the simulation alone

@@ -2,7 +2,7 @@
 
 import gc
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from pydrake.systems.analysis import Simulator
@@ -47,16 +47,15 @@ class MeasurementRun:
     def __init__(self, scenario: Scenario, procedure: MeasurementProcedure | None = None) -> None:
         """Builds the diagram. Raises ValueError if a part refuses its configuration."""
         self._procedure = procedure or MeasurementProcedure()
-        self._config = scenario.station
+        # Events have their times in runs along a path.
+        self._config = replace(scenario.station, events=[])
         # Between its first and its last tick a window must see one exposure more than is needed, because the
         # one that is the newest at its first tick may be from before it.
         needed = self._procedure.fewest_exposures * scenario.station.camera.period
         self._window = max(self._ticks(self._procedure.window), self._tick_at(needed) + 1)
         robot = load_robot(scenario.robot)
         builder = DiagramBuilder()
-        self._station = builder.AddNamedSystem(
-            "station", SimulatedStation(robot, scenario.station, "cascade")
-        )
+        self._station = builder.AddNamedSystem("station", SimulatedStation(robot, self._config, "cascade"))
         mover = JointMover(self._procedure.speed_share * robot.speed)
         self._mover = builder.AddNamedSystem("mover", mover)
         for name in ("position_command", "velocity_command"):

@@ -16,9 +16,10 @@ from diagrams.servo import Servo, law_name
 from diagrams.station import SimulatedStation
 from robots.description.model import RobotModel, load_robot
 from robots.dynamics.newton_inverse import inverse_kinematics
+from systems.cell.events.station_events import check_events
 from systems.controller_model import ControllerModel
 from systems.guard.guard import KINDS
-from systems.reference.paths import CartesianPath
+from systems.reference.paths import CartesianPath, make_path
 
 _CHUNK = 0.2  # s of simulated time between two reports of progress
 
@@ -66,6 +67,8 @@ class Experiment:
             law: a shipped law by name, ``FILE.py:CLASS``, a class, or any system with the ports of a law.
         """
         self.scenario, self.law = scenario, law_name(law)
+        end = make_path(scenario.reference).duration
+        check_events(scenario.station.events, end, scenario.station.drive.dead_time)
         self.seed = scenario.seed if seed is None else seed
         drawn = nominal_robot(scenario, robot)
         robot = robot or drawn
@@ -94,7 +97,8 @@ class Experiment:
             self.context, start_position(self.servo.model, scenario, self.path), self.seed
         )
         rate = self.station.fastest_rate(self.context)
-        self.integration = Integration(scenario.integrator, scenario.station.period, rate)
+        changes = self.station.changes()
+        self.integration = Integration(scenario.integrator, scenario.station.period, rate, changes)
         self.integration.initialize(self.simulator)
         self._wall_time = 0.0
 
@@ -145,6 +149,7 @@ class Experiment:
             path_start=self.path.path_start,
             dwell_start=self.path.dwell_start,
             path_end=self.path.duration,
+            lap_starts=tuple(self.path.lap_starts.tolist()) if len(self.path.lap_starts) > 1 else (),
             wall_time=self._wall_time,
         )
 

@@ -93,7 +93,10 @@ class VirtualCell:
             for name in ("position_command", "velocity_command")
         ]
         self._integration = Integration(
-            scenario.integrator, config.period, self._station.fastest_rate(self._context)
+            scenario.integrator,
+            config.period,
+            self._station.fastest_rate(self._context),
+            self._station.changes(),
         )
         self._integration.initialize(self._simulator)
         self._joints = self._station.GetOutputPort("joint_sample")

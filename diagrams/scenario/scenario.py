@@ -15,6 +15,8 @@ from robots.description.geometric_errors import GeometricErrors
 from robots.description.model import NUM_JOINTS, Placement
 from robots.dynamics.plant import ELASTICITIES
 from systems.cell.drive import KINDS, DriveConfig
+from systems.cell.encoders import EncoderConfig
+from systems.cell.events.station_events import StationEvent
 from systems.cell.marker_camera import MarkerCameraConfig
 from systems.cell.network_faults import SHARES, FaultConfig
 from systems.cell.pose_camera import CAMERAS, CameraConfig
@@ -59,6 +61,15 @@ class LinkConfig:
 
 
 @dataclass
+class Variation:
+    """By how much springs and friction of the true robot are off its drawing: drawn within +- the shares."""
+
+    stiffness: float = 0.0  # of each gear, bearing and beam
+    friction: float = 0.0  # viscous and Coulomb, of each joint
+    seed: int = 0
+
+
+@dataclass
 class StationConfig:
     """The robot cell: what the controller does not see, and what it is connected to."""
 
@@ -66,6 +77,10 @@ class StationConfig:
     period: float = 4e-3  # s, between two commands and between two joint samples
     elasticity: str = "joints"  # of the true robot: rigid, joints or structure
     payload: float = 0.0  # kg at the flange
+    payload_centre_mm: list[float] = field(default_factory=list)  # three; empty: as the robot's file has it
+    variation: Variation = field(default_factory=Variation)
+    link_growth_ppm_per_hour: float = 0.0  # of the warming links
+    encoder: EncoderConfig = field(default_factory=EncoderConfig)
     errors: GeometricErrors = field(default_factory=GeometricErrors)
     drive: DriveConfig = field(default_factory=DriveConfig)
     camera: CameraConfig = field(default_factory=CameraConfig)
@@ -74,6 +89,7 @@ class StationConfig:
     egm: EgmConfig = field(default_factory=EgmConfig)
     link: LinkConfig = field(default_factory=LinkConfig)
     faults: FaultConfig = field(default_factory=FaultConfig)
+    events: list[StationEvent] = field(default_factory=list)  # of runs along a path
 
 
 @dataclass
@@ -255,7 +271,8 @@ def _one_of(path: str, value: str, allowed: Collection[str]) -> None:
 def _plain(value: Any) -> Any:
     """Dataclasses and arrays as mappings and lists, for a YAML text."""
     if is_dataclass(value):
-        return {entry.name: _plain(getattr(value, entry.name)) for entry in fields(value)}
+        plain = {entry.name: _plain(getattr(value, entry.name)) for entry in fields(value)}
+        return {"_tag": f"!{type(value).__name__}", **plain} if isinstance(value, StationEvent) else plain
     if isinstance(value, dict):
         return {key: _plain(entry) for key, entry in value.items()}
     if isinstance(value, (list, tuple, np.ndarray)):

@@ -20,6 +20,30 @@ from robots.description.model import NUM_JOINTS, RobotModel
 
 
 @dataclass
+class RandomErrors:
+    """Errors drawn uniformly within bounds, the same ones for the same seed; zero bounds draw none."""
+
+    seed: int = 0
+    translation_mm: float = 0.0  # largest translation, of a frame or the tool, along each axis
+    rotation_deg: float = 0.0  # largest rotation, of a joint, body or the tool, about each axis
+
+    def vector(self, robot: RobotModel) -> np.ndarray:
+        """One draw in m and rad, in the order of `error_parameters`, shape (48,).
+
+        Raises:
+            ValueError: if a bound is negative or not finite.
+        """
+        for label in ("translation_mm", "rotation_deg"):
+            if not 0.0 <= getattr(self, label) < np.inf:
+                raise ValueError(
+                    f"errors.random.{label} must be finite and not negative, got {getattr(self, label)}"
+                )
+        bounds = {"m": 1e-3 * self.translation_mm, "rad": np.deg2rad(self.rotation_deg)}
+        largest = np.array([bounds[parameter.unit] for parameter in error_parameters(robot)])
+        return largest * np.random.default_rng(self.seed).uniform(-1.0, 1.0, len(largest))
+
+
+@dataclass
 class GeometricErrors:
     """Deviations of the true geometry, Probst (2024), section 2.3 and table 6.1.
 
@@ -27,7 +51,7 @@ class GeometricErrors:
     its ZYX Euler angles (alpha, beta, gamma) are added to the nominal ones, eq. (2.48). The other frames are
     displaced along the axes of their parents (``pl_I0`` to ``pl_56``), and the bodies (``body_0`` to
     ``body_6``) are turned by small angles about x, y and z, as `error_parameters` says. A turn about the
-    joint's own axis must be zero, because that is the joint's offset.
+    joint's own axis must be zero, because that is the joint's offset. Random errors come on top.
     """
 
     joint_offset_deg: np.ndarray = field(default_factory=lambda: np.zeros(NUM_JOINTS))
@@ -39,6 +63,7 @@ class GeometricErrors:
     body_rotation_deg: dict[str, np.ndarray] = field(
         default_factory=lambda: {f"body_{body}": np.zeros(3) for body in range(TOOL)}
     )
+    random: RandomErrors = field(default_factory=RandomErrors)
 
     def vector(self, robot: RobotModel) -> np.ndarray:
         """The error parameters in m and rad, in the order of `error_parameters`, shape (48,).
@@ -61,7 +86,8 @@ class GeometricErrors:
                     f"body_rotation_deg.body_{parameter.body}: the turn about {'xyz'[parameter.axis]}, the "
                     f"axis of joint {parameter.body}, must be 0, got {angle} deg; give it as joint_offset_deg"
                 )
-        return checked(np.array([self._value(parameter) for parameter in parameters]))
+        named = checked(np.array([self._value(parameter) for parameter in parameters]))
+        return named + self.random.vector(robot)
 
     @staticmethod
     def from_vector(robot: RobotModel, p: np.ndarray) -> "GeometricErrors":

@@ -171,4 +171,5 @@ class MarkerCamera(LeafSystem):
         entry = next(candidate for candidate in in_flight if candidate[0] <= due)
         # Orthonormal by construction; checking it again would cost more than the rest.
         X_WE = RigidTransform.MakeUnchecked(entry[2:14].reshape(3, 4))
-        output.set_value(PoseSample(float(entry[0]), X_WE, bool(entry[1]), float(entry[14])))
+        stamp = self._config.stamp(float(entry[0]))
+        output.set_value(PoseSample(stamp, X_WE, bool(entry[1]), float(entry[14])))

@@ -16,6 +16,7 @@ CAMERAS = ("pose", "features", "images")
 _WIDTH = 14  # time, valid, then the rows of the 3 x 4 pose matrix
 BLOCK = 64  # exposures whose noise is drawn at once: drawing is what Drake is slow at
 _PER_EXPOSURE = 7  # standard normal numbers: orientation, position, drop-out
+_PER_OUTLIER = 7  # and if there are reflections: orientation, position, whether it is one
 _EPSILON = 1e-9  # s, a sample that is due at a tick arrives at it in spite of rounding
 
 
@@ -31,6 +32,15 @@ class CameraConfig:
     orientation_sigma_deg: float = 0.0  # standard deviation of one sample about each axis
     dropout_probability: float = 0.0  # of a single sample to be lost
     dropouts: list[list[float]] = field(default_factory=list)  # s, windows [start, end) without a sample
+    outlier_probability: float = 0.0  # of a single sample to be a reflection, valid but wrong
+    outlier_mm: float = 20.0  # standard deviation of what it is off along each axis
+    outlier_deg: float = 2.0  # and about each axis
+    clock_offset: float = 0.0  # s, by which its stamps are ahead of the robot's clock
+    clock_drift_ppm: float = 0.0  # by which its clock runs faster than the robot's
+
+    def stamp(self, time: float) -> float:
+        """What the camera's clock shows at a time of the robot's clock, both in s."""
+        return time * (1.0 + 1e-6 * self.clock_drift_ppm) + self.clock_offset
 
 
 class PoseCamera(LeafSystem):
@@ -38,7 +48,7 @@ class PoseCamera(LeafSystem):
 
     Ports:
         in  ``X_WE``         RigidTransform, the true tool in the world
-        in  ``noise``        vector 448, standard normal, drawn anew every `BLOCK` periods
+        in  ``noise``        vector 448, standard normal, drawn anew every `BLOCK` periods; 896 with outliers
         out ``pose_sample``  PoseSample, the newest one that has arrived; a lost exposure arrives as invalid
         out ``exposure``     vector 14, the last exposure before it arrives: time, validity, rows of X_WE
 
@@ -56,9 +66,11 @@ class PoseCamera(LeafSystem):
         self._config = config
         self._rotation_sigma = float(np.deg2rad(config.orientation_sigma_deg))
         self._lost_below = norm.ppf(config.dropout_probability)
+        self._outlier_below = norm.ppf(config.outlier_probability)
+        self._numbers = _PER_EXPOSURE + (_PER_OUTLIER if config.outlier_probability > 0.0 else 0)
         self._X_WE = self.DeclareAbstractInputPort("X_WE", Value(RigidTransform()))
         self._noise = self.DeclareVectorInputPort(
-            "noise", BLOCK * _PER_EXPOSURE, RandomDistribution.kGaussian
+            "noise", BLOCK * self._numbers, RandomDistribution.kGaussian
         )
         self._in_flight = int(np.floor(config.delay / config.period + _EPSILON)) + 2
         empty = np.concatenate([[-np.inf, 0.0], np.eye(4)[:3].ravel()])
@@ -80,9 +92,13 @@ class PoseCamera(LeafSystem):
 
     def _calc_disturbances(self, context: Context, value) -> None:
         """Of each exposure of a block a rotation and a shift in the world, and whether it is lost."""
-        noise = self._noise.Eval(context).reshape(BLOCK, _PER_EXPOSURE)
+        noise = self._noise.Eval(context).reshape(BLOCK, self._numbers)
         turns = _small_rotations(self._rotation_sigma * noise[:, :3])
         shifts = self._config.position_sigma * noise[:, 3:6]
+        if self._numbers > _PER_EXPOSURE:
+            off = noise[:, _PER_EXPOSURE:] * (noise[:, -1:] < self._outlier_below)
+            turns = _small_rotations(np.deg2rad(self._config.outlier_deg) * off[:, :3]) @ turns
+            shifts = shifts + 1e-3 * self._config.outlier_mm * off[:, 3:6]
         value.set_value((turns, shifts, (noise[:, 6] < self._lost_below).tolist()))
 
     def _expose(self, context: Context, discrete_state: DiscreteValues) -> None:
@@ -112,7 +128,8 @@ class PoseCamera(LeafSystem):
             entry = arrived[np.argmax(arrived[:, 0])]
         # Orthonormal by construction; checking it again would cost more than the rest.
         X_WE = RigidTransform.MakeUnchecked(entry[2:].reshape(3, 4))
-        output.set_value(PoseSample(float(entry[0]), X_WE, bool(entry[1]), self._config.position_sigma))
+        stamp = self._config.stamp(float(entry[0]))
+        output.set_value(PoseSample(stamp, X_WE, bool(entry[1]), self._config.position_sigma))
 
 
 def _small_rotations(vectors: np.ndarray) -> np.ndarray:
@@ -142,6 +159,8 @@ def _check(config: CameraConfig) -> None:
         )
     if not 0.0 <= config.dropout_probability < 1.0:
         raise ValueError(f"camera: dropout_probability must be in [0, 1), got {config.dropout_probability}")
+    if not 0.0 <= config.outlier_probability < 1.0:
+        raise ValueError(f"camera: outlier_probability must be in [0, 1), got {config.outlier_probability}")
     for window in config.dropouts:
         if len(window) != 2 or not window[0] < window[1]:
             raise ValueError(f"camera: a drop-out must be [start, end] with start < end, got {window}")

@@ -15,6 +15,8 @@ import numpy as np
 
 from robots.pose import rotation_from_zyx, rotation_vector
 
+_CLOSED = 1e-9  # m and rad, the ends of a path that is closed are that near to each other
+
 
 @dataclass
 class Waypoint:
@@ -64,6 +66,7 @@ class ReferenceConfig:
     acceleration: float = 0.7  # 1/s^2, k_a: peak acceleration in segments (or turns) per s^2
     settle: float = 0.0  # s at the start pose before the path begins
     dwell: float = 2.0  # s at rest at the end; with "points" at every point
+    laps: int = 1  # how often the path is run, one after the other; more than once it must be closed
     preview: float = 0.0  # s that the preview ports of the Reference look ahead
     waypoints: list[Waypoint] = field(default_factory=rectangle_waypoints)  # of "rectangle" and "points"
     circle: CircleConfig = field(default_factory=CircleConfig)
@@ -199,12 +202,19 @@ class CartesianPath:
 
     Attributes:
         path_start: s, the path begins (the settling time is over).
+        lap_starts: s, shape (laps,), each lap begins; the first one with the path.
         dwell_start: s, the last pose is reached.
         duration: s, the path is over: settling, motion and dwell.
     """
 
     def __init__(
-        self, segments: list[Segment], profile: SineSquaredProfile, settle: float, dwell: float, hold: float
+        self,
+        segments: list[Segment],
+        profile: SineSquaredProfile,
+        settle: float,
+        dwell: float,
+        hold: float,
+        laps: int = 1,
     ) -> None:
         """Lays the segments out in time.
 
@@ -214,8 +224,11 @@ class CartesianPath:
             settle: s before the path begins.
             dwell: s at rest at the end.
             hold: s at rest before each segment.
+            laps: how often all segments are run.
         """
         self.path_start = settle
+        self.lap_starts = settle + np.arange(laps) * len(segments) * (profile.duration + hold)
+        segments = segments * laps
         self._starts = [settle + hold + i * (profile.duration + hold) for i in range(len(segments))]
         self.dwell_start = self._starts[-1] + profile.duration
         self.duration = self.dwell_start + dwell
@@ -281,7 +294,29 @@ def make_path(config: ReferenceConfig) -> CartesianPath:
         value = getattr(config, name)
         if not 0.0 <= value < math.inf:
             raise ValueError(f"reference: {name} must be finite and not negative, got {value} s")
-    return maker(config)
+    if not 1 <= config.laps < math.inf or config.laps != int(config.laps):
+        raise ValueError(f"reference: laps must be a whole number from 1 on, got {config.laps}")
+    path = maker(config)
+    if config.laps > 1:
+        _require_closed(config, path)
+    return path
+
+
+def _require_closed(config: ReferenceConfig, path: CartesianPath) -> None:
+    """Refuses laps of a path that does not end where it starts: the tool would have to jump."""
+    start, end = path.sample(np.array([0.0, path.dwell_start]))[0]
+    distance, angle = _pose_distance(start, end)
+    if distance > _CLOSED or angle > _CLOSED:
+        raise ValueError(
+            f"reference: {config.laps} laps need a path that ends where it starts, but the ends of "
+            f"'{config.path}' are {1e3 * distance:.3g} mm and {math.degrees(angle):.3g} deg apart"
+        )
+
+
+def _pose_distance(X: np.ndarray, Y: np.ndarray) -> tuple[float, float]:
+    """Metres and radians between two poses (4, 4)."""
+    turn = rotation_vector(X[:3, :3] @ Y[:3, :3].T)
+    return float(np.linalg.norm(X[:3, 3] - Y[:3, 3])), float(np.linalg.norm(turn))
 
 
 def _through_waypoints(config: ReferenceConfig, hold: float = 0.0) -> CartesianPath:
@@ -293,7 +328,8 @@ def _through_waypoints(config: ReferenceConfig, hold: float = 0.0) -> CartesianP
         _require_vectors(f"waypoint {number}", waypoint, "translation_mm", "zyx_deg")
     poses = [_waypoint_pose(waypoint) for waypoint in config.waypoints]
     segments = [line(start, end) for start, end in pairwise(poses)]
-    return CartesianPath(segments, SineSquaredProfile(config.acceleration), config.settle, config.dwell, hold)
+    profile = SineSquaredProfile(config.acceleration)
+    return CartesianPath(segments, profile, config.settle, config.dwell, hold, config.laps)
 
 
 def _points(config: ReferenceConfig) -> CartesianPath:
@@ -316,7 +352,7 @@ def _around(config: ReferenceConfig, name: str, curve, segment: Callable[..., Se
     if not 1 <= curve.turns < math.inf or curve.turns != int(curve.turns):
         raise ValueError(f"reference: {name} turns must be a whole number from 1 on, got {curve.turns}")
     profile = SineSquaredProfile(config.acceleration, float(curve.turns))
-    return CartesianPath([segment(curve)], profile, config.settle, config.dwell, hold=0.0)
+    return CartesianPath([segment(curve)], profile, config.settle, config.dwell, 0.0, config.laps)
 
 
 def _require_positive(name: str, value: float, unit: str) -> None:

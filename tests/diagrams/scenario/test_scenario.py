@@ -7,6 +7,7 @@ import pytest
 
 from diagrams.runs.simulation import Experiment
 from diagrams.scenario.scenario import ScenarioError, load_scenario, scenario_text, shipped_scenarios
+from systems.cell.events.station_events import PayloadChange, ToolShift
 
 
 def refusal(name: str, *settings: str) -> str:
@@ -23,7 +24,7 @@ def written(folder: Path, text: str, name: str = "mine.yaml") -> str:
 
 
 def test_the_shipped_scenarios_load_by_name_and_say_what_they_are():
-    assert shipped_scenarios() == ["cell", "dead-time", "misaligned", "nominal"]
+    assert shipped_scenarios() == ["cell", "dead-time", "everything", "misaligned", "nominal"]
     for name in shipped_scenarios():
         assert len(load_scenario(name).description) > 40
 
@@ -49,7 +50,7 @@ def test_dead_time_is_misaligned_with_140_ms_from_command_to_motion():
     assert scenario_text(late) == scenario_text(base)
 
 
-@pytest.mark.parametrize("name", ["cell", "dead-time", "misaligned", "nominal"])
+@pytest.mark.parametrize("name", ["cell", "dead-time", "everything", "misaligned", "nominal"])
 def test_the_text_of_a_scenario_reads_back_as_the_same_scenario(tmp_path: Path, name: str):
     text = scenario_text(load_scenario(name))
     assert scenario_text(load_scenario(written(tmp_path, text))) == text
@@ -153,11 +154,21 @@ def test_a_refusal_names_the_scenario(tmp_path: Path):
     assert refusal(name).startswith(f"scenario {name}: station.payload must be a number")
 
 
+def test_events_are_written_as_they_are_read():
+    text = "[!PayloadChange {at: 8, payload: 7}, !ToolShift {at: 9, shift_mm: [0.5, 0, 0]}]"
+    scenario = load_scenario("misaligned", [f"station.events={text}"])
+    payload, tool = scenario.station.events
+    assert payload == PayloadChange(at=8.0, payload=7.0)
+    assert isinstance(tool, ToolShift)
+    np.testing.assert_array_equal(tool.shift_mm, [0.5, 0.0, 0.0])
+    assert "!PayloadChange" in scenario_text(scenario)
+
+
 @pytest.mark.parametrize("name", ["nothing", "folder/nothing.yaml"])
 def test_a_missing_scenario_is_named_beside_those_that_exist(name: str):
     text = refusal(name)
     assert f"scenario '{name}': no file" in text
-    assert "dead-time, misaligned, nominal" in text
+    assert "dead-time, everything, misaligned, nominal" in text
 
 
 def test_a_file_that_extends_itself_is_refused(tmp_path: Path):

@@ -98,6 +98,26 @@ def test_exposures_in_a_window_are_lost_and_arrive_as_invalid():
     assert [round(sample.time / config.period) for sample in found] == list(range(40))
 
 
+def test_a_clock_of_its_own_changes_stamps_and_nothing_else():
+    config = CameraConfig(clock_offset=-3e-3, clock_drift_ppm=500.0)
+    true, found = each_exposure(CameraConfig(), 20), each_exposure(config, 20)
+    stamps = np.array([[a.time, b.time] for a, b in zip(true, found, strict=True)])
+    np.testing.assert_allclose(stamps[:, 1], 1.0005 * stamps[:, 0] - 3e-3, atol=1e-12)
+    assert [sample.valid for sample in found] == [sample.valid for sample in true]
+
+
+def test_reflections_are_valid_far_off_and_as_many_as_declared():
+    """2000 samples: a share of 20 % is known to 0.9 %; three sigma."""
+    config = CameraConfig(outlier_probability=0.2, outlier_mm=20.0, outlier_deg=2.0)
+    found = each_exposure(config, 2000)
+    errors = pose_error(STILL, np.array([sample.X_WE.GetAsMatrix4() for sample in found]))
+    is_off = np.abs(errors).max(axis=1) > 1e-12
+    assert all(sample.valid for sample in found)
+    assert is_off.mean() == pytest.approx(0.2, abs=0.027)
+    assert 1e3 * errors[is_off, 3:].std() == pytest.approx(20.0, rel=0.1)
+    assert np.rad2deg(errors[is_off, :3]).std() == pytest.approx(2.0, rel=0.1)
+
+
 @pytest.mark.parametrize(
     ("change", "message"),
     [

@@ -18,6 +18,7 @@ from systems.reference.paths import (
     Waypoint,
     line,
     make_path,
+    rectangle_waypoints,
 )
 
 TILTED = np.array([30.0, 40.0, 50.0])
@@ -204,6 +205,18 @@ def test_settling_shifts_everything(config: ReferenceConfig):
         np.testing.assert_allclose(shifted, original, atol=1e-13)  # rounding of the time
 
 
+@pytest.mark.parametrize("name", ["rectangle", "circle", "figure_eight"])
+def test_every_lap_is_the_first_one_again_without_a_pause(name: str):
+    once, path = (make_path(ReferenceConfig(path=name, settle=1.0, laps=laps)) for laps in (1, 3))
+    length = once.dwell_start - once.path_start
+    np.testing.assert_allclose(path.lap_starts, 1.0 + length * np.arange(3))
+    assert path.dwell_start == pytest.approx(1.0 + 3.0 * length)
+    t = np.linspace(1.0, 1.0 + length, 101)
+    for start in path.lap_starts:
+        for again, first in zip(path.sample(t - 1.0 + start), once.sample(t), strict=True):
+            np.testing.assert_allclose(again, first, atol=1e-9)
+
+
 def test_a_new_path_is_a_few_lines_of_a_scenario():
     config = yaml_load_typed(
         schema=ReferenceConfig,
@@ -227,6 +240,11 @@ def test_a_new_path_is_a_few_lines_of_a_scenario():
         (ReferenceConfig(acceleration=math.nan), "acceleration must be finite and positive, got nan"),
         (ReferenceConfig(dwell=-1.0), "dwell must be finite and not negative, got -1.0 s"),
         (ReferenceConfig(settle=math.inf), "settle must be finite and not negative, got inf s"),
+        (ReferenceConfig(laps=0), "laps must be a whole number from 1 on, got 0"),
+        (
+            ReferenceConfig(waypoints=rectangle_waypoints()[:2], laps=2),
+            "2 laps need a path that ends where it starts, but the ends of 'rectangle' are 200 mm and 90 deg",
+        ),
         (ReferenceConfig(preview=-0.01), "preview must be finite and not negative, got -0.01 s"),
         (
             ReferenceConfig(waypoints=[Waypoint(), Waypoint(np.array([0, math.nan, 0]))]),

@@ -1,0 +1,104 @@
+"""``truetip robustness``: laws on many random robots, worst and median."""
+
+from typing import Annotated, Any
+
+import typer
+from rich import box
+from rich.console import Console
+from rich.markup import escape
+from rich.table import Table
+
+from experiments.cli.console import count, progress_bar, refusing
+from experiments.cli.json_output import human_console, json_output
+from experiments.cli.option_limits import at_least
+from experiments.cli.options import JobsOption, JsonOption, SetOption
+from experiments.cli.workers import usable_cores
+from experiments.report.style import law_title
+from experiments.robustness.cases import CASES
+from experiments.robustness.study import Case, judged, run_trials, trials
+
+PATHS = ("rectangle", "circle", "figure_eight")
+
+
+def robustness_command(
+    scenario: Annotated[str, typer.Option(metavar="NAME|FILE", help="What is drawn anew for each seed.")] = (
+        "everything"
+    ),
+    laws: Annotated[str, typer.Option(metavar="A,B", help="Laws, with commas.")] = "open_loop,numerical_ik",
+    cases: Annotated[
+        str, typer.Option(metavar="A,B", help=f"With commas: {', '.join(CASES)}; or all.")
+    ] = "plain",
+    paths: Annotated[
+        str, typer.Option(metavar="A,B", help=f"With commas: {', '.join(PATHS)}.")
+    ] = "rectangle",
+    seeds: Annotated[int, typer.Option(metavar="N", help="Robots, each with noise of its own.")] = 3,
+    first_seed: Annotated[int, typer.Option(metavar="N", help="The first of the seeds.")] = 1000,
+    laps: Annotated[int, typer.Option(metavar="N", help="How often each path is run.")] = 1,
+    settings: SetOption = None,
+    jobs: JobsOption = None,
+    json_file: JsonOption = None,
+) -> None:
+    """Run laws on random robots and print what is left in the worst case and in the median."""
+    human = human_console(json_file)
+    with refusing(ValueError):
+        for name, value in (("--seeds", seeds), ("--laps", laps), ("--jobs", jobs)):
+            at_least(name, 1, value)
+        chosen = [_case(name, settings or []) for name in (CASES if cases == "all" else cases.split(","))]
+        todo = trials(
+            scenario, chosen, laws.split(","), range(first_seed, first_seed + seeds), paths.split(","), laps
+        )
+        processes = min(jobs or usable_cores(), len(todo))
+        with (
+            json_output(json_file) as output,
+            output.staged(),
+            progress_bar(
+                f"{count(len(todo), 'run')} in {count(processes, 'process', 'processes')}"
+            ) as progress,
+        ):
+            rows = run_trials(todo, processes, progress)
+            results = [
+                {"case": case.name, "law": law, **judged(matching)}
+                for case in chosen
+                for law in laws.split(",")
+                if (matching := [row for row in rows if (row["case"], row["law"]) == (case.name, law)])
+            ]
+            output.write({"scenario": scenario, "results": results, "runs": rows})
+    _print(human, scenario, results)
+
+
+def _case(name: str, settings: list[str]) -> Case:
+    if name not in CASES:
+        raise ValueError(f"--cases: must be of {', '.join(CASES)}, got '{name}'")
+    return Case(name, (*CASES[name].settings, *settings))
+
+
+def _print(console: Console, scenario: str, results: list[dict[str, Any]]) -> None:
+    table = Table(
+        box=box.SIMPLE_HEAD,
+        title=f"Scenario {escape(scenario)}: true error, worst (median)",
+        title_justify="left",
+        title_style="italic",
+    )
+    for name in ("case", "law", "lap", "mm", "°", "at rest mm", "worst", "guard"):
+        table.add_column(name, justify="right" if name in ("lap", "mm", "°", "at rest mm") else "left")
+    for result in results:
+        label = escape(result["case"]), escape(law_title(result["law"]))
+        laps = result.get("laps", [])
+        for number, lap in enumerate(laps, 1):
+            is_last = number == len(laps)
+            table.add_row(
+                *(label if number == 1 else ("", "")),
+                str(number),
+                _pair(lap["max_norm_mm"], 3),
+                _pair(lap["max_angle_deg"], 4),
+                _pair(result["static_mm"], 4) if is_last else "",
+                f"seed {result['worst_seed']}, {result['worst_path']}" if is_last else "",
+                str(result["guard"]) if is_last else "",
+            )
+        for failure in result["failures"]:
+            table.add_row(*label, "", "", "", "", f"[red]{escape(failure)}[/red]", "")
+    console.print(table)
+
+
+def _pair(pair: tuple[float, float], digits: int) -> str:
+    return f"{pair[0]:.{digits}f} ({pair[1]:.{digits}f})"

@@ -1,0 +1,140 @@
+"""One law after the other on random robots: each seed draws a robot, its errors and the camera's noise."""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from diagrams.runs.simulation import run
+from diagrams.scenario.scenario import load_scenario
+from experiments.cli.workers import Progress, in_processes
+from experiments.comparison.compare import simulating
+from experiments.metrics.laps import lap_metrics
+from experiments.metrics.run_metrics import error_metrics
+
+
+@dataclass(frozen=True)
+class Case:
+    """A way in which a station is hard on a law."""
+
+    name: str
+    settings: tuple[str, ...] = ()  # of the scenario, as ``--set`` takes them
+
+
+@dataclass(frozen=True)
+class Trial:
+    """One law on one robot."""
+
+    scenario: str
+    case: Case
+    law: str
+    seed: int
+    path: str
+    laps: int
+
+    @property
+    def settings(self) -> list[str]:
+        """Of the scenario."""
+        drawn = ("seed", "station.errors.random.seed", "station.variation.seed")
+        return [
+            *self.case.settings,
+            *(f"{name}={self.seed}" for name in drawn),
+            f"reference.path={self.path}",
+            f"reference.laps={self.laps}",
+        ]
+
+
+def trials(
+    scenario: str,
+    cases: Sequence[Case],
+    laws: Sequence[str],
+    seeds: Sequence[int],
+    paths: Sequence[str],
+    laps: int = 1,
+) -> list[Trial]:
+    """All combinations, seed by seed, so that the first results are of all laws."""
+    return [
+        Trial(scenario, case, law, seed, path, laps)
+        for case in cases
+        for seed in seeds
+        for path in paths
+        for law in laws
+    ]
+
+
+def run_trials(
+    todo: Sequence[Trial], processes: int | None = None, progress: Callable[[float], None] | None = None
+) -> list[dict[str, Any]]:
+    """Runs them on as many processes as there are cores; rows in the order of the trials.
+
+    Raises:
+        ValueError: if a scenario is refused.
+        SimulationError: if a process was ended from outside.
+    """
+    return in_processes(run_trial, todo, processes, progress)
+
+
+def run_trial(trial: Trial, progress: Progress) -> dict[str, Any]:
+    """The numbers of one run; of one that broke off, ``failure`` in place of numbers."""
+    row: dict[str, Any] = {
+        "case": trial.case.name,
+        "law": trial.law,
+        "seed": trial.seed,
+        "path": trial.path,
+        "failure": None,
+    }
+    try:
+        with simulating(trial.law, trial.seed):
+            log = run(load_scenario(trial.scenario, trial.settings), trial.law, progress=progress)
+    except RuntimeError as error:  # a SimulationError; the others shall go on
+        return row | {"failure": str(error)}
+    errors = error_metrics(log, "true")
+    return row | {
+        "max_norm_mm": errors["max_norm_mm"],
+        "max_angle_deg": errors["max_angle_deg"],
+        "static_mm": float(np.linalg.norm(errors["static_mm"])),
+        "static_deg": float(np.linalg.norm(errors["static_deg"])),
+        "laps": lap_metrics(log, "true"),
+        "guard": {kind: count for kind, count in log.guard_counts.items() if count},
+        "wall_s": log.wall_time,
+    }
+
+
+def judged(rows: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
+    """Worst and median of the rows of one law in one case.
+
+    Returns:
+        ``laps``: per lap ``max_norm_mm`` and ``max_angle_deg``, then ``static_mm``, as (worst, median) each;
+        ``worst_seed`` and ``worst_path`` of the largest distance; ``guard``: interventions of all runs;
+        ``failures``: runs that broke off.
+    """
+    done = [row for row in rows if row["failure"] is None]
+    result: dict[str, Any] = {
+        "runs": len(rows),
+        "failures": [
+            f"seed {row['seed']}, {row['path']}: {row['failure']}" for row in rows if row["failure"]
+        ],
+    }
+    if not done:
+        return result
+    worst = max(done, key=lambda row: row["max_norm_mm"])
+    laps = [
+        {
+            name: _worst_and_median([row["laps"][lap][name] for row in done])
+            for name in ("max_norm_mm", "max_angle_deg")
+        }
+        for lap in range(len(done[0]["laps"]))
+    ]
+    return result | {
+        "laps": laps,
+        "static_mm": _worst_and_median([row["static_mm"] for row in done]),
+        "static_deg": _worst_and_median([row["static_deg"] for row in done]),
+        "worst_seed": worst["seed"],
+        "worst_path": worst["path"],
+        "guard": sum(sum(row["guard"].values()) for row in done),
+    }
+
+
+def _worst_and_median(values: Sequence[float]) -> tuple[float, float]:
+    return float(np.max(values)), float(np.median(values))

@@ -1,0 +1,130 @@
+"""Encoders that are not perfect: a disc off its centre, and angles in whole steps."""
+
+from dataclasses import dataclass, field
+
+import numpy as np
+from pydrake.symbolic import Expression, MakeVectorContinuousVariable, cos, sin
+from pydrake.systems.framework import BasicVector, Context, DiscreteValues, LeafSystem
+from pydrake.systems.primitives import SymbolicVectorSystem
+
+from robots.description.model import NUM_JOINTS, RobotModel
+
+SIDES = ("joint", "motor")
+_MOST_BITS = 32
+
+
+@dataclass
+class EncoderConfig:
+    """How well the angles of the motors are known; read from a scenario file."""
+
+    side: str = "joint"  # of the gear on which the discs sit: joint or motor
+    bits: int = 0  # a turn of a disc has 2**bits steps; 0 for none, that is, exact angles
+    eccentricity_deg: float = 0.0  # largest error of a disc's angle, once a turn of it
+    phase_deg: np.ndarray = field(default_factory=lambda: np.zeros(NUM_JOINTS))  # of that error at zero
+
+
+class Encoders:
+    """What the discs of a robot say; angles are those of motors seen behind the gear, shape (..., 6)."""
+
+    def __init__(self, robot: RobotModel, config: EncoderConfig) -> None:
+        """Checks the configuration.
+
+        Raises:
+            ValueError: if the side is unknown or a number out of its range.
+        """
+        if config.side not in SIDES:
+            raise ValueError(f"encoder: side must be one of {', '.join(SIDES)}, got '{config.side}'")
+        if not 0 <= config.bits <= _MOST_BITS:
+            raise ValueError(f"encoder: bits must be between 0 and {_MOST_BITS}, got {config.bits}")
+        if not 0.0 <= config.eccentricity_deg <= 10.0:
+            raise ValueError(
+                f"encoder: eccentricity_deg must be between 0 and 10 deg, got {config.eccentricity_deg}"
+            )
+        self.turns = np.abs(robot.gear_ratio) if config.side == "motor" else np.ones(NUM_JOINTS)
+        self.step = 2.0 * np.pi / 2**config.bits / self.turns if config.bits else np.zeros(NUM_JOINTS)
+        self.amplitude = np.deg2rad(config.eccentricity_deg) / self.turns
+        self.phase = np.deg2rad(np.asarray(config.phase_deg, dtype=float))
+
+    @property
+    def has_steps(self) -> bool:
+        """Whether angles come in whole steps."""
+        return bool(self.step.any())
+
+    @property
+    def is_eccentric(self) -> bool:
+        """Whether the discs are off their centres."""
+        return bool(self.amplitude.any())
+
+    def angle(self, theta: np.ndarray) -> np.ndarray:
+        """What eccentric discs of infinitely many steps say of true motor positions in rad."""
+        return theta + self.amplitude * np.sin(self.turns * theta + self.phase)
+
+    def rounded(self, angle: np.ndarray) -> np.ndarray:
+        """Angles in rad to whole steps."""
+        if not self.has_steps:
+            return angle
+        return self.step * np.round(angle / self.step)
+
+
+def eccentric_discs(encoders: Encoders) -> SymbolicVectorSystem:
+    """From the true motor state to the one that the discs say, 12 numbers each.
+
+    The drives control what the discs say, so that the motors are wrong by the error of the discs. A system of
+    Drake's own, for it is asked at every stage of every step of the integrator.
+    """
+    state = MakeVectorContinuousVariable(2 * NUM_JOINTS, "x")
+    outputs = []
+    for order in range(2):
+        for i in range(NUM_JOINTS):
+            turn = float(encoders.turns[i]) * Expression(state[i]) + float(encoders.phase[i])
+            amplitude = float(encoders.amplitude[i])
+            if order == 0:
+                outputs.append(Expression(state[i]) + amplitude * sin(turn))
+            else:
+                slope = 1.0 + amplitude * float(encoders.turns[i]) * cos(turn)
+                outputs.append(Expression(state[NUM_JOINTS + i]) * slope)
+    # Without a state of its own such a system refuses to be integrated along with others: one that rests.
+    idle = MakeVectorContinuousVariable(1, "idle")
+    at_rest = np.array([Expression(0.0)], dtype=object)
+    return SymbolicVectorSystem(
+        input=state, state=idle, dynamics=at_rest, output=np.array(outputs, dtype=object)
+    )
+
+
+class SteppedReading(LeafSystem):
+    """Angles in whole steps, and velocities that are differences of two of them a period apart.
+
+    Ports:
+        in  ``motor_state``  vector 12, positions in rad, then velocities in rad/s
+        out ``motor_state``  vector 12, as it is reported
+
+    Drives read their encoders far more often than the controller does; their own loops stay exact.
+    """
+
+    def __init__(self, encoders: Encoders, period: float) -> None:
+        """Declares the ports.
+
+        Args:
+            encoders: with steps.
+            period: between two readings that are reported, in s.
+        """
+        super().__init__()
+        self._encoders, self._period = encoders, period
+        self._state = self.DeclareVectorInputPort("motor_state", 2 * NUM_JOINTS)
+        self._before = self.DeclareDiscreteState(np.full(NUM_JOINTS, np.nan))
+        self.DeclareVectorOutputPort(
+            "motor_state", 2 * NUM_JOINTS, self._calc, {self._state.ticket(), self.xd_ticket()}
+        )
+        self.DeclarePeriodicDiscreteUpdateEvent(period, 0.0, self._remember)
+
+    def _reading(self, context: Context) -> np.ndarray:
+        return self._encoders.rounded(self._state.Eval(context)[:NUM_JOINTS])
+
+    def _remember(self, context: Context, discrete_state: DiscreteValues) -> None:
+        discrete_state.set_value(self._before, self._reading(context))
+
+    def _calc(self, context: Context, output: BasicVector) -> None:
+        now = self._reading(context)
+        before = context.get_discrete_state(self._before).value()
+        rate = (now - before) / self._period
+        output.set_value(np.concatenate([now, np.where(np.isfinite(rate), rate, 0.0)]))
