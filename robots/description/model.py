@@ -1,6 +1,7 @@
 """What a six-axis robot is: geometry, limits, masses and drive trains, read from one YAML file.
 
-A robot file is the dataclass tree below, field for field. Every part carries a ``source``: where its
+A robot file is the dataclass tree below, field for field; ``extends`` names a robot or a file on top of which
+it stands. Every part carries a ``source``: where its
 numbers come from, or the word ``assumed``. Angles in the file are in degrees and say so in the name
 of their field; the arrays that `RobotModel` offers to the rest of the code are in SI units.
 
@@ -22,9 +23,11 @@ from pydrake.math import RigidTransform, RotationMatrix
 
 from robots.description.beam import Beam, beam_surrogate
 from robots.description.counterbalance_spring import CounterbalanceSpring
+from robots.description.drive_train import DriveTrain, drive_trains
+from robots.description.extended_file import whole_text
 from robots.drivetrain.counterbalance import Counterbalance
-from robots.drivetrain.stiffening import Stiffening, gear_springs
 from robots.drivetrain.stiffness import SpringRow
+from robots.drivetrain.train import DriveTrains
 from robots.pose import rotation_from_zyx
 
 NUM_JOINTS = 6
@@ -55,25 +58,6 @@ class JointLimits:
     lower_deg: float = 0.0
     upper_deg: float = 0.0
     speed_deg_s: float = 0.0
-    source: str = ""
-
-
-@dataclass
-class DriveTrain:
-    """Motor, gear and friction of one joint.
-
-    The friction coefficients act on the motor side: a joint-side torque is ``ratio`` times the Coulomb
-    part and ``ratio**2`` times the viscous part, see `RobotModel.joint_viscous_friction`.
-    """
-
-    ratio: float = 1.0
-    rotor_inertia: float = 0.0  # kg m^2, about the motor's axis
-    stiffness: float = 0.0  # N m / rad, joint side, at rest
-    stiffening: Stiffening | None = None  # under load; None for a linear spring
-    damping: float = 0.0  # N m s / rad, joint side, parallel to the stiffness
-    viscous_friction: float = 0.0  # N m s / rad, motor side
-    coulomb_friction: float = 0.0  # N m, motor side
-    coulomb_velocity: float = 0.01  # rad/s on the joint side, width of the tanh transition
     source: str = ""
 
 
@@ -201,9 +185,13 @@ class RobotModel:
     @property
     def stiffening_gears(self) -> SpringRow | None:
         """The springs of the six gears where one of them stiffens under load, None if all are linear."""
-        return gear_springs(
-            self.joint_stiffness.tolist(), [joint.drive_train.stiffening for joint in self.joints]
-        )
+        trains = [joint.drive_train for joint in self.joints]
+        return SpringRow([train.spring for train in trains]) if any(t.stiffening for t in trains) else None
+
+    @property
+    def drive_trains(self) -> DriveTrains | None:
+        """The drive trains of the joints where one of them has parts beyond gear and friction, else None."""
+        return drive_trains([joint.drive_train for joint in self.joints])
 
     @property
     def joint_damping(self) -> np.ndarray:
@@ -250,20 +238,26 @@ def load_robot(name: str) -> RobotModel:
     Raises:
         RobotFileError: if there is no such robot, or its file is not a valid robot.
     """
-    path = Path(name) if name.endswith((".yaml", ".yml")) else Path(str(_data_folder() / f"{name}.yaml"))
-    if not path.is_file():
-        raise RobotFileError(
-            f"robot '{name}': no file {path}; "
-            f"give the path of a YAML file or one of {', '.join(shipped_robots())}"
-        )
+    path = _file(name, Path())
     try:
-        robot = yaml_load_typed(schema=RobotModel, filename=str(path))
+        robot = yaml_load_typed(schema=RobotModel, data=whole_text(path, _file))
     except Exception as error:  # the parser raises a dozen types, all of them about this file
         raise RobotFileError(f"robot file {path}: {' '.join(str(error).split())}") from error
     problem = _problem(robot)
     if problem:
         raise RobotFileError(f"robot file {path}: {problem}")
     return robot
+
+
+def _file(name: str, beside: Path) -> Path:
+    is_file = name.endswith((".yaml", ".yml"))
+    path = beside / name if is_file else Path(str(_data_folder() / f"{name}.yaml"))
+    if not path.is_file():
+        raise RobotFileError(
+            f"robot '{name}': no file {path}; "
+            f"give the path of a YAML file or one of {', '.join(shipped_robots())}"
+        )
+    return path
 
 
 def _data_folder():
@@ -331,14 +325,13 @@ def _joint_problem(joint: Joint, number: int) -> str:
     }
     return (
         _not_positive(f"joint {number}", positive)
-        or _stiffening_problem(f"joint {number}", train)
+        or _train_problem(f"joint {number}", train)
         or _tilting_problem(f"joint {number}: tilting", joint)
     )
 
 
-def _stiffening_problem(where: str, train: DriveTrain) -> str:
-    stiffening = train.stiffening
-    problem = "" if stiffening is None else _refusal(lambda: stiffening.spring(train.stiffness))
+def _train_problem(where: str, train: DriveTrain) -> str:
+    problem = _refusal(train.parts)
     return problem and f"{where}: {problem}"
 
 

@@ -54,17 +54,14 @@ def _varied_joint(joint: Joint, gear: float, bearing: np.ndarray, friction: floa
 
 
 def _varied_drive_train(train: DriveTrain, gear: float, friction: float) -> DriveTrain:
-    stiffening = train.stiffening
-    if stiffening is not None:
-        # The same factor at every deflection, see `GearSpring.scaled`.
-        stiffening = replace(stiffening, c_max=gear * stiffening.c_max, sharpness=stiffening.sharpness / gear)
     return replace(
         train,
         stiffness=gear * train.stiffness,
-        stiffening=stiffening,
+        stiffening=train.stiffening.scaled(gear) if train.stiffening else None,
         damping=gear * train.damping,
         viscous_friction=friction * train.viscous_friction,
         coulomb_friction=friction * train.coulomb_friction,
+        friction=train.friction.scaled(friction) if train.friction else None,
     )
 
 

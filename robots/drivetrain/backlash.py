@@ -9,12 +9,23 @@ from robots.drivetrain.monotone import monotone_inverse
 from robots.drivetrain.stiffness import GearSpring
 
 
+def contact(beyond: np.ndarray, torque: np.ndarray) -> np.ndarray:
+    """What of a torque teeth can exert: none in the gap, and beyond it none that pulls.
+
+    Args:
+        beyond: how far in rad the deflection is beyond the gap, zero within.
+        torque: of spring and damper in N m.
+    """
+    return np.where(torque * beyond > 0.0, torque, 0.0)
+
+
 @dataclass(frozen=True)
 class Backlash:
     """A spring and damper that act only beyond half of the gap, Reiner (2010) eq. (2.12), corrected.
 
     The conditions are on phi_rel - phi_0 like the torques, not on phi_rel. The damping torque jumps at
-    contact, so that the model cannot be inverted.
+    contact, so that the model cannot be inverted. Teeth that part do not pull: where the damping torque
+    would outdo the spring, (2.12) is cut off at zero.
     """
 
     spring: GearSpring
@@ -33,7 +44,7 @@ class Backlash:
         """Torques in N m at deflections in rad and their rates in rad/s."""
         offset = np.asarray(deflection) - self.centre
         beyond = offset - np.clip(offset, -0.5 * self.gap, 0.5 * self.gap)
-        return np.where(beyond != 0.0, self.spring.torque(beyond) + self.damping * rate, 0.0)
+        return contact(beyond, self.spring.torque(beyond) + self.damping * rate)
 
 
 @dataclass(frozen=True)

@@ -20,16 +20,25 @@ class DirectionalEfficiency:
     backward: float  # eta_2 at rest, in (0, 1]
     forward_per_speed: float = 0.0  # s / rad
     backward_per_speed: float = 0.0  # s / rad
+    rest_width: float = 0.01  # rad/s, over which `loss` changes its sign
 
     invertible: ClassVar[bool] = False  # at rest it holds like sticking friction
     _LEAST: ClassVar[float] = 0.05
 
     def __post_init__(self) -> None:
         for label in ("forward", "backward"):
-            if not 0.0 < getattr(self, label) <= 1.0:
+            value = getattr(self, label)
+            if not np.all(np.greater(value, 0.0) & np.less_equal(value, 1.0)):
                 raise ValueError(
                     f"DirectionalEfficiency: {label} must be in (0, 1], got {getattr(self, label)}"
                 )
+        for label in ("forward_per_speed", "backward_per_speed"):
+            if np.any(np.less(getattr(self, label), 0.0)):
+                raise ValueError(
+                    f"DirectionalEfficiency: {label} must not be negative, got {getattr(self, label)}"
+                )
+        if not np.all(np.greater(self.rest_width, 0.0)):
+            raise ValueError(f"DirectionalEfficiency: rest_width must be positive, got {self.rest_width}")
 
     def both(self, speed: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """eta_1 and eta_2 at a speed in rad/s."""
@@ -46,6 +55,22 @@ class DirectionalEfficiency:
         power = np.asarray(torque_A) * speed_A
         drives = (power > 0.0) | ((power == 0.0) & (np.asarray(speed_A) >= 0.0))
         return np.where(drives, forward, 1.0 / backward)
+
+    def loss(self, load: np.ndarray, speed: np.ndarray) -> np.ndarray:
+        """What the input has to give beyond the load in N m, smooth through rest; it never drives.
+
+        The load is what the output gives, so the input gives load / eta_1 where it drives and eta_2 load
+        where it is driven. The loss acts like friction in proportion to the load and vanishes at rest; the
+        smooth change of (2.11) leaves a loss of the wrong sign there, which would create energy.
+
+        Args:
+            load: torque in N m that the gear gives to its output, with the ratio one.
+            speed: rad/s.
+        """
+        forward, backward = self.both(speed)
+        drives = np.asarray(load) * speed > 0.0
+        share = np.where(drives, 1.0 / forward - 1.0, 1.0 - backward)
+        return share * np.abs(load) * np.tanh(speed / self.rest_width)
 
 
 @dataclass(frozen=True)

@@ -12,13 +12,13 @@ import numpy as np
 
 def _refuse_negative(part: object, **values: float) -> None:
     for label, value in values.items():
-        if not value >= 0.0:
+        if not np.all(np.greater_equal(value, 0.0)):
             raise ValueError(f"{type(part).__name__}: {label} must not be negative, got {value}")
 
 
 def _refuse_not_positive(part: object, **values: float) -> None:
     for label, value in values.items():
-        if not value > 0.0:
+        if not np.all(np.greater(value, 0.0)):
             raise ValueError(f"{type(part).__name__}: {label} must be positive, got {value}")
 
 
@@ -165,40 +165,67 @@ class PolynomialFriction:
 class StickSlipFriction:
     """Friction that holds: at rest it balances what is applied, up to a breakaway torque, Reiner (2010) 2.2.
 
-    For forward models only: at rest the torque does not follow from the motion.
+    For forward models only: at rest the torque does not follow from the motion. `step` is for time stepping
+    with the direction of slip as its state; `holding` for integrators, without a state.
     """
 
     viscous: float  # N m s / rad
     coulomb: float  # N m, while slipping
     breakaway: float  # N m, at least as large
-    rest: float = 1e-6  # rad/s, below which a slipping joint may stick again
+    stribeck_velocity: float = 0.01  # rad/s, over which the breakaway torque falls to the Coulomb torque
+    stopping_time: float = 2e-3  # s, in which `holding` takes what is left of the velocity away
 
     invertible: ClassVar[bool] = False
 
     def __post_init__(self) -> None:
         _refuse_negative(self, viscous=self.viscous, coulomb=self.coulomb)
-        _refuse_not_positive(self, rest=self.rest)
-        if self.breakaway < self.coulomb:
+        _refuse_not_positive(self, stribeck_velocity=self.stribeck_velocity, stopping_time=self.stopping_time)
+        if np.any(np.less(self.breakaway, self.coulomb)):
             raise ValueError(
                 "StickSlipFriction: breakaway must be at least coulomb, got "
                 f"{self.breakaway} and {self.coulomb}"
             )
 
     def step(
-        self, velocity: np.ndarray, applied: np.ndarray, sticks: np.ndarray
+        self, velocity: np.ndarray, applied: np.ndarray, direction: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray]:
-        """Friction torques and whether the joints stick.
+        """Friction torques for the next step, and the state.
+
+        A slipping joint whose velocity has changed its sign since the last step has been at rest in between:
+        it sticks, unless the breakaway torque cannot hold it.
 
         Args:
             velocity: rad/s.
             applied: all other torques in N m.
-            sticks: whether the joints stuck before.
+            direction: of slip at the last step: 1 or -1, 0 for a joint that sticks.
 
         Returns:
-            Torques in N m against the motion, and the new state of sticking.
+            Torques in N m against the motion, and the new directions. A joint that sticks is to be taken for
+            at rest, whatever the last step has left of its velocity.
         """
-        holds = np.abs(applied) <= np.where(sticks, self.breakaway, self.coulomb)
-        sticks = (np.abs(velocity) < self.rest) & holds
-        direction = np.where(np.abs(velocity) < self.rest, np.sign(applied), np.sign(velocity))
-        slipping = self.viscous * velocity + self.coulomb * direction
-        return np.where(sticks, applied, slipping), sticks
+        has_stopped = velocity * direction <= 0.0
+        sticks = has_stopped & (np.abs(applied) <= self.breakaway)
+        direction = np.where(sticks, 0.0, np.where(has_stopped, np.sign(applied), direction))
+        slipping = self.viscous * velocity + self._sliding(velocity) * direction
+        return np.where(sticks, applied, slipping), direction
+
+    def holding(self, velocity: np.ndarray, applied: np.ndarray, inertia: np.ndarray) -> np.ndarray:
+        """Friction torques in N m as a function of the motion and of what is applied.
+
+        The torque that takes the velocity away within the stopping time and balances what drives the motion,
+        as far as friction reaches: where it does, a joint comes to rest and stays there without creeping.
+        It never drives the motion, and once the velocity changes its sign it holds.
+
+        Args:
+            velocity: rad/s.
+            applied: all other torques in N m.
+            inertia: kg m^2, which they accelerate.
+        """
+        driving = np.where(applied * velocity >= 0.0, applied, 0.0)
+        needed = driving + inertia / self.stopping_time * velocity
+        limit = self._sliding(velocity)
+        return np.clip(needed, -limit, limit) + self.viscous * velocity
+
+    def _sliding(self, velocity: np.ndarray) -> np.ndarray:
+        fall = np.exp(-np.square(velocity / self.stribeck_velocity))
+        return self.coulomb + (self.breakaway - self.coulomb) * fall

@@ -6,6 +6,7 @@ from typing import Any
 
 from robots.drivetrain.backlash import Backlash, ViscoElasticGear
 from robots.drivetrain.counterbalance import Counterbalance
+from robots.drivetrain.dahl import DahlHysteresis
 from robots.drivetrain.efficiency import DirectionalEfficiency, SmoothEfficiency
 from robots.drivetrain.friction import (
     PolynomialFriction,
@@ -33,6 +34,7 @@ PARTS: dict[str, type] = {
     "smooth_efficiency": SmoothEfficiency,
     "backlash": Backlash,
     "visco_elastic_gear": ViscoElasticGear,
+    "dahl_hysteresis": DahlHysteresis,
     "prandtl_ishlinskii": PrandtlIshlinskii,
     "smooth_prandtl_ishlinskii": SmoothPrandtlIshlinskii,
     "motor_lag": MotorLag,

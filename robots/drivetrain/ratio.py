@@ -6,33 +6,48 @@ from typing import ClassVar
 import numpy as np
 
 _NEWTON_STEPS = 20
+_EXACT_ENOUGH = 1e-9  # rad, what `position_error` may leave
 
 
 @dataclass(frozen=True)
 class FourierRatio:
-    """The ratio i(phi_B) and the angle phi_A that it adds up to, Reiner (2010) eq. (2.6); any shape, rad."""
+    """The ratio i(phi_B) and the angle phi_A that it adds up to, Reiner (2010) eq. (2.6); any shape, rad.
 
-    base: float  # the mean ratio
-    amplitudes: tuple[float, ...] = ()
-    frequencies: tuple[int, ...] = ()  # per turn of the output
-    phases: tuple[float, ...] = ()  # rad
+    Parameters of several gears are arrays: one row of a series for each number of the base.
+    """
+
+    base: float | np.ndarray  # the mean ratio
+    amplitudes: tuple[float, ...] | np.ndarray = ()
+    frequencies: tuple[float, ...] | np.ndarray = ()  # per turn of the output, not always whole
+    phases: tuple[float, ...] | np.ndarray = ()  # rad
     start: float = 0.0  # rad, of the input where the sines vanish at output zero
     invertible: ClassVar[bool] = True
 
     _terms: np.ndarray = field(init=False, repr=False, compare=False)
+    _waves: list = field(init=False, repr=False, compare=False)  # amplitude over base, frequency, phase
+    _steps: int = field(init=False, repr=False, compare=False)
 
     def __post_init__(self) -> None:
-        if not len(self.amplitudes) == len(self.frequencies) == len(self.phases):
+        if not np.shape(self.amplitudes) == np.shape(self.frequencies) == np.shape(self.phases):
             raise ValueError("FourierRatio: amplitudes, frequencies and phases must be equally many")
-        if any(frequency < 1 for frequency in self.frequencies):
-            raise ValueError(f"FourierRatio: frequencies must be 1 or more, got {list(self.frequencies)}")
-        if not np.abs(self.amplitudes).sum() < self.base:
+        terms = np.array([self.amplitudes, self.frequencies, self.phases], dtype=float)
+        size = np.abs(terms[0]).sum(axis=-1)
+        if np.any(terms[1] < 1.0):
+            raise ValueError(
+                f"FourierRatio: frequencies must be 1 or more, got {np.asarray(self.frequencies).tolist()}"
+            )
+        if not np.all(size < self.base):
             raise ValueError(
                 f"FourierRatio: the amplitudes must add up to less than the ratio {self.base}, or the gear "
-                f"would turn back, got {np.abs(self.amplitudes).sum()}"
+                f"would turn back, got {size}"
             )
-        terms = np.array([self.amplitudes, self.frequencies, self.phases], dtype=float)
         object.__setattr__(self, "_terms", terms)
+        waves = [(a / self.base, f, p) for a, f, p in zip(*np.moveaxis(terms, -1, 1), strict=True)]
+        object.__setattr__(self, "_waves", waves)
+        # What Newton's first step from an even gear leaves at most.
+        first = np.sum(np.abs(terms[0]) / terms[1], axis=-1) / self.base
+        left = 0.5 * np.sum(np.abs(terms[0]) * terms[1], axis=-1) / self.base * first**2
+        object.__setattr__(self, "_steps", 1 if np.all(left < _EXACT_ENOUGH) else _NEWTON_STEPS)
 
     def ratio(self, phi_B: np.ndarray) -> np.ndarray:
         """d(phi_A) / d(phi_B), eq. (2.6a)."""
@@ -53,6 +68,26 @@ class FourierRatio:
         for _ in range(_NEWTON_STEPS):
             phi_B = phi_B - (self.input_angle(phi_B) - phi_A) / self.ratio(phi_B)
         return phi_B
+
+    def position_error(self, theta: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """How far in rad the output is ahead of an even gear, and the derivative of that by theta.
+
+        The same as `output_angle`, in fewer steps for the tiny errors that gears have.
+
+        Args:
+            theta: input angle over the mean ratio in rad, with no start.
+        """
+        lead = theta
+        for _ in range(self._steps):
+            excess, slope = lead - theta, np.ones_like(lead)
+            for weight, frequency, phase in self._waves:
+                angle = frequency * lead + phase
+                excess, slope = excess + weight / frequency * np.sin(angle), slope + weight * np.cos(angle)
+            lead = lead - excess / slope
+        slope = np.ones_like(lead)
+        for weight, frequency, phase in self._waves:
+            slope = slope + weight * np.cos(frequency * lead + phase)
+        return lead - theta, 1.0 / slope - 1.0
 
     def input_torque(self, torque_B: np.ndarray, phi_B: np.ndarray) -> np.ndarray:
         """-tau_B / i in N m, eq. (2.6c): what the input must hold, without losses."""

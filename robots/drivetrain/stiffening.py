@@ -1,10 +1,9 @@
 """What a robot file says of a gear that stiffens under load."""
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from robots.drivetrain.parts import part_from
-from robots.drivetrain.stiffness import CubicSpring, GearSpring, SpringRow
+from robots.drivetrain.stiffness import GearSpring
 
 KINDS = ("cubic_spring", "exponential_spring", "limited_spring")
 
@@ -22,6 +21,10 @@ class Stiffening:
     sharpness: float = 0.0  # rad / (N m)
     source: str = ""
 
+    def scaled(self, factor: float) -> "Stiffening":
+        """For a gear ``factor`` times as stiff at every deflection, see `GearSpring.scaled`."""
+        return replace(self, c_max=factor * self.c_max, sharpness=self.sharpness / factor)
+
     def spring(self, c_0: float) -> GearSpring:
         """The spring of a gear whose stiffness at rest is c_0 in N m / rad.
 
@@ -32,15 +35,3 @@ class Stiffening:
             raise ValueError(f"stiffening: kind must be one of {', '.join(KINDS)}, got '{self.kind}'")
         given = {name: getattr(self, name) for name in ("gamma", "c_max", "sharpness")}
         return part_from({"kind": self.kind, "c_0": c_0} | {name: x for name, x in given.items() if x})
-
-
-def gear_springs(c_0: Sequence[float], stiffenings: Sequence[Stiffening | None]) -> SpringRow | None:
-    """The springs of gears, by their stiffness at rest in N m / rad; None if none of them stiffens.
-
-    Raises:
-        ValueError: as `Stiffening.spring`.
-    """
-    if not any(stiffenings):
-        return None
-    pairs = zip(c_0, stiffenings, strict=True)
-    return SpringRow([shape.spring(c) if shape else CubicSpring(c, 0.0) for c, shape in pairs])

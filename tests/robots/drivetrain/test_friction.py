@@ -75,10 +75,10 @@ def test_the_parts_of_the_polynomial_join():
 
 def test_a_block_sticks_until_it_is_pushed_hard_enough_and_slips_then():
     friction = StickSlipFriction(0.0, 1.0, 1.5)
-    velocity, sticks, speeds = 0.0, np.array(True), []
+    velocity, direction, speeds = 0.0, np.array(0.0), []
     for k in range(4000):
         applied = 2.0 * k / 4000.0  # N m, on 1 kg m^2
-        torque, sticks = friction.step(np.array(velocity), np.array(applied), sticks)
+        torque, direction = friction.step(np.array(velocity), np.array(applied), direction)
         velocity += 1e-3 * (applied - float(torque))
         speeds.append(velocity)
     speeds = np.array(speeds)
@@ -86,6 +86,26 @@ def test_a_block_sticks_until_it_is_pushed_hard_enough_and_slips_then():
     assert 2.0 * first / 4000.0 == pytest.approx(1.5, abs=2e-3)
     assert (np.diff(speeds[first:]) > 0.0).all()
     assert not StickSlipFriction.invertible
+
+
+def test_a_coasting_block_sticks_when_its_velocity_changes_sign_within_a_step():
+    """With steps of a millisecond no velocity is ever small; once it sticks it is at rest for good."""
+    friction, v, direction = StickSlipFriction(0.1, 1.0, 1.5), 0.2345, np.array(1.0)
+    for _ in range(1000):
+        torque, direction = friction.step(np.array(v), np.array(0.3), direction)
+        v = v + 1e-3 * (0.3 - float(torque)) if direction else 0.0
+    assert direction == 0.0
+    assert v == 0.0
+
+
+@given(st.floats(-2.0, 2.0), st.floats(-5.0, 5.0), st.floats(0.01, 1.0))
+def test_what_holds_never_drives_and_never_exceeds_the_breakaway_torque(v: float, applied: float, J: float):
+    friction = StickSlipFriction(0.0, 1.0, 1.5)
+    torque = float(friction.holding(np.array(v), np.array(applied), np.array(J)))
+    assert torque * v >= 0.0
+    assert abs(torque) <= 1.5
+    at_rest = float(friction.holding(np.array(0.0), np.array(applied), np.array(J)))
+    assert at_rest == pytest.approx(np.clip(applied, -1.5, 1.5))
 
 
 @pytest.mark.parametrize(

@@ -67,7 +67,36 @@ def test_an_uneven_gear_turns_on_average_with_its_ratio_and_can_be_turned_back(a
     assert power_in == pytest.approx(-5.0)
 
 
+def test_the_error_of_a_position_is_that_of_the_whole_angle_with_its_derivative():
+    for amplitude in (-2e-5 * 200.0 * 100.0, 3.0):  # 20 urad at the output; a bad gear
+        gear, theta = (
+            FourierRatio(100.0, (amplitude, 0.1), (200.0, 3.0), (0.4, 0.0)),
+            np.linspace(0.0, 1.0, 301),
+        )
+        error, slope = gear.position_error(theta)
+        np.testing.assert_allclose(error, gear.output_angle(100.0 * theta) - theta, atol=1e-9)
+        h = 1e-7
+        after, before = gear.position_error(theta + h)[0], gear.position_error(theta - h)[0]
+        np.testing.assert_allclose(slope, (after - before) / (2.0 * h), atol=1e-6)
+    assert abs(
+        FourierRatio(100.0, (-0.4,), (200.0,), (0.0,)).position_error(theta)[0]
+    ).max() == pytest.approx(2e-5, rel=0.01)
+
+
 EFFICIENCY = DirectionalEfficiency(0.9, 0.8, 0.1, 0.1)
+
+
+@given(load=st.floats(-300.0, 300.0), speed=st.floats(-3.0, 3.0))
+def test_the_loss_of_a_load_never_drives_and_is_what_the_efficiencies_say(load: float, speed: float):
+    t, w = np.array(load), np.array(speed)
+    loss = float(EFFICIENCY.loss(t, w))
+    assert loss * speed >= 0.0
+    if abs(speed) > 0.1 and load:  # beyond the smooth change
+        forward, backward = EFFICIENCY.both(w)
+        needed = load / forward if load * speed > 0.0 else load * backward
+        assert load + loss == pytest.approx(float(needed))
+
+
 SMOOTH = SmoothEfficiency(EFFICIENCY, 1.0, SigmoidFriction(5.0, 5.0, 100.0), 100.0)
 
 

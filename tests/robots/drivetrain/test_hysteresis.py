@@ -1,5 +1,7 @@
 """Hysteresis operators: memory, exact inverse, and how near the smooth one comes."""
 
+import itertools
+
 import numpy as np
 import pytest
 from hypothesis import given
@@ -8,6 +10,7 @@ from hypothesis.extra.numpy import arrays
 from scipy.integrate import trapezoid
 
 from robots.drivetrain.counterbalance import Counterbalance
+from robots.drivetrain.dahl import DahlHysteresis
 from robots.drivetrain.hysteresis import PrandtlIshlinskii, SmoothPrandtlIshlinskii, pade_delay, play
 from robots.drivetrain.motor import MotorLag
 from robots.drivetrain.parts import PARTS, part_from
@@ -89,6 +92,34 @@ def test_the_smooth_operator_approaches_the_exact_one():
         for sharpness in (25.0, 100.0)
     ]
     assert gaps[1] < 0.4 * gaps[0] < 0.04
+
+
+DAHL = DahlHysteresis((300.0, 100.0), (5e-4, 2e-3))
+
+
+def test_a_hysteresis_of_torques_moves_as_its_rate_says_and_stays_bounded():
+    x = 3e-3 * np.sin(np.linspace(0.0, 9.0, 20001)) * np.linspace(0.0, 1.0, 20001)
+    z, jumped = np.zeros(2), np.zeros(2)
+    for before, after in itertools.pairwise(x):
+        z = z + DAHL.rate(z, np.array(after - before))
+        assert (abs(z) <= DAHL.width).all()
+    turning = [0, *(np.flatnonzero(np.diff(np.sign(np.diff(x)))) + 1), len(x) - 1]
+    for start, stop in itertools.pairwise(turning):
+        jumped = DAHL.moved(jumped, np.array(x[stop] - x[start]))
+    np.testing.assert_allclose(jumped, z, atol=2e-7)
+
+
+@given(arrays(float, 12, elements=st.floats(-5e-3, 5e-3)))
+def test_a_hysteresis_of_torques_loses_energy_in_every_cycle(corners: np.ndarray):
+    """Once around a closed path of deflections, from wherever it has come to: work less what is stored."""
+    z, path = np.zeros(2), np.concatenate([corners, corners[:1]])
+    legs = np.concatenate([np.linspace(a, b, 200) for a, b in itertools.pairwise(path)])
+    work, stored = 0.0, float(DAHL.energy(z))
+    for turn in np.diff(legs):
+        after = DAHL.moved(z, np.array(turn))
+        work += 0.5 * float(DAHL.torque(z) + DAHL.torque(after)) * turn
+        z = after
+    assert work >= float(DAHL.energy(z)) - stored - 1e-9
 
 
 def test_a_motor_follows_its_current_with_one_time_constant():

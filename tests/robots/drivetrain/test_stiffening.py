@@ -11,7 +11,7 @@ from pydrake.multibody.plant import MultibodyPlant
 
 from robots.description.model import RobotFileError, RobotModel, load_robot
 from robots.description.robot_file import robot_text
-from robots.drivetrain.stiffening import Stiffening, gear_springs
+from robots.drivetrain.stiffening import Stiffening
 from robots.drivetrain.stiffness import CubicSpring, ExponentialSpring, LimitedSpring, SpringRow
 from robots.dynamics.modes import ModalAnalysis
 from robots.dynamics.plant import add_robot
@@ -45,9 +45,9 @@ def test_a_row_is_its_springs_side_by_side(x: np.ndarray, factor: float):
 
 def test_without_stiffening_the_gears_are_linear_and_need_no_row():
     assert load_robot("irb1200").stiffening_gears is None
-    row = gear_springs([1e4, 2e4], [None, Stiffening("cubic_spring", gamma=100.0)])
+    row = stiffening_robot(Stiffening("cubic_spring", gamma=100.0)).stiffening_gears
     assert row is not None
-    np.testing.assert_allclose(row.torque(np.array([0.01, 0.01])), [100.0, 202.0])
+    np.testing.assert_allclose(row.torque(np.full(6, 0.01)), np.array([250, 450, 454.5, 450, 450, 450]))
 
 
 def test_a_robot_file_tells_how_its_gears_stiffen(tmp_path: Path):
