@@ -10,17 +10,14 @@ from pydrake.systems.primitives import (
     ConstantVectorSource,
     DiscreteTimeDelay,
     RandomSource,
-    Selector,
-    SelectorParams,
 )
 
+from diagrams.driven_robot import add_driven_robot
 from diagrams.integration import Change
 from diagrams.scenario.scenario import StationConfig
 from diagrams.true_robot import true_robot, with_payload_centre
 from robots.description.model import NUM_JOINTS, RobotModel
 from robots.dynamics.payload_change import carried_inertia
-from robots.dynamics.plant import PlantRobot, add_robot
-from systems.cell.drive import Drive
 from systems.cell.encoders import Encoders, SteppedReading, eccentric_discs
 from systems.cell.events.changing_delay import ChangingDelay, shortest_dead_time
 from systems.cell.events.displaced_view import DisplacedView
@@ -35,7 +32,6 @@ from systems.cell.events.true_geometry import TrueGeometry
 from systems.cell.joint_sensor import JointSensor
 from systems.cell.marker_camera import MarkerCamera
 from systems.cell.pose_camera import BLOCK, PoseCamera
-from systems.cell.stiffening_gears import stiffening_gears
 from systems.cell.tip_pose import TipPose
 from systems.link.abb.motion import EgmMotion
 
@@ -68,14 +64,15 @@ class SimulatedStation(Diagram):
 
     Only a simulated station has these; nothing but logs and metrics may use them:
         out ``truth.X_WE``          RigidTransform
-        out ``truth.state``         state of the plant
+        out ``truth.state``         state of the plant: links and structure
+        out ``truth.motor_state``   vector 12, positions of the motors (rad), then velocities (rad/s)
         out ``truth.motor_torque``  vector 6 in N m, joint side
         out ``truth.exposure``      vector 14, what the camera saw last, before it says so: time, validity,
                                     rows of X_WE
     """
 
     # What `record` is made of.
-    LOGGED = ("truth.state", "truth.motor_torque", "truth.exposure")
+    LOGGED = ("truth.state", "truth.motor_state", "truth.motor_torque", "truth.exposure")
 
     def __init__(
         self,
@@ -109,36 +106,38 @@ class SimulatedStation(Diagram):
             motion = EgmMotion(config.egm.motion, config.period, takes_position=drive != "velocity")
             self._motion = builder.AddNamedSystem("egm", motion)
             drive, takes_torque = "cascade", False
-        self.plant = builder.AddNamedSystem("plant", MultibodyPlant(0.0))
         self._true_robot = true_robot(robot, config)
-        self.robot = add_robot(self.plant, self._true_robot, config.elasticity, config.payload, config.errors)
-        self.plant.Finalize()
-        self._geometry = TrueGeometry(self.robot, config.events, config.link_growth_ppm_per_hour)
         drive_config = replace(
             config.drive, dead_time=shortest_dead_time(config.events, config.drive.dead_time)
         )
-        told = config.payload if config.drive.payload is None else config.drive.payload
-        self.drive = builder.AddNamedSystem("drive", Drive(robot, drive, drive_config, config.period, told))
-        selector = builder.AddNamedSystem("motor_state", motor_state_selector(self.robot))
-        builder.Connect(self.plant.get_state_output_port(), selector.get_input_port())
-        motor_state = selector.get_output_port()
         self._encoders = Encoders(robot, config.encoder)
-        if self._encoders.is_eccentric:
-            discs = builder.AddNamedSystem("eccentric_discs", eccentric_discs(self._encoders))
-            builder.Connect(motor_state, discs.get_input_port())
-            motor_state = discs.get_output_port()
-        self._connect_drive(builder, motor_state)
-        self._connect_torque_feedforward(builder, replace(config, drive=drive_config), takes_torque)
-        runaway = _RUNAWAY * float(robot.speed.max())
-        self._add_joint_sensor(builder, motor_state, runaway)
-        self._noise = self._add_camera(builder, _camera(robot, config), selector.get_output_port(), config)
+        discs = eccentric_discs(self._encoders) if self._encoders.is_eccentric else None
+        config = replace(config, drive=drive_config)
+        self._driven = add_driven_robot(builder, robot, self._true_robot, config, drive, discs)
+        self.robot, self.drive = self._driven.links, self._driven.drive
+        self._geometry = TrueGeometry(self.robot, config.events, config.link_growth_ppm_per_hour)
+        self._connect_commands(builder)
+        self._connect_torque_feedforward(builder, config, takes_torque)
+        self._add_joint_sensor(builder, _RUNAWAY * float(robot.speed.max()))
+        self._noise = self._add_camera(builder, _camera(robot, config), config)
         builder.ExportOutput(self.plant.get_state_output_port(), "truth.state")
-        builder.ExportOutput(self.drive.GetOutputPort("motor_torque"), "truth.motor_torque")
+        builder.ExportOutput(self._driven.motor_state, "truth.motor_state")
+        builder.ExportOutput(self._driven.motor_torque, "truth.motor_torque")
         builder.BuildInto(self)
         self.set_name("station")
 
-    def _connect_drive(self, builder: DiagramBuilder, motor_state: OutputPort) -> None:
-        """Commands to the drive, through the controller if there is one, and torques to the plant."""
+    @property
+    def plant(self) -> MultibodyPlant:
+        """The links and, if it yields, the structure."""
+        return self._driven.plant
+
+    @property
+    def setpoint(self) -> OutputPort:
+        """Where the interpolated commands are: positions (rad), then velocities (rad/s), vector 12."""
+        return self._driven.setpoint
+
+    def _connect_commands(self, builder: DiagramBuilder) -> None:
+        """Commands to the drive, through the controller if there is one."""
         for name in ("position_command", "velocity_command"):
             if self._motion:
                 builder.Connect(self._motion.GetOutputPort(name), self.drive.GetInputPort(name))
@@ -147,13 +146,6 @@ class SimulatedStation(Diagram):
                 builder.Connect(self._delay.GetOutputPort(name), port)
                 port = self._delay.GetInputPort(name)
             builder.ExportInput(port, name)
-        builder.Connect(motor_state, self.drive.GetInputPort("motor_state"))
-        builder.Connect(self.drive.GetOutputPort("joint_torque"), self.plant.get_actuation_input_port())
-        if self.robot.stiffening_gears is not None:
-            stiffening = builder.AddNamedSystem("stiffening_gears", stiffening_gears(self.robot))
-            builder.Connect(self.plant.get_state_output_port(), stiffening.get_input_port())
-            port = self.plant.get_applied_generalized_force_input_port()
-            builder.Connect(stiffening.get_output_port(), port)
 
     def _connect_torque_feedforward(
         self, builder: DiagramBuilder, config: StationConfig, takes_torque: bool
@@ -173,7 +165,8 @@ class SimulatedStation(Diagram):
             no_torque = builder.AddNamedSystem("no_feedforward", ConstantVectorSource(np.zeros(NUM_JOINTS)))
             builder.Connect(no_torque.get_output_port(), ahead)
 
-    def _add_joint_sensor(self, builder: DiagramBuilder, motor_state: OutputPort, runaway: float) -> None:
+    def _add_joint_sensor(self, builder: DiagramBuilder, runaway: float) -> None:
+        motor_state = self._driven.measured_state
         if self._encoders.has_steps:
             reading = SteppedReading(self._encoders, self._config.period)
             builder.AddNamedSystem("stepped_reading", reading)
@@ -181,14 +174,13 @@ class SimulatedStation(Diagram):
             motor_state = reading.get_output_port()
         sensor = builder.AddNamedSystem("joint_sensor", JointSensor(runaway))
         builder.Connect(motor_state, sensor.GetInputPort("motor_state"))
-        builder.Connect(self.drive.GetOutputPort("motor_torque"), sensor.GetInputPort("motor_torque"))
+        builder.Connect(self._driven.motor_torque, sensor.GetInputPort("motor_torque"))
         builder.ExportOutput(sensor.GetOutputPort("joint_sample"), "joint_sample")
 
     def _add_camera(
         self,
         builder: DiagramBuilder,
         camera: PoseCamera | MarkerCamera,
-        motor_state: OutputPort,
         config: StationConfig,
     ) -> RandomSource:
         """The camera, what it looks at, and the source of its noise, which is returned."""
@@ -203,7 +195,7 @@ class SimulatedStation(Diagram):
             seen = view.get_output_port()
         builder.Connect(seen, camera.GetInputPort("X_WE"))
         if camera.HasInputPort("motor_state"):  # of the arm, which hides markers
-            builder.Connect(motor_state, camera.GetInputPort("motor_state"))
+            builder.Connect(self._driven.motor_state, camera.GetInputPort("motor_state"))
         port = camera.GetInputPort("noise")
         noise = RandomSource(RandomDistribution.kGaussian, port.size(), BLOCK * config.camera.period)
         builder.AddNamedSystem("noise", noise)
@@ -215,13 +207,11 @@ class SimulatedStation(Diagram):
 
     def set_at_rest(self, root_context: Context, theta: np.ndarray, seed: int) -> None:
         """Puts the motors at theta (rad, shape (6,)), everything at rest, and seeds the camera's noise."""
-        self.robot.set_at_rest(self.plant.GetMyMutableContextFromRoot(root_context), theta)
-        self.drive.set_at_rest(root_context, theta)
+        self._driven.set_at_rest(root_context, theta)
         if self._delay:
             self._delay.set_at_rest(self._delay.GetMyMutableContextFromRoot(root_context), theta)
         if self._motion:
             self._motion.set_at_rest(self._motion.GetMyMutableContextFromRoot(root_context), theta)
-        # Not SetRandomContext of the diagram: that would draw the friction parameters too.
         self._noise.SetRandomContext(
             self._noise.GetMyMutableContextFromRoot(root_context), RandomGenerator(seed)
         )
@@ -261,27 +251,11 @@ class SimulatedStation(Diagram):
         """
         context = self.plant.CreateDefaultContext()
         context.SetTimeStateAndParametersFrom(self.plant.GetMyContextFromRoot(root_context))
-        rates = [self._rate(context)]
+        rates = [self._driven.fastest_rate(context)]
         for event in of_kind(self._config.events, PayloadChange):
             self._load(context, event)
-            rates.append(self._rate(context))
+            rates.append(self._driven.fastest_rate(context))
         return max(rates)
-
-    def _rate(self, context: Context) -> float:
-        """Of a context of the plant."""
-        stiffness, damping = self.drive.linear_gains()
-        motors = [joint.position_start() for joint in self.robot.motors]
-        n = self.plant.num_positions()
-        K, D = np.zeros(n), np.zeros(n)
-        K[motors], D[motors] = stiffness, damping
-        sprung = self.robot.sprung
-        rows = [joint.position_start() for joint in sprung]
-        K[rows] = self.robot.tangent_stiffness(self.plant.GetPositions(context)[rows])
-        for joint in (*self.robot.motors, *sprung):
-            D[joint.velocity_start()] += joint.default_damping()
-        M_inverse = np.linalg.inv(self.plant.CalcMassMatrix(context))
-        A = np.block([[np.zeros((n, n)), np.eye(n)], [-M_inverse * K, -M_inverse * D]])
-        return float(np.abs(np.linalg.eigvals(A)).max())
 
     def record(self, times: np.ndarray, logged: dict[str, np.ndarray]) -> StationRecord:
         """What the station has measured, and the truth beside it.
@@ -292,7 +266,7 @@ class SimulatedStation(Diagram):
         """
         state = logged["truth.state"]
         exposure_time, X_WE_measured = _exposures(logged["truth.exposure"])
-        theta = state[:, self.robot.motor_indices()[:NUM_JOINTS]]
+        theta = logged["truth.motor_state"][:, :NUM_JOINTS]
         if self._geometry.is_constant:
             X_WE_true = self.robot.tool_poses(state)
         else:
@@ -329,14 +303,3 @@ def _exposures(logged: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     poses = np.tile(np.eye(4), (len(first), 1, 1))
     poses[:, :3] = valid[first, 2:].reshape(-1, 3, 4)
     return valid[first, 0], poses
-
-
-def motor_state_selector(robot: PlantRobot) -> Selector:
-    """A system that picks motor positions and velocities, 12 numbers, from the state of a robot's plant."""
-    params = SelectorParams()
-    params.inputs = [SelectorParams.InputPortParams(name="state", size=robot.plant.num_multibody_states())]
-    selections = [
-        SelectorParams.OutputSelection(input_port_index=0, input_offset=i) for i in robot.motor_indices()
-    ]
-    params.outputs = [SelectorParams.OutputPortParams(name="motor_state", selections=selections)]
-    return Selector(params)

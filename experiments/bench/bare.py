@@ -1,7 +1,6 @@
 """The yardstick of the closed loop: the same plant and drives making the same motion, and nothing else."""
 
 import numpy as np
-from pydrake.multibody.plant import MultibodyPlant
 from pydrake.systems.analysis import Simulator
 from pydrake.systems.framework import Diagram, DiagramBuilder
 from pydrake.systems.primitives import (
@@ -11,12 +10,11 @@ from pydrake.systems.primitives import (
 )
 from pydrake.trajectories import PiecewisePolynomial
 
+from diagrams.driven_robot import add_driven_robot
 from diagrams.record.log import RunLog
 from diagrams.runs.simulation import Experiment
-from diagrams.station import motor_state_selector
+from diagrams.true_robot import true_robot
 from robots.description.model import NUM_JOINTS, RobotModel
-from robots.dynamics.plant import add_robot
-from systems.cell.drive import Drive
 
 
 class BarePlant:
@@ -36,14 +34,9 @@ class BarePlant:
         """
         config = experiment.scenario.station
         builder = DiagramBuilder()
-        self._plant = builder.AddNamedSystem("plant", MultibodyPlant(0.0))
-        self._robot = add_robot(self._plant, robot, config.elasticity, config.payload, config.errors)
-        self._plant.Finalize()
         kind = experiment.scenario.servo.laws[experiment.law].drive
-        drive = builder.AddNamedSystem(
-            "drive", Drive(robot, kind, config.drive, config.period, config.payload)
-        )
-        state = builder.AddNamedSystem("motor_state", motor_state_selector(self._robot))
+        self._driven = add_driven_robot(builder, robot, true_robot(robot, config), config, kind)
+        drive = self._driven.drive
         no_torque = builder.AddNamedSystem("no_feedforward", ConstantVectorSource(np.zeros(NUM_JOINTS)))
         commands = builder.AddNamedSystem("commands", TrajectorySource(_held(log, config.period)))
         split = builder.AddNamedSystem("split", Demultiplexer([NUM_JOINTS, NUM_JOINTS]))
@@ -51,16 +44,12 @@ class BarePlant:
         builder.Connect(split.get_output_port(0), drive.GetInputPort("position_command"))
         builder.Connect(split.get_output_port(1), drive.GetInputPort("velocity_command"))
         builder.Connect(no_torque.get_output_port(), drive.GetInputPort("torque_feedforward"))
-        builder.Connect(self._plant.get_state_output_port(), state.get_input_port())
-        builder.Connect(state.get_output_port(), drive.GetInputPort("motor_state"))
-        builder.Connect(drive.GetOutputPort("joint_torque"), self._plant.get_actuation_input_port())
         self._diagram: Diagram = builder.Build()
         self._simulator = Simulator(self._diagram)
         self._context = self._simulator.get_mutable_context()
         # The motors begin where they were measured first; they are at rest there.
         theta = log.joint_position[np.isfinite(log.joint_position).all(axis=1)][0]
-        self._robot.set_at_rest(self._plant.GetMyMutableContextFromRoot(self._context), theta)
-        drive.set_at_rest(self._context, theta)
+        self._driven.set_at_rest(self._context, theta)
         self._integration = experiment.integration
         self._integration.initialize(self._simulator)
 
@@ -70,8 +59,10 @@ class BarePlant:
 
     def link_positions(self) -> np.ndarray:
         """Link positions now, in rad, shape (6,)."""
-        positions = self._plant.GetPositions(self._plant.GetMyContextFromRoot(self._context))
-        return self._robot.link_positions(positions)
+        plant = self._driven.plant
+        return self._driven.links.link_positions(
+            plant.GetPositions(plant.GetMyContextFromRoot(self._context))
+        )
 
 
 def _held(log: RunLog, period: float) -> PiecewisePolynomial:

@@ -6,10 +6,14 @@ coordinates the plant is the flexible-joint model without gyroscopic coupling of
 positions are motor + deflection. A gear that stiffens under load has in the plant the spring that it has at
 rest; `PlantRobot.stiffening_torque` is what it has beyond that.
 
+The same robot without its drive trains is a plant of the links alone, ``joint_i``, turned by the torques of
+the gears; motors and gears are then a system beside it, which costs half as much to simulate.
+
 An elastic structure has more sprung joints behind the gears: ``tilt_a_i``, ``tilt_b_i`` where a bearing
 tilts across its axis, ``beam_i_...`` where a link is a beam.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -53,7 +57,8 @@ class PlantRobot:
     """The parts of a plant that belong to one robot, in joint order.
 
     Attributes:
-        deflections: the sprung joints of the gears, empty for a rigid robot.
+        motors: the joints that the motors turn; those of the links where drive trains are not in the plant.
+        deflections: the sprung joints of the gears, empty for a rigid robot and without drive trains.
         springs: the springs of these joints.
         tool: frame E.
         structure: the sprung joints of bearings and beams, empty without an elastic structure.
@@ -148,16 +153,32 @@ class PlantRobot:
         forces.mutable_generalized_forces()[:] = 0.0
         return self.plant.CalcGeneralizedForces(context, forces)
 
-    def set_at_rest(self, context: Context, theta: np.ndarray) -> None:
-        """Puts the motors at theta (rad, shape (6,)), still, with gears and structure sagging under load."""
+    def set_at_rest(
+        self,
+        context: Context,
+        theta: np.ndarray,
+        wind_up: Callable[[np.ndarray], np.ndarray] | None = None,
+    ) -> None:
+        """Puts the motors at theta, still, with gears and structure sagging under load.
+
+        Args:
+            context: of the plant.
+            theta: motor positions in rad, shape (6,).
+            wind_up: where the gears are not in the plant, how far they yield in rad to torques in N m on
+                their links, shape (6,) each; None for gears that do not.
+        """
         positions = np.zeros(self.plant.num_positions())
-        positions[[joint.position_start() for joint in self.motors]] = theta
+        driven = [joint.position_start() for joint in self.motors]
+        positions[driven] = theta
         self.plant.SetVelocities(context, np.zeros(self.plant.num_velocities()))
         self.plant.SetPositions(context, positions)
         rows = [joint.position_start() for joint in self.sprung]
         # The sag changes the lever arms by about a thousandth, so each pass gains three digits.
-        for _ in range(6 if rows else 0):
-            positions[rows] = self.static_deflection(self.load(context)[rows])
+        for _ in range(6 if rows or wind_up else 0):
+            load = self.load(context)
+            positions[rows] = self.static_deflection(load[rows])
+            if wind_up:
+                positions[driven] = theta + wind_up(load[driven])
             self.plant.SetPositions(context, positions)
 
 
@@ -167,6 +188,7 @@ def add_robot(
     elasticity: str = "joints",
     payload: float = 0.0,
     errors: GeometricErrors | None = None,
+    drive_trains: bool = True,
 ) -> PlantRobot:
     """Adds a robot to a plant that is not yet finalized. Capsules picture it if there is a SceneGraph.
 
@@ -178,6 +200,8 @@ def add_robot(
         elasticity: ``"rigid"``, ``"joints"`` for elastic gears, ``"structure"`` for bearings and beams too.
         payload: mass at the flange in kg.
         errors: how the true geometry differs from the nominal one; None for exact geometry.
+        drive_trains: whether motors and gears are in the plant. Otherwise its joints are those of the links,
+            its actuation the torques that the gears give them, and a base is left out, which stands still.
 
     Raises:
         ValueError: if the elasticity is unknown, the payload is more than the robot may carry, or an error
@@ -191,17 +215,14 @@ def add_robot(
         )
     if errors is not None:
         robot = ErrorKinematics(robot).robot_with_errors(errors.vector(robot))
-    parent = plant.AddRigidBody("base", link_inertia(robot.base_link))
-    plant.WeldFrames(plant.world_frame(), parent.body_frame(), robot.base.pose())
-    _add_capsule(
-        plant, parent, np.zeros(3), robot.joints[0].placement.translation, robot.base_link.radius, _BASE_COLOR
-    )
+    if drive_trains:
+        before = _add_base(plant, robot).body_frame()
+    else:
+        before = plant.AddFrame(FixedOffsetFrame("base", plant.world_frame(), robot.base.pose()))
     motors, gears, structure = [], SprungJoints(), SprungJoints()
     bodies = []  # of each link the first body and the last
     for i, joint in enumerate(robot.joints):
-        socket = plant.AddFrame(
-            FixedOffsetFrame(f"socket_{i + 1}", parent.body_frame(), joint.placement.pose())
-        )
+        socket = plant.AddFrame(FixedOffsetFrame(f"socket_{i + 1}", before, joint.placement.pose()))
         carried = _payload_inertia(robot, payload) if i + 1 == NUM_JOINTS and payload > 0.0 else None
         link = robot.links[i]
         hinges = SprungJoints()
@@ -209,17 +230,26 @@ def add_robot(
             bodies.append(add_beam_link(plant, hinges, i + 1, link, carried))
         else:
             bodies.append(add_rigid_link(plant, i + 1, link, carried))
-        first, parent = bodies[-1]
+        first, last = bodies[-1]
+        before = last.body_frame()
         driven = first
-        if elasticity != "rigid":
-            driven = _add_gear(plant, gears, structure, i + 1, joint, first, elasticity == "structure")
+        if elasticity == "structure" and joint.tilting is not None:
+            driven = plant.AddRigidBody(f"gear_{i + 1}", massless())
+            add_bearing(plant, structure, i + 1, joint, driven, first)
+        if elasticity != "rigid" and drive_trains:
+            driven = _add_gear(plant, gears, i + 1, joint, driven)
         structure.extend(hinges)
-        motors.append(_add_motor(plant, robot, i, socket, driven))
+        if drive_trains:
+            motors.append(_add_motor(plant, robot, i, socket, driven))
+        else:
+            name = f"joint_{i + 1}"
+            motors.append(plant.AddJoint(RevoluteJoint(name, socket, driven.body_frame(), joint.axis)))
+            plant.AddJointActuator(name, motors[-1])
         if i + 1 < NUM_JOINTS:
             _picture_link(plant, bodies[-1], link, robot.joints[i + 1].placement.translation)
     if robot.counterbalance is not None:
         _add_counterbalance(plant, robot, bodies[0][1], bodies[1][0])
-    tool = plant.AddFrame(FixedOffsetFrame("tool", parent.body_frame(), robot.tool.pose()))
+    tool = plant.AddFrame(FixedOffsetFrame("tool", before, robot.tool.pose()))
     return PlantRobot(
         plant,
         motors,
@@ -229,29 +259,26 @@ def add_robot(
         structure.joints,
         structure.springs,
         robot.counterbalance is not None,
-        None if elasticity == "rigid" else robot.stiffening_gears,
+        None if elasticity == "rigid" or not drive_trains else robot.stiffening_gears,
     )
 
 
+def _add_base(plant: MultibodyPlant, robot: RobotModel) -> RigidBody:
+    base = plant.AddRigidBody("base", link_inertia(robot.base_link))
+    plant.WeldFrames(plant.world_frame(), base.body_frame(), robot.base.pose())
+    _add_capsule(
+        plant, base, np.zeros(3), robot.joints[0].placement.translation, robot.base_link.radius, _BASE_COLOR
+    )
+    return base
+
+
 def _add_gear(
-    plant: MultibodyPlant,
-    gears: SprungJoints,
-    structure: SprungJoints,
-    number: int,
-    joint: Joint,
-    link: RigidBody,
-    tilts: bool,
+    plant: MultibodyPlant, gears: SprungJoints, number: int, joint: Joint, driven: RigidBody
 ) -> RigidBody:
-    """Puts the elastic gear, and the bearing if it tilts, before a link; returns the rotor."""
+    """Puts the elastic gear before what it turns; returns the rotor."""
     rotor = plant.AddRigidBody(f"rotor_{number}", massless())
-    behind = link
-    if tilts and joint.tilting is not None:
-        behind = plant.AddRigidBody(f"gear_{number}", massless())
-    train = joint.drive_train
-    frames = rotor.body_frame(), behind.body_frame()
+    frames, train = (rotor.body_frame(), driven.body_frame()), joint.drive_train
     gears.add(plant, f"deflection_{number}", frames, joint.axis, train.stiffness, train.damping)
-    if behind is not link:
-        add_bearing(plant, structure, number, joint, behind, link)
     return rotor
 
 

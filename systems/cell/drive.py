@@ -1,4 +1,4 @@
-"""Controlled joints: from commands every few milliseconds to motor torques, with gravity and friction.
+"""Controlled joints: from commands every few milliseconds to motor torques.
 
 Made of Drake's C++ systems alone.
 """
@@ -7,20 +7,19 @@ from dataclasses import dataclass, field
 
 import numpy as np
 from pydrake.multibody.plant import MultibodyPlant
-from pydrake.systems.controllers import InverseDynamics, PidController
-from pydrake.systems.framework import Context, Diagram, DiagramBuilder, InputPort, LeafSystem, OutputPort
+from pydrake.systems.controllers import InverseDynamics
+from pydrake.systems.framework import Context, Diagram, DiagramBuilder
 from pydrake.systems.primitives import (
     Adder,
     ConstantVectorSource,
-    LinearSystem,
     MatrixGain,
-    MultilayerPerceptron,
-    PerceptronActivationType,
+    ZeroOrderHold,
 )
 
 from robots.description.model import NUM_JOINTS, RobotModel
 from robots.dynamics.plant import add_robot
 from systems.cell.command_interpolator import CommandInterpolator
+from systems.cell.motors import PidGains
 
 KINDS = ("position", "velocity", "cascade")
 
@@ -59,20 +58,22 @@ class DriveConfig:
 
 
 class Drive(Diagram):
-    """Six controlled joints.
+    """What the controllers of six joints compute at every tick; their loops are in `systems.cell.motors`.
 
     Ports:
         in  ``position_command``    vector 6 in rad
         in  ``velocity_command``    vector 6 in rad/s
         in  ``torque_feedforward``  vector 6 in N m, joint side
         in  ``motor_state``         vector 12, motor positions (rad), then velocities (rad/s)
-        out ``motor_torque``        vector 6 in N m, joint side: what the motors give
-        out ``joint_torque``        vector 6 in N m, the same less the Coulomb friction: what the joints get
+        in  ``setpoint``            vector 12, positions and velocities of the set-points
+        out ``acceleration``        vector 6 in rad/s^2, of the set-points until the next tick
+        out ``added_torque``        vector 6 in N m, what the motors give beside the torque of the controllers
 
     All three kinds are one PID law on the interpolated command, because the PI loops of a cascade
     multiply out to it. A velocity-controlled joint follows the integral of its velocity command.
     Gravity, and the counterbalance if there is one, are compensated with the nominal rigid model of the
-    robot and its payload at the motors' positions.
+    robot and its payload. That torque is held for a period; it is the one at the positions at which the
+    motors will be in the middle of it if they go on as they do.
     """
 
     def __init__(
@@ -91,7 +92,6 @@ class Drive(Diagram):
             ValueError: if the kind is unknown or the delay is shorter than one period.
         """
         super().__init__()
-        self.robot = robot
         builder = DiagramBuilder()
         self._interpolator = builder.AddNamedSystem(
             "interpolator",
@@ -99,73 +99,47 @@ class Drive(Diagram):
                 period, config.command_delay + config.dead_time, tracks_position=kind != "velocity"
             ),
         )
-        self._setpoint = builder.AddNamedSystem("setpoint", _double_integrator())
-        # Kept as a member: the gravity system only refers to it.
+        # Kept as a member: the system that computes the load only refers to it.
         self._rigid_plant = MultibodyPlant(0.0)
-        add_robot(self._rigid_plant, robot, "rigid", payload)
+        self._rigid = add_robot(self._rigid_plant, robot, "rigid", payload)
         self._rigid_plant.Finalize()
-        self._gains = kp, ki, kd = _pid_gains(robot, kind, config, self._rigid_plant)
-        controller = builder.AddNamedSystem("controller", PidController(kp, ki, kd))
-        load_input, load = _load_compensation(builder, self._rigid_plant, robot.counterbalance is not None)
-        self._friction = builder.AddNamedSystem("friction", _coulomb_friction())
-        motor_torque = builder.AddNamedSystem("motor_torque", Adder(3, NUM_JOINTS))
-        joint_torque = builder.AddNamedSystem("joint_torque", Adder(2, NUM_JOINTS))
-
-        builder.Connect(self._interpolator.GetOutputPort("acceleration"), self._setpoint.get_input_port())
-        builder.Connect(self._setpoint.get_output_port(), self._interpolator.GetInputPort("setpoint"))
-        builder.Connect(self._setpoint.get_output_port(), controller.get_input_port_desired_state())
-        builder.Connect(controller.get_output_port_control(), motor_torque.get_input_port(0))
-        builder.Connect(load, motor_torque.get_input_port(1))
-        builder.Connect(motor_torque.get_output_port(), joint_torque.get_input_port(0))
-        builder.Connect(self._friction.get_output_port(), joint_torque.get_input_port(1))
-
-        builder.ExportInput(self._interpolator.GetInputPort("position_command"), "position_command")
-        builder.ExportInput(self._interpolator.GetInputPort("velocity_command"), "velocity_command")
-        builder.ExportInput(motor_torque.get_input_port(2), "torque_feedforward")
-        motor_state = builder.ExportInput(self._friction.get_input_port(), "motor_state")
-        for port in (controller.get_input_port_estimated_state(), load_input):
-            builder.ConnectInput(motor_state, port)
-        builder.ExportOutput(motor_torque.get_output_port(), "motor_torque")
-        builder.ExportOutput(joint_torque.get_output_port(), "joint_torque")
+        self.gains = _pid_gains(robot, kind, config, self._rigid_plant)
+        ahead = builder.AddNamedSystem("ahead", MatrixGain(_half_a_tick_ahead(period)))
+        load = _add_load_compensation(builder, self._rigid_plant)
+        self._held_load = builder.AddNamedSystem("held_load", ZeroOrderHold(period, NUM_JOINTS))
+        added = builder.AddNamedSystem("added_torque", Adder(2, NUM_JOINTS))
+        builder.Connect(ahead.get_output_port(), load.get_input_port_estimated_state())
+        builder.Connect(load.get_output_port_generalized_force(), self._held_load.get_input_port())
+        builder.Connect(self._held_load.get_output_port(), added.get_input_port(0))
+        for name in ("position_command", "velocity_command", "setpoint"):
+            builder.ExportInput(self._interpolator.GetInputPort(name), name)
+        builder.ExportInput(ahead.get_input_port(), "motor_state")
+        builder.ExportInput(added.get_input_port(1), "torque_feedforward")
+        builder.ExportOutput(self._interpolator.GetOutputPort("acceleration"), "acceleration")
+        builder.ExportOutput(added.get_output_port(), "added_torque")
         builder.BuildInto(self)
 
-    def linear_gains(self) -> tuple[np.ndarray, np.ndarray]:
-        """Stiffness (N m / rad) and damping (N m s / rad) about rest, joint side, shape (6,) each."""
-        friction_slope = self.robot.joint_coulomb_friction / self.robot.coulomb_velocity
-        return self._gains[0], self._gains[2] + friction_slope
-
     def set_at_rest(self, root_context: Context, theta: np.ndarray) -> None:
-        """Puts the set-point and the commands in transit at the motor positions theta (rad, shape (6,)).
-
-        Also writes the friction parameters, which live in the context.
-        """
-        still = np.concatenate([theta, np.zeros(NUM_JOINTS)])
-        self._setpoint.GetMyMutableContextFromRoot(root_context).SetContinuousState(still)
+        """Puts the commands in transit at the motor positions theta (rad, shape (6,)), and holds the load."""
         self._interpolator.set_at_rest(root_context, theta)
-        friction, context = self._friction, self._friction.GetMyMutableContextFromRoot(root_context)
-        velocity_only = np.hstack(
-            [np.zeros((NUM_JOINTS, NUM_JOINTS)), np.diag(1.0 / self.robot.coulomb_velocity)]
-        )
-        friction.SetWeights(context, 0, velocity_only)
-        friction.SetWeights(context, 1, -np.diag(self.robot.joint_coulomb_friction))
-        for layer in (0, 1):
-            friction.SetBiases(context, layer, np.zeros(NUM_JOINTS))
+        rigid = self._rigid_plant.CreateDefaultContext()
+        self._rigid_plant.SetPositions(rigid, theta)
+        held = self._held_load.GetMyMutableContextFromRoot(root_context)
+        self._held_load.SetVectorState(held, -self._rigid.load(rigid))
 
 
-def _pid_gains(
-    robot: RobotModel, kind: str, config: DriveConfig, rigid_plant: MultibodyPlant
-) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def _pid_gains(robot: RobotModel, kind: str, config: DriveConfig, rigid_plant: MultibodyPlant) -> PidGains:
     """Joint-side gains of the PID law that the drive amounts to."""
     ratio = robot.gear_ratio
     if kind == "position":
-        return config.position.proportional * ratio, config.position.integral * ratio, 0.0 * ratio
+        return PidGains(config.position.proportional * ratio, config.position.integral * ratio, 0.0 * ratio)
     if kind == "velocity":
         # The integral of the velocity error is the error against the integrated command.
-        return config.velocity.integral * ratio, 0.0 * ratio, config.velocity.proportional * ratio
+        return PidGains(config.velocity.integral * ratio, 0.0 * ratio, config.velocity.proportional * ratio)
     if kind == "cascade":
         gains = config.cascade
         velocity = gains.velocity * _joint_inertias(rigid_plant)
-        return (
+        return PidGains(
             velocity * (gains.position + gains.integral),
             velocity * gains.position * gains.integral,
             velocity,
@@ -173,42 +147,24 @@ def _pid_gains(
     raise ValueError(f"drive kind must be one of {', '.join(KINDS)}, got '{kind}'")
 
 
-def _load_compensation(
-    builder: DiagramBuilder, plant: MultibodyPlant, has_counterbalance: bool
-) -> tuple[InputPort, OutputPort]:
-    """From the motor state to the torque that holds the rigid robot at its position."""
+def _half_a_tick_ahead(period: float) -> np.ndarray:
+    """From a state to the position half a period later, at rest there."""
+    one, o = np.eye(NUM_JOINTS), np.zeros((NUM_JOINTS, NUM_JOINTS))
+    return np.block([[one, 0.5 * period * one], [o, o]])
+
+
+def _add_load_compensation(builder: DiagramBuilder, plant: MultibodyPlant) -> InverseDynamics:
+    """Adds a system from a state at rest to the torque that holds the rigid robot there.
+
+    Inverse dynamics without motion: the mode for gravity would leave the spring of a counterbalance out.
+    """
     modes = InverseDynamics.InverseDynamicsMode
-    if not has_counterbalance:
-        gravity = builder.AddNamedSystem("gravity", InverseDynamics(plant, modes.kGravityCompensation))
-        return gravity.get_input_port_estimated_state(), gravity.get_output_port_generalized_force()
-    # The mode for gravity leaves springs between bodies out; without motion the other one has just the two.
     load = builder.AddNamedSystem("load", InverseDynamics(plant, modes.kInverseDynamics))
-    still = builder.AddNamedSystem("still", MatrixGain(np.diag([1.0] * NUM_JOINTS + [0.0] * NUM_JOINTS)))
     at_rest = builder.AddNamedSystem("at_rest", ConstantVectorSource(np.zeros(NUM_JOINTS)))
-    builder.Connect(still.get_output_port(), load.get_input_port_estimated_state())
     builder.Connect(at_rest.get_output_port(), load.get_input_port_desired_acceleration())
-    return still.get_input_port(), load.get_output_port_generalized_force()
+    return load
 
 
 def _joint_inertias(rigid_plant: MultibodyPlant) -> np.ndarray:
     """What each motor has to turn at zero joint positions, rotor included, in kg m^2, shape (6,)."""
     return np.diag(rigid_plant.CalcMassMatrix(rigid_plant.CreateDefaultContext())).copy()
-
-
-def _double_integrator() -> LeafSystem:
-    """Position and velocity under a piecewise constant acceleration, 12 states."""
-    zero, one = np.zeros((NUM_JOINTS, NUM_JOINTS)), np.eye(NUM_JOINTS)
-    A, B = np.block([[zero, one], [zero, zero]]), np.vstack([zero, one])
-    return LinearSystem(A, B, np.eye(2 * NUM_JOINTS), np.zeros((2 * NUM_JOINTS, NUM_JOINTS)))
-
-
-def _coulomb_friction() -> LeafSystem:
-    """-d_c tanh(velocity / width), Probst (2024) eq. (2.64), from the motor state.
-
-    A perceptron with one tanh layer is exactly this function, and it is the one C++ system in Drake that
-    computes it in continuous time.
-    """
-    return MultilayerPerceptron(
-        [2 * NUM_JOINTS, NUM_JOINTS, NUM_JOINTS],
-        [PerceptronActivationType.kTanh, PerceptronActivationType.kIdentity],
-    )

@@ -54,15 +54,14 @@ def setpoints_and_commands(law: str, delay: float) -> tuple[np.ndarray, np.ndarr
         f"station.drive.dead_time={dead_time}",
     )
     experiment = Experiment(config, law)
-    drive = experiment.station.drive
-    setpoint = drive.GetSubsystemByName("setpoint")
-    context = setpoint.GetMyContextFromRoot(experiment.context)
+    setpoint = experiment.station.setpoint
+    context = setpoint.get_system().GetMyContextFromRoot(experiment.context)
     servo = experiment.servo.GetMyContextFromRoot(experiment.context)
     commands = ("position_command", "velocity_command")
     positions, issued = {}, {}
     for step in range(1, round((0.75 + delay) / 2e-3)):
         experiment.advance(step * 2e-3)
-        positions[step] = setpoint.get_output_port().Eval(context)[:6]
+        positions[step] = setpoint.Eval(context)[:6]
         if step % 2 == 0:
             # Issued at the tick before: this tick's update is still to come.
             issued[step - 2] = [experiment.servo.GetOutputPort(name).Eval(servo) for name in commands]

@@ -6,14 +6,23 @@ import numpy as np
 import pytest
 from pydrake.multibody.plant import MultibodyPlant
 from pydrake.systems.analysis import ApplySimulatorConfig, Simulator, SimulatorConfig
-from pydrake.systems.framework import DiagramBuilder
-from pydrake.systems.primitives import ConstantVectorSource, LogVectorOutput, ZeroOrderHold
+from pydrake.systems.framework import Context, DiagramBuilder, OutputPort
+from pydrake.systems.primitives import (
+    Adder,
+    ConstantVectorSource,
+    Demultiplexer,
+    LogVectorOutput,
+    Multiplexer,
+    ZeroOrderHold,
+)
 
 from robots.description.model import load_robot
 from robots.dynamics.plant import add_robot
 from robots.kinematics.analytic_inverse import InverseKinematics
 from robots.kinematics.forward import Kinematics, robust_inverse
 from systems.cell.drive import CascadeGains, Drive, DriveConfig, PiGains
+from systems.cell.drive_train import CoulombFriction
+from systems.cell.motors import motor_controllers
 from systems.reference.paths import ReferenceConfig, make_path
 from tests.systems.rigs import PERIOD, VectorSignal
 
@@ -37,30 +46,54 @@ def gravity_torque(theta: np.ndarray, payload: float = 0.0) -> np.ndarray:
     return -plant.CalcGravityGeneralizedForces(context)
 
 
+class Controllers:
+    """Drives and their loops on motors whose state comes from a port."""
+
+    def __init__(
+        self, builder: DiagramBuilder, kind: str, config: DriveConfig, payload: float, motor_state: OutputPort
+    ) -> None:
+        self.drive = builder.AddSystem(Drive(ROBOT, kind, config, PERIOD, payload))
+        self.loops = builder.AddSystem(motor_controllers(self.drive.gains))
+        inputs = builder.AddSystem(Multiplexer([6, 6, 12]))
+        parts = builder.AddSystem(Demultiplexer([6, 6, 12]))
+        for index, name in enumerate(("acceleration", "added_torque")):
+            builder.Connect(self.drive.GetOutputPort(name), inputs.get_input_port(index))
+        builder.Connect(motor_state, inputs.get_input_port(2))
+        builder.Connect(motor_state, self.drive.GetInputPort("motor_state"))
+        builder.Connect(inputs.get_output_port(), self.loops.get_input_port())
+        builder.Connect(self.loops.get_output_port(), parts.get_input_port())
+        builder.Connect(parts.get_output_port(2), self.drive.GetInputPort("setpoint"))
+        self.motor_torque, self.setpoint = parts.get_output_port(0), parts.get_output_port(2)
+
+    def set_at_rest(self, root: Context, theta: np.ndarray) -> None:
+        self.drive.set_at_rest(root, theta)
+        loops = self.loops.GetMyMutableContextFromRoot(root)
+        loops.SetContinuousState(np.concatenate([theta, np.zeros(12)]))
+
+
 def torques(kind: str, state: Callable, command: Callable, times, payload: float = 0.0, config=CONFIG):
-    """Motor and joint torques and the set-point, with the motors moved by force: state(t) is given."""
+    """Motor torques and the set-point, with the motors moved by force: state(t) is given."""
     builder = DiagramBuilder()
-    drive = builder.AddSystem(Drive(ROBOT, kind, config, PERIOD, payload))
+    motor_state = builder.AddSystem(VectorSignal(lambda t: np.concatenate(state(t)))).get_output_port()
+    controllers = Controllers(builder, kind, config, payload, motor_state)
     signals = {
-        "motor_state": lambda t: np.concatenate(state(t)),
         "position_command": lambda t: command(t)[0],
         "velocity_command": lambda t: command(t)[1],
         "torque_feedforward": lambda t: np.zeros(6),
     }
     for name, signal in signals.items():
-        builder.Connect(builder.AddSystem(VectorSignal(signal)).get_output_port(), drive.GetInputPort(name))
+        source = builder.AddSystem(VectorSignal(signal))
+        builder.Connect(source.get_output_port(), controllers.drive.GetInputPort(name))
     simulator = Simulator(builder.Build())
     ApplySimulatorConfig(SimulatorConfig(integration_scheme="runge_kutta3", accuracy=1e-8), simulator)
     root = simulator.get_mutable_context()
-    drive.set_at_rest(root, command(0.0)[0])
-    found = {"motor_torque": [], "joint_torque": [], "setpoint": []}
+    controllers.set_at_rest(root, command(0.0)[0])
+    found = {"motor_torque": [], "setpoint": []}
     for time in times:
-        simulator.AdvanceTo(time)
-        context = drive.GetMyContextFromRoot(root)
-        for name in ("motor_torque", "joint_torque"):
-            found[name].append(drive.GetOutputPort(name).Eval(context))
-        setpoint = drive.GetSubsystemByName("setpoint")
-        found["setpoint"].append(setpoint.get_output_port().Eval(setpoint.GetMyContextFromRoot(root)))
+        # Until just after the ticks, at which the load is determined anew.
+        simulator.AdvanceTo(time + 1e-9)
+        for name, port in (("motor_torque", controllers.motor_torque), ("setpoint", controllers.setpoint)):
+            found[name].append(port.Eval(port.get_system().GetMyContextFromRoot(root)))
     return {name: np.array(values) for name, values in found.items()}
 
 
@@ -72,7 +105,13 @@ def motion(kind: str, command: Callable, duration: float, config=CONFIG, load=0.
     """Motor positions and velocities (n, 6) at the ticks of a rigid robot that starts at the command."""
     builder = DiagramBuilder()
     plant = builder.AddSystem(rigid_plant(load))
-    drive = builder.AddSystem(Drive(ROBOT, kind, config, PERIOD, known_load))
+    controllers = Controllers(builder, kind, config, known_load, plant.get_state_output_port())
+    drive, friction = controllers.drive, builder.AddSystem(CoulombFriction(ROBOT))
+    joint_torque = builder.AddSystem(Adder(2, 6))
+    builder.Connect(plant.get_state_output_port(), friction.get_input_port())
+    builder.Connect(controllers.motor_torque, joint_torque.get_input_port(0))
+    builder.Connect(friction.get_output_port(), joint_torque.get_input_port(1))
+    builder.Connect(joint_torque.get_output_port(), plant.get_actuation_input_port())
     holds = []
     for k, name in enumerate(("position_command", "velocity_command")):
         signal = builder.AddSystem(VectorSignal(lambda time, k=k: command(time)[k]))
@@ -82,8 +121,6 @@ def motion(kind: str, command: Callable, duration: float, config=CONFIG, load=0.
         builder.Connect(hold.get_output_port(), drive.GetInputPort(name))
     feedforward = builder.AddSystem(ConstantVectorSource(np.full(6, extra)))
     builder.Connect(feedforward.get_output_port(), drive.GetInputPort("torque_feedforward"))
-    builder.Connect(plant.get_state_output_port(), drive.GetInputPort("motor_state"))
-    builder.Connect(drive.GetOutputPort("joint_torque"), plant.get_actuation_input_port())
     log = LogVectorOutput(plant.get_state_output_port(), builder, PERIOD)
     simulator = Simulator(builder.Build())
     # Velocity control of the light wrist is stiff: 100 N m s / rad times the gear on 0.2 kg m^2.
@@ -91,7 +128,7 @@ def motion(kind: str, command: Callable, duration: float, config=CONFIG, load=0.
     ApplySimulatorConfig(SimulatorConfig(integration_scheme=scheme, accuracy=1e-4), simulator)
     root = simulator.get_mutable_context()
     plant.SetPositions(plant.GetMyMutableContextFromRoot(root), command(0.0)[0])
-    drive.set_at_rest(root, command(0.0)[0])
+    controllers.set_at_rest(root, command(0.0)[0])
     for hold, value in zip(holds, command(0.0), strict=True):
         hold.SetVectorState(hold.GetMyMutableContextFromRoot(root), value)
     simulator.AdvanceTo(duration)
@@ -104,21 +141,6 @@ def motion(kind: str, command: Callable, duration: float, config=CONFIG, load=0.
 def test_at_its_setpoint_a_drive_gives_just_the_torque_of_gravity(kind: str, payload: float):
     found = torques(kind, still(POSE), still(POSE), [0.02], payload)
     np.testing.assert_allclose(found["motor_torque"][0], gravity_torque(POSE, payload), atol=1e-9)
-    np.testing.assert_allclose(
-        found["joint_torque"], found["motor_torque"], atol=1e-12
-    )  # no friction at rest
-
-
-def test_coulomb_friction_is_taken_from_the_motor_torque_and_grows_with_the_gear():
-    """-d_c i tanh(v / eps), eq. (2.64) of Probst (2024), of each joint for itself."""
-    trains = [joint.drive_train for joint in ROBOT.joints]
-    for v in (np.linspace(-0.02, 0.03, 6), np.full(6, 2.0), np.full(6, -2.0)):
-        found = torques("position", lambda t, v=v: (POSE, v), still(POSE), [0.0])
-        expected = [
-            -d.coulomb_friction * d.ratio * np.tanh(x / d.coulomb_velocity)
-            for d, x in zip(trains, v, strict=True)
-        ]
-        np.testing.assert_allclose((found["joint_torque"] - found["motor_torque"])[0], expected, atol=1e-12)
 
 
 @pytest.mark.parametrize(("kind", "gain"), [("position", 80.0), ("velocity", 1.0)])
@@ -132,7 +154,7 @@ def test_the_published_gains_are_motor_torques_so_a_joint_gets_them_times_its_ge
 def test_a_velocity_controlled_joint_answers_a_velocity_error_with_its_gain():
     v = np.linspace(-0.2, 0.3, 6)
     found = torques("velocity", lambda t: (POSE, v), still(POSE), [0.0])
-    expected = -100.0 * ROBOT.gear_ratio * v + gravity_torque(POSE)
+    expected = -100.0 * ROBOT.gear_ratio * v + gravity_torque(POSE + 0.5 * PERIOD * v)
     np.testing.assert_allclose(found["motor_torque"][0], expected, rtol=1e-9)
 
 
@@ -154,7 +176,9 @@ def test_the_cascade_is_a_position_loop_around_a_pi_velocity_loop():
     plant = rigid_plant(0.0)
     inertia = np.diag(plant.CalcMassMatrix(plant.CreateDefaultContext()))
     torque = inertia * gains.velocity * (velocity_error + gains.integral * integral)
-    gravity = np.array([gravity_torque(theta) for theta in p])
+    # Of the last tick, half a tick ahead of it.
+    ticks = np.floor(times / PERIOD + 1e-9) * PERIOD
+    gravity = np.array([gravity_torque(q + 0.5 * PERIOD * v) for q, v in (sway(t, 11.0) for t in ticks)])
     # h^2/12 of the second derivative, 0.1 rad/s * 20^2 / s^2 * 0.3 s, times 2300 N m s / rad.
     np.testing.assert_allclose(found["motor_torque"] - gravity, torque, atol=0.01)
     assert np.abs(torque).max() > 100.0
