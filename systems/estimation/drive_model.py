@@ -1,0 +1,184 @@
+"""What the motors make of commands: known up to factors, which their encoders show."""
+
+from dataclasses import dataclass
+from types import SimpleNamespace
+from typing import NamedTuple
+
+import numpy as np
+from pydrake.multibody.plant import MultibodyPlant
+from scipy.linalg import expm
+
+from robots.description.model import RobotModel
+from robots.dynamics.plant import add_robot
+from systems.estimation.memory import Layout
+
+_FILTERED = 5  # torque that is needed beside the feedforward; rotor, viscous, Coulomb; the load of a kilogram
+SIZE = 38
+DEAD_TIME, MASS = 0, 37
+_OWN = np.arange(6)
+_ACCELERATION_UNIT = 1e-2
+_STEEPEST = 0.05  # rad/s, what learning may add to the speed of a joint
+
+
+@dataclass
+class DriveModelConfig:
+    """How the motors are believed to be controlled, and how well that is known."""
+
+    takes_torque: bool = True  # whether the drives take a torque feedforward
+    position: float = 25.0  # 1/s, gain of the position loop of the cascade
+    velocity: float = 100.0  # 1/s, of the speed loop, joint torque per speed and inertia
+    integral: float = 10.0  # 1/s
+    # Standard deviations. That of one following error is larger than its noise by far, because what the
+    # model leaves of it stays the same for many samples.
+    following_sigma: float = 4e-4  # rad
+    dead_time_sigma: float = 3e-3  # s, of all joints alike
+    lag_sigma: float = 3e-4  # s, of each joint
+    payload_sigma: float = 0.5  # kg
+
+
+class DriveCommand(NamedTuple):
+    """What to tell the drives."""
+
+    position: np.ndarray  # (6,) rad
+    velocity: np.ndarray  # (6,) rad/s
+    torque: np.ndarray  # (6,) N m, joint side, on top of what the drives do for gravity
+    columns: np.ndarray  # (24,), what `DriveModel.features` needs of this instant
+
+
+class DriveModel:
+    """Following errors of the motors as a linear model of the planned motion.
+
+    A drive is e = G w: the torque w that a motion needs and nobody gives it leaves the motor behind by e,
+    with k_d e' + k_p e + k_i int e dt = w. The model is e = Phi beta with columns for a shared dead time, a
+    lag and an inertia of each joint, the torques of rotor, viscous and Coulomb friction through G, a constant
+    and the load of a kilogram through G; beta is learnt by recursive least squares. The mass in it makes up
+    for all that loads are wrong by. It is not that of the payload, and nobody else may take it for that.
+    """
+
+    def __init__(self, robot: RobotModel, payload: float, period: float, config: DriveModelConfig) -> None:
+        """Works out the gains of the cascade and the filter G for one period."""
+        self._config, self._period = config, period
+        self._payload = payload
+        # Kept as a member: the parts only refer to it. Its context is scratch memory, written before use.
+        self._plant = MultibodyPlant(0.0)
+        self._parts = add_robot(self._plant, robot, "rigid", min(payload, robot.payload.largest_mass))
+        self._plant.Finalize()
+        self._context = self._plant.CreateDefaultContext()
+        inertia = np.diag(self._plant.CalcMassMatrix(self._context))
+        self._kd = config.velocity * inertia
+        self._kp = self._kd * (config.position + config.integral)
+        self._ki = self._kd * config.position * config.integral
+        self._rotor, self._viscous = robot.reflected_inertia, robot.joint_viscous_friction
+        self._coulomb, self._width = robot.joint_coulomb_friction, robot.coulomb_velocity
+        self._step = np.array(
+            [_filter_step(*gains, period) for gains in zip(self._kp, self._ki, self._kd, strict=True)]
+        )
+        spread = [config.dead_time_sigma, *[config.lag_sigma] * 6, *[1e-4] * 6]
+        spread += [0.3, 0.3, 0.5] * 6 + [1e-5] * 6 + [config.payload_sigma]
+        self._prior = np.diag(np.array(spread) ** 2)
+        self.layout = Layout(
+            started=(1,),
+            z=(_FILTERED, 6, 2),  # integral of e, and e
+            w=(_FILTERED, 6),
+            beta=(SIZE,),
+            P=(SIZE, SIZE),
+            correction=(6,),
+        )
+
+    def start(self, memory: SimpleNamespace) -> None:
+        """Writes what is believed before anything moves."""
+        memory.P[:] = self._prior
+
+    def command(
+        self,
+        memory: SimpleNamespace,
+        motion: tuple[np.ndarray, np.ndarray, np.ndarray],
+        loads: np.ndarray,
+        mass: float,
+    ) -> DriveCommand:
+        """What to command so that the motors move as planned.
+
+        Args:
+            memory: of the layout.
+            motion: planned position, velocity and acceleration of the motors, (6,) each.
+            loads: of the gears, (5, 18) as `ArmLoads.at` gives them.
+            mass: of the payload as the drives' own gravity compensation has it in kg.
+
+        """
+        theta, v, a = motion
+        rotor, viscous = self._rotor * a, self._viscous * v
+        coulomb = self._coulomb * np.tanh(v / self._width)
+        gears = loads[0, :6] + mass * loads[1, :6]
+        self._plant.SetPositions(self._context, theta)
+        needed = rotor + viscous + coulomb + gears + self._parts.load(self._context)
+        torque, missing = np.zeros(6), needed
+        if self._config.takes_torque:
+            # It arrives when the motion does; drives hold it for a period, so it is that of its middle.
+            last = memory.w[0] if memory.started[0] else needed
+            torque, missing = 1.5 * needed - 0.5 * last, np.zeros(6)
+        self._filter(memory, np.array([missing, rotor, viscous, coulomb, loads[1, :6]]), needed)
+        position, velocity = theta.copy(), v.copy()
+        if not self._config.takes_torque:
+            integral, error = memory.z[0, :, 0], memory.z[0, :, 1]
+            position += error
+            velocity += (missing - self._kp * error - self._ki * integral) / self._kd
+        columns = memory.z[1:, :, 1].ravel().copy()
+        correction = self.features(v, a, columns) @ memory.beta
+        last = memory.correction.copy() if memory.started[0] else correction
+        most = self._period * _STEEPEST
+        correction = last + np.clip(correction - last, -most, most)
+        memory.correction[:], memory.started[0] = correction, 1.0
+        velocity += (correction - last) / self._period
+        return DriveCommand(position + correction, velocity, torque, columns)
+
+    def _filter(self, memory: SimpleNamespace, w: np.ndarray, needed: np.ndarray) -> None:
+        """e = G w for several torques, exact for torques that change evenly within a period."""
+        if not memory.started[0]:
+            memory.z[..., 0] = w / self._ki
+        else:
+            last = memory.w.copy()
+            last[0] = w[0] if self._config.takes_torque else last[0]
+            inputs = np.stack([last, w - last], -1)
+            memory.z[:] = np.einsum("jab,kjb->kja", self._step, np.concatenate([memory.z, inputs], -1))
+        memory.w[:] = w
+        memory.w[0] = needed
+
+    def features(self, v: np.ndarray, a: np.ndarray, columns: np.ndarray) -> np.ndarray:
+        """Rows of the regression, shape (6, 38), from motion and the filtered torques (24,)."""
+        filtered = columns.reshape(_FILTERED - 1, 6)
+        Phi = np.zeros((6, SIZE))
+        Phi[:, DEAD_TIME] = v
+        Phi[_OWN, 1 + _OWN] = v
+        Phi[_OWN, 7 + _OWN] = _ACCELERATION_UNIT * a
+        for k in range(3):
+            Phi[_OWN, 13 + 3 * _OWN + k] = filtered[k]
+        Phi[_OWN, 31 + _OWN] = 1.0
+        Phi[:, MASS] = filtered[3]
+        return Phi
+
+    def learn(self, memory: SimpleNamespace, Phi: np.ndarray, y: np.ndarray) -> None:
+        """One step of recursive least squares: the motors were y behind a plan without correction, (6,)."""
+        PH = memory.P @ Phi.T
+        S = Phi @ PH + self._config.following_sigma**2 * np.eye(6)
+        gain = np.linalg.solve(S, PH.T).T
+        memory.beta += gain @ (y - Phi @ memory.beta)
+        P = memory.P - gain @ PH.T
+        memory.P[:] = 0.5 * (P + P.T)
+
+    def widen(self, memory: SimpleNamespace) -> None:
+        """The load has changed: constants and mass are open again."""
+        extra = np.zeros(SIZE)
+        extra[31:37], extra[MASS] = 3e-5, 5.0
+        memory.P[_DIAGONAL, _DIAGONAL] += extra**2
+
+
+_DIAGONAL = np.arange(SIZE)
+
+
+def _filter_step(kp: float, ki: float, kd: float, period: float) -> np.ndarray:
+    """From (integral of e, e, torque, its change in a period) to the first two a period later, (2, 4)."""
+    A = np.zeros((4, 4))
+    A[0, 1] = 1.0
+    A[1] = [-ki / kd, -kp / kd, 1.0 / kd, 0.0]
+    A[2, 3] = 1.0 / period
+    return expm(A * period)[:2]

@@ -1,0 +1,145 @@
+"""What samples of the past said, kept so that it can be read again with better parameters."""
+
+from types import SimpleNamespace
+
+import numpy as np
+
+from robots.pose import pose_error
+from systems.estimation.arm_geometry import Constants
+from systems.estimation.memory import Layout
+from systems.estimation.tip_model import TipModel
+
+# A keyframe: encoder positions, deflection of the gears, joint velocity and acceleration, twist, the rows of
+# the pose that was seen, and its weight in samples.
+_THETA, _GEARS, _MOTION, _TWIST = slice(0, 6), slice(6, 12), slice(12, 24), slice(24, 30)
+_POSE, _WEIGHT, _ROW = slice(30, 42), 42, 43
+
+
+class Keyframes:
+    """Merged samples in a ring, and their information at parameters that are kept up to date, a few a tick.
+
+    Information is summed up in passes: each works through the ring with the parameters of now, and takes the
+    place of the sum of the last pass when it is through. Where the ring is full, the oldest keyframes leave
+    it for good: what they said stays in ``old``, which fades slowly, so that neither memory nor confidence
+    grows without bound.
+    """
+
+    def __init__(self, model: TipModel, weights: np.ndarray, length: int = 512, batch: int = 5) -> None:
+        """Lays out the memory.
+
+        Args:
+            model: of the tip.
+            weights: of the six entries of a pose error, one over their variances.
+            length: how many keyframes there can be.
+            batch: how many are worked through in a tick.
+        """
+        self._model, self._weights, self._length, self._batch = model, weights, length, batch
+        n = model.size
+        self.layout = Layout(
+            rows=(length, _ROW),
+            first=(1,),
+            end=(1,),
+            position=(1,),  # of the pass; below zero for none
+            leaving=(1,),  # keyframes before this one leave with this pass
+            xi_pass=(n,),
+            A_old=(n, n),
+            b_old=(n,),
+            A=(n, n),  # old and ring
+            b=(n,),
+            A_pass=(n, n),
+            b_pass=(n,),
+            A_leaving=(n, n),
+            b_leaving=(n,),
+        )
+
+    def reset(self, memory: SimpleNamespace, A: np.ndarray, b: np.ndarray) -> None:
+        """Forgets all keyframes; the information A, b is what is left."""
+        memory.first[0] = memory.end[0] = 0.0
+        memory.position[0] = -1.0
+        memory.A_old[:], memory.b_old[:], memory.A[:], memory.b[:] = A, b, A, b
+        memory.xi_pass[:] = np.inf
+
+    def has_room(self, memory: SimpleNamespace) -> bool:
+        """Whether another keyframe fits in."""
+        return memory.end[0] - memory.first[0] < self._length
+
+    def add(self, memory: SimpleNamespace, row: np.ndarray, A: np.ndarray, b: np.ndarray) -> None:
+        """Adds a keyframe as `keyframe_row` makes it, with the information of its samples."""
+        end = int(memory.end[0])
+        memory.rows[end % self._length] = row
+        memory.end[0] = end + 1
+        memory.A += A
+        memory.b += b
+
+    def work(self, memory: SimpleNamespace, constants: Constants, xi: np.ndarray, tolerance: float) -> bool:
+        """Goes on with a pass, or begins one if a parameter has moved by more than the tolerance (m, rad).
+
+        Returns:
+            Whether the sum has been replaced.
+        """
+        first, end = int(memory.first[0]), int(memory.end[0])
+        if memory.position[0] < 0.0:
+            change = np.abs((xi - memory.xi_pass) * self._model.sigma)[self._model.G]
+            is_full = end - first > self._length - 48
+            if first == end or not (change.max() > tolerance or is_full):
+                return False
+            memory.position[0] = first
+            memory.leaving[0] = end - self._length + 96 if is_full else first
+            memory.xi_pass[:] = xi
+            for part in (memory.A_pass, memory.b_pass, memory.A_leaving, memory.b_leaving):
+                part[:] = 0.0
+        position = int(memory.position[0])
+        leaving = int(memory.leaving[0])
+        until = min(position + self._batch, end, max(leaving, position) if position < leaving else end)
+        A, b = self._information(memory, np.arange(position, until), constants, xi)
+        is_leaving = position < leaving
+        (memory.A_leaving if is_leaving else memory.A_pass)[:] += A
+        (memory.b_leaving if is_leaving else memory.b_pass)[:] += b
+        memory.position[0] = until
+        if until < end:
+            return False
+        if leaving > first:
+            # Old knowledge fades as new knowledge joins it.
+            fading = 1.0 - (leaving - first) / 3000.0
+            memory.A_old[:] = fading * memory.A_old + (1.0 - fading) * np.eye(self._model.size)
+            memory.A_old += memory.A_leaving
+            memory.b_old[:] = fading * memory.b_old + memory.b_leaving
+            memory.first[0] = leaving
+        memory.A[:] = memory.A_old + memory.A_pass
+        memory.b[:] = memory.b_old + memory.b_pass
+        memory.position[0] = -1.0
+        return True
+
+    def _information(
+        self, memory: SimpleNamespace, numbers: np.ndarray, constants: Constants, xi: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """A and b of some keyframes, linear about xi; renews the deflections of their gears."""
+        places = numbers % self._length
+        rows = memory.rows[places]
+        n = len(rows)
+        model = self._model
+        motion = rows[:, 12:18], rows[:, 18:24]
+        configuration = rows[:, _THETA], rows[:, _GEARS]
+        found = model.predict_anew(constants, model.full(xi), configuration, motion, rows[:, _TWIST])
+        memory.rows[places, _GEARS] = found.gears
+        seen = np.zeros((n, 4, 4))
+        seen[:, :3] = rows[:, _POSE].reshape(n, 3, 4)
+        seen[:, 3, 3] = 1.0
+        y = pose_error(seen, found.X_WE) + found.H @ xi
+        H = found.H.reshape(-1, model.size)
+        weighted = (rows[:, _WEIGHT, None] * self._weights).ravel()[:, None] * H
+        return H.T @ weighted, weighted.T @ y.ravel()
+
+
+def keyframe_row(
+    theta: np.ndarray,
+    gears: np.ndarray,
+    motion: np.ndarray,
+    twist: np.ndarray,
+    seen: tuple[np.ndarray, float],
+) -> np.ndarray:
+    """One keyframe as numbers; ``seen`` is the pose (4, 4) and its weight in samples."""
+    row = np.empty(_ROW)
+    row[_THETA], row[_GEARS], row[_MOTION], row[_TWIST] = theta, gears, motion, twist
+    row[_POSE], row[_WEIGHT] = seen[0][:3].ravel(), seen[1]
+    return row

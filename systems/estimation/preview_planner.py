@@ -1,0 +1,171 @@
+"""Where the motors have to be so that the tip of the robot as it is known now is on the path."""
+
+from types import SimpleNamespace
+from typing import NamedTuple
+
+import numpy as np
+
+from robots.pose import pose_error
+from systems.estimation.arm_geometry import Arm, Constants
+from systems.estimation.memory import Layout
+from systems.estimation.tip_model import TipModel
+
+_BLEND = 1.5  # s, in which the robot is led from where it starts onto the path
+_NEWTON_STEP = 1e-5  # rad; what a step of this size leaves is its square
+_GEOMETRY_STEP = 1e-4  # m or rad, within which poses are linear in the parameters
+
+
+class Wanted(NamedTuple):
+    """The path at one instant, and a motion of the joints beside it."""
+
+    X_WE: np.ndarray  # (4, 4)
+    V_WE: np.ndarray  # (6,)
+    aside: tuple[np.ndarray, np.ndarray, np.ndarray]  # rad and its derivatives, (6,) each
+
+
+class MotorPlan(NamedTuple):
+    """Motion of the motors at one instant, and what it loads."""
+
+    theta: np.ndarray  # (6,) rad
+    velocity: np.ndarray  # (6,)
+    acceleration: np.ndarray  # (6,)
+    loads: np.ndarray  # (5, 18), as `ArmLoads.at` gives them
+    motion: np.ndarray  # (12,), velocity and acceleration of the links
+    twist: np.ndarray  # (6,), of the tip
+    columns: np.ndarray  # (6, 18 + g), as `ArmGeometry.arm` gives them
+
+
+class PreviewPlanner:
+    """Inverts the estimated compliant robot on the path.
+
+    Newton's method gives the joints q behind the gears at which a stiff arm of the estimated geometry would
+    be on the path, from a prediction so close that one step mostly does. The motors are then at
+    theta = q - J^-1 T phi - delta, and ahead of that by what the damping of the gears holds back. Rates
+    contain the motion of the parameters that are led in; loads do not, or they would feed back on
+    themselves through the deflections: an algebraic loop, and an unstable one.
+    """
+
+    def __init__(self, model: TipModel, period: float) -> None:
+        """Lays out the memory."""
+        self._model, self._period = model, period
+        self._gear_lag = model.lag[:6]
+        self.layout = Layout(
+            started=(1,),
+            x_geometry=(model.size,),
+            q=(6,),
+            rates=(2, 6),  # of the last two instants, newest first
+            wander=(6,),
+            yields=(4, 6),  # newest first
+            start_error=(6,),
+            start_yield=(6,),
+        )
+        self._constants: Constants | None = None
+
+    def constants(self, memory: SimpleNamespace, x: np.ndarray) -> Constants:
+        """The geometry near x; a function of the memory alone, kept to save time."""
+        model = self._model
+        if np.abs((x - memory.x_geometry)[model.G]).max() > _GEOMETRY_STEP:
+            memory.x_geometry[:] = x
+        p = memory.x_geometry[model.G]
+        if self._constants is None or not np.array_equal(self._constants.p[model.chosen], p):
+            self._constants = model.constants(memory.x_geometry)
+        return self._constants
+
+    def start(
+        self, memory: SimpleNamespace, x: np.ndarray, theta: np.ndarray, X_WE: np.ndarray
+    ) -> np.ndarray:
+        """Takes note of where the robot stands; returns the Jacobian of the tip, (6, 6).
+
+        Args:
+            memory: of the layout.
+            x: parameters that the plan begins with.
+            theta: measured, rad, (6,).
+            X_WE: where the path begins, (4, 4).
+        """
+        model, still = self._model, np.zeros((1, 6))
+        memory.x_geometry[:] = x
+        constants = self.constants(memory, x)
+        frames = model.forward(constants, x, theta[None])[1].frames
+        loads = model.loads.at(frames, theta[None], still, still)
+        memory.q[:] = theta + model.deflections(x, loads)[0, :6]
+        X, arm = model.forward(constants, x, memory.q[None])
+        memory.start_error[:] = pose_error(X_WE, X[0])
+        memory.start_yield[:] = 0.0
+        yields = self._yields(arm, x, model.deflections(x, loads)[0])
+        memory.start_yield[:] = theta - memory.q - yields
+        memory.yields[:] = theta - memory.q
+        memory.rates[:] = memory.wander[:] = 0.0
+        memory.started[0] = 1.0
+        return arm.columns[0, :, :6]
+
+    def _yields(self, arm: Arm, x: np.ndarray, deflection: np.ndarray) -> np.ndarray:
+        """By how much the motors have to be ahead of the links of a stiff arm, rad, (6,)."""
+        columns = arm.columns[0]
+        tilt = columns[:, 6:18] @ deflection[6:]
+        return -np.linalg.solve(columns[:, :6], tilt) - deflection[:6]
+
+    def _newton(
+        self, constants: Constants, x: np.ndarray, q: np.ndarray, X_WE: np.ndarray, left: np.ndarray
+    ) -> tuple[np.ndarray, Arm, np.ndarray, float]:
+        """One step towards a pose: joints, the arm before it, its inverse Jacobian, and the size in rad."""
+        X, arm = self._model.forward(constants, x, q[None])
+        inverse = np.linalg.inv(arm.columns[0, :, :6])
+        move = inverse @ (pose_error(X_WE, X[0]) - left)
+        return q + move, arm, inverse, float(np.abs(move).max())
+
+    def step(
+        self,
+        memory: SimpleNamespace,
+        parameters: tuple[np.ndarray, np.ndarray],
+        wanted: Wanted,
+        since_start: float,
+        step: float,
+    ) -> MotorPlan:
+        """Plans one instant.
+
+        Args:
+            memory: of the layout, after `start`.
+            parameters: in use now, and their rates.
+            wanted: the path at this instant.
+            since_start: s.
+            step: s since the last instant that was planned.
+        """
+        x, rate = parameters
+        model = self._model
+        constants = self.constants(memory, x)
+        left, fading = _blend(since_start)
+        q = memory.q + step * (1.5 * memory.rates[0] - 0.5 * memory.rates[1] + memory.wander)
+        error_left = left * memory.start_error
+        q, arm, inverse, step_size = self._newton(constants, x, q, wanted.X_WE, error_left)
+        if step_size > _NEWTON_STEP:
+            q, arm, inverse, _ = self._newton(constants, x, q, wanted.X_WE, error_left)
+        columns = arm.columns[0]
+        drift = fading * memory.start_error + columns[:, 18:] @ rate[model.G]
+        v, wander = inverse @ wanted.V_WE, -inverse @ drift
+        a = (1.5 * v - 2.0 * memory.rates[0] + 0.5 * memory.rates[1]) / step
+        memory.q[:], memory.wander[:] = q, wander
+        memory.rates[1] = memory.rates[0]
+        memory.rates[0] = v
+        aside, aside_rate, aside_bend = wanted.aside
+        if aside_rate.any() or aside.any():
+            q, v, a = q + aside, v + aside_rate, a + aside_bend
+            arm = model.forward(constants, x, q[None])[1]
+            columns = arm.columns[0]
+        loads = model.loads.at(arm.frames, q[None], v[None], a[None])
+        yields = self._yields(arm, x, model.deflections(x, loads)[0]) + left * memory.start_yield
+        history = memory.yields
+        history[1:] = history[:-1].copy()
+        history[0] = yields
+        y_rate = (11.0 * history[0] - 18.0 * history[1] + 9.0 * history[2] - 2.0 * history[3]) / (6.0 * step)
+        y_bend = (2.0 * history[0] - 5.0 * history[1] + 4.0 * history[2] - history[3]) / step**2
+        velocity = v + wander
+        theta = q + yields - self._gear_lag * y_rate
+        twist = columns[:, :6] @ velocity
+        motion = np.concatenate((v, a))
+        return MotorPlan(theta, velocity + y_rate, a + y_bend, loads[0], motion, twist, columns)
+
+
+def _blend(since_start: float) -> tuple[float, float]:
+    """What is left of the way from the start onto the path, and how fast it goes away, per s."""
+    s = min(1.0, max(0.0, since_start / _BLEND))
+    return 1.0 - s**3 * (10.0 - s * (15.0 - 6.0 * s)), -30.0 * s * s * (1.0 - s) ** 2 / _BLEND

@@ -1,0 +1,200 @@
+"""From pairs of encoder positions and camera poses of one instant to the parameters of the robot."""
+
+from dataclasses import dataclass, field
+from types import SimpleNamespace
+from typing import NamedTuple
+
+import numpy as np
+from scipy.linalg import get_lapack_funcs
+
+from robots.pose import pose_error
+from systems.estimation.arm_geometry import Constants
+from systems.estimation.events import Event, Innovations
+from systems.estimation.keyframes import Keyframes, keyframe_row
+from systems.estimation.memory import Layout
+from systems.estimation.tip_model import Prediction, Spread, TipModel, moved
+
+(_POSV,) = get_lapack_funcs(("posv",), dtype=np.float64)  # symmetric positive definite equations
+_CLOSE_AT = (5, 20, 60)  # samples: the first linearisations are poor
+
+
+@dataclass
+class TipEstimatorConfig:
+    """What is known of robot and camera before anything is measured."""
+
+    spread: Spread = field(default_factory=Spread)
+    position_sigma: float = 60e-6  # m, of a camera sample and of what no parameter describes
+    rotation_sigma: float = 2.1e-4  # rad
+    keyframe_step: float = 0.012  # rad, samples nearer than this in every joint are merged
+    keyframe_samples: int = 100  # the most samples in one
+    relinearise: float = 3e-4  # m or rad, a change of a parameter after which the past is read anew
+    geometry_step: float = 1e-4  # m or rad, within which poses are linear in the parameters
+    calm: float = 0.05  # m/s^2, of the tip by parameters that are led in: more makes samples count less
+    test_after: int = 250  # samples before events are looked for
+
+
+class Pair(NamedTuple):
+    """One instant: what the encoders said, what the camera saw, and what the plan knows of it."""
+
+    theta: np.ndarray  # (6,) rad
+    loads: np.ndarray  # (5, 18) N m, as `ArmLoads.at` gives them
+    motion: np.ndarray  # (12,), velocity and acceleration of the joints
+    twist: np.ndarray  # (6,), of the tip
+    X_WE: np.ndarray  # (4, 4), seen
+    unrest: float = 0.0  # m/s^2, of the tip by parameters that are led in
+
+
+class TipEstimator:
+    """Recursive least squares in information form, on keyframes that are linearised again.
+
+    With A = I + sum w H^T W H and b = sum w H^T W (r + H xi) the estimate is A^-1 b, in units of the spreads.
+    """
+
+    def __init__(self, model: TipModel, config: TipEstimatorConfig) -> None:
+        """Lays out the memory."""
+        self.model, self._config = model, config
+        variances = np.repeat([config.rotation_sigma, config.position_sigma], 3) ** 2
+        self._weights = 1.0 / variances
+        self._keyframes = Keyframes(model, self._weights)
+        self._innovations = Innovations(variances)
+        n = model.size
+        self.layout = Layout(
+            xi=(n,),
+            x_geometry=(n,),  # the value that the constants are for
+            count=(1,),
+            A_open=(n, n),
+            b_open=(n,),
+            samples=(1,),
+            weight=(1,),
+            first_theta=(6,),
+            sums=(30,),  # theta, gears, motion and twist, weighted
+            sum_y=(6,),
+            sum_H=(6, n),
+            keyframes=self._keyframes.layout,
+            innovations=self._innovations.layout,
+        )
+        self._constants: Constants | None = None
+
+    def start(self, memory: SimpleNamespace) -> None:
+        """Writes what is known before the first sample."""
+        memory.x_geometry[:] = self.model.mean
+        self._keyframes.reset(memory.keyframes, np.eye(self.model.size), np.zeros(self.model.size))
+
+    def x(self, memory: SimpleNamespace) -> np.ndarray:
+        """The unknowns in their units."""
+        return self.model.full(memory.xi)
+
+    def covariance(self, memory: SimpleNamespace) -> np.ndarray:
+        """Covariance of the unknowns in units of their spreads."""
+        return np.linalg.inv(memory.keyframes.A + memory.A_open)
+
+    def constants(self, memory: SimpleNamespace) -> Constants:
+        """The geometry near the estimate; a function of the memory alone, kept to save time."""
+        model, x = self.model, self.x(memory)
+        if np.abs((x - memory.x_geometry)[model.G]).max() > self._config.geometry_step:
+            memory.x_geometry[:] = x
+        p = memory.x_geometry[model.G]
+        if self._constants is None or not np.array_equal(self._constants.p[model.chosen], p):
+            self._constants = model.constants(memory.x_geometry)
+        return self._constants
+
+    def predict(self, memory: SimpleNamespace, pair: Pair) -> Prediction:
+        """The tip of one pair at the estimate."""
+        return self.model.predict(
+            self.constants(memory), self.x(memory), pair.theta[None], pair.loads[None], pair.twist[None]
+        )
+
+    def tip_covariance(self, memory: SimpleNamespace, pair: Pair) -> np.ndarray:
+        """Covariance of the predicted tip, rotation (rad^2) first, shape (6, 6)."""
+        H = self.predict(memory, pair).H[0]
+        return H @ self.covariance(memory) @ H.T
+
+    def add(self, memory: SimpleNamespace, pair: Pair) -> Event | None:
+        """Learns from one pair; says if something happened to the robot."""
+        config = self._config
+        found = self.predict(memory, pair)
+        r, H = pose_error(pair.X_WE, found.X_WE[0]), found.H[0]
+        weight = 1.0 / (1.0 + (pair.unrest / config.calm) ** 2)
+        event = None
+        if memory.count[0] > config.test_after and weight > 0.2:
+            verdict = self._innovations.judge(
+                memory.innovations, r, H, lambda: self._solve_columns(memory, H)
+            )
+            if verdict.is_outlier:
+                return None
+            if verdict.has_jumped:
+                event = self._innovations.explain(memory.innovations, H, self.model)
+                self._widen(memory)
+        y = r + H @ memory.xi
+        weighted = (weight * self._weights)[:, None] * H
+        memory.A_open += H.T @ weighted
+        memory.b_open += weighted.T @ y
+        self._open(memory, pair, found, (y, H, weight))
+        memory.count[0] += 1.0
+        moved_away = np.abs(pair.theta - memory.first_theta).max() > config.keyframe_step
+        is_long = memory.samples[0] >= config.keyframe_samples
+        if moved_away or is_long or int(memory.count[0]) in _CLOSE_AT:
+            self._close(memory)
+        self._solve(memory)
+        return event
+
+    def work(self, memory: SimpleNamespace) -> None:
+        """What can be done in a tick without a sample, or after its command is out: relinearise."""
+        constants = self.constants(memory)
+        if self._keyframes.work(memory.keyframes, constants, memory.xi, self._config.relinearise):
+            self._solve(memory)
+
+    def _open(self, memory: SimpleNamespace, pair: Pair, found: Prediction, sample) -> None:
+        y, H, weight = sample
+        if memory.samples[0] == 0.0:
+            memory.first_theta[:] = pair.theta
+        memory.samples[0] += 1.0
+        memory.weight[0] += weight
+        memory.sums += weight * np.concatenate((pair.theta, found.gears[0], pair.motion, pair.twist))
+        memory.sum_y += weight * y
+        memory.sum_H += weight * H
+
+    def _close(self, memory: SimpleNamespace) -> None:
+        """Makes the open samples a keyframe: one pose at their mean, with their mean error."""
+        if not self._keyframes.has_room(memory.keyframes):
+            return
+        total = float(memory.weight[0])
+        mean = memory.sums / total
+        r = (memory.sum_y - memory.sum_H @ memory.xi) / total
+        theta, gears, motion, twist = mean[:6], mean[6:12], mean[12:24], mean[24:]
+        constants, x = self.constants(memory), self.x(memory)
+        found = self.model.predict_anew(
+            constants, x, (theta[None], gears[None]), (motion[None, :6], motion[None, 6:]), twist[None]
+        )
+        seen = moved(found.X_WE, r[None])[0]
+        row = keyframe_row(theta, found.gears[0], motion, twist, (seen, total))
+        self._keyframes.add(memory.keyframes, row, memory.A_open, memory.b_open)
+        for part in (memory.A_open, memory.b_open, memory.samples, memory.weight):
+            part[:] = 0.0
+        for part in (memory.sums, memory.sum_y, memory.sum_H):
+            part[:] = 0.0
+
+    def _solve(self, memory: SimpleNamespace) -> None:
+        A, b = memory.keyframes.A + memory.A_open, memory.keyframes.b + memory.b_open
+        _, xi, info = _POSV(A, b, lower=1)
+        if info == 0:
+            memory.xi[:] = xi
+
+    def _solve_columns(self, memory: SimpleNamespace, H: np.ndarray) -> np.ndarray:
+        return np.linalg.solve(memory.keyframes.A + memory.A_open, H.T)
+
+    def _widen(self, memory: SimpleNamespace) -> None:
+        """Something happened: what was known stays, but for the tool and the load."""
+        model = self.model
+        P = self.covariance(memory)
+        tool = model.tool_directions()
+        P = P + tool @ tool.T
+        load = np.zeros(model.size)
+        load[model.M] = np.array([4.0, 0.3, 0.3, 0.3]) / model.sigma[model.M]
+        A = np.linalg.inv(P + np.diag(load**2))
+        A = 0.5 * (A + A.T)
+        self._keyframes.reset(memory.keyframes, A, A @ memory.xi)
+        for part in (memory.A_open, memory.b_open, memory.samples, memory.weight):
+            part[:] = 0.0
+        for part in (memory.sums, memory.sum_y, memory.sum_H):
+            part[:] = 0.0

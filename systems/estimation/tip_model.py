@@ -1,0 +1,210 @@
+"""Where the tip of an elastic robot is, as a function of all that a controller does not know exactly."""
+
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+
+from robots.calibration.identifiability import IdentifiableParameters, identifiable_parameters
+from robots.description.error_parameters import NUM_PARAMETERS, TOOL, error_parameters
+from robots.description.model import load_robot
+from systems.controller_model import ControllerModel
+from systems.estimation.arm_geometry import Arm, ArmGeometry, Constants, skew
+from systems.estimation.arm_loads import ArmLoads
+
+
+@dataclass
+class Spread:
+    """How far from its belief a robot may be: standard deviations before anything is measured."""
+
+    shift: float = 0.012  # m, of a frame
+    angle: float = 0.03  # rad, of a joint's zero, an axis or a frame
+    calibrated_shift: float = 1e-4  # m, the same of a calibrated robot
+    calibrated_angle: float = 2e-4  # rad
+    gear: float = 0.3  # of the compliance of a gear, as a factor
+    bearing: float = 0.5  # the same of a bearing
+    payload: float = 0.5  # kg
+    payload_centre: float = 0.015  # m
+    clock: float = 2e-3  # s, between the stamps of the camera and those of the joints
+
+
+class Prediction(NamedTuple):
+    """The tip in n configurations, and how it moves with the unknowns in units of their spread."""
+
+    X_WE: np.ndarray  # (n, 4, 4)
+    H: np.ndarray  # (n, 6, size)
+    gears: np.ndarray  # (n, 6), deflection in rad
+
+
+class TipModel:
+    """The unknowns x and what they make of encoder positions and loads.
+
+    The tip is at exp(T phi + V c) F(theta + delta, p), with the gears' deflection delta = -k c_g tau, that of
+    the bearings phi = -k c_b M about the axes in the columns T, and the twist V of the tip times the offset
+    c of the camera's clock. Loads are linear in the payload's mass and first moment.
+
+    The vector of unknowns holds the identifiable geometric errors (m, rad), 18 factors of the compliance of
+    gears and bearings, the mass of the payload (kg), the change of its first moment (kg m, 3) and the offset
+    of the clock (s).
+    """
+
+    def __init__(self, model: ControllerModel, spread: Spread) -> None:
+        """Takes means from what is believed and spreads from the configuration."""
+        robot = model.robot
+        # A calibrated robot has no exactly parallel axes left: what can be seen is known of the drawn one.
+        drawn = load_robot(robot.calibration.of) if robot.is_calibrated and robot.calibration.of else robot
+        self.identifiable: IdentifiableParameters = identifiable_parameters(drawn)
+        chosen = self.chosen = self.identifiable.independent
+        self.geometry, self.loads = ArmGeometry(robot, chosen), ArmLoads(robot)
+        self.parameters = error_parameters(robot)
+        g = len(chosen)
+        self.size = g + 23
+        self.G, self.K = slice(0, g), slice(g, g + 18)
+        self.M, self.C = slice(g + 18, g + 22), g + 22
+        self.mean, self.sigma = np.zeros(self.size), np.zeros(self.size)
+        shift, angle = spread.shift, spread.angle
+        if robot.is_calibrated:
+            shift, angle = spread.calibrated_shift, spread.calibrated_angle
+        self.sigma[self.G] = [shift if self.parameters[i].unit == "m" else angle for i in chosen]
+        bearings = [joint.tilting for joint in robot.joints]
+        stiffness = [s for t in bearings for s in (t.stiffness if t else (np.inf, np.inf))]
+        self.compliance = 1.0 / np.concatenate([robot.joint_stiffness, np.array(stiffness)])
+        damping = [d for t in bearings for d in (t.damping if t else (0.0, 0.0))]
+        self.lag = np.concatenate([robot.joint_damping, np.array(damping)]) * self.compliance
+        self.mean[self.K] = {"rigid": 0.0, "joints": 1.0, "structure": 1.0}[model.elasticity]
+        # Bearings of one type differ more than gears do, and few robot files know them.
+        self.mean[g + 6 : g + 18] = 0.5 if model.elasticity == "structure" else 0.0
+        self.sigma[self.K] = np.concatenate([np.full(6, spread.gear), np.full(12, spread.bearing)])
+        self.mean[g + 18] = model.payload
+        self.sigma[g + 18] = spread.payload
+        self.sigma[g + 19 : g + 22] = spread.payload_centre * max(model.payload, 0.1)
+        self.sigma[self.C] = spread.clock
+        self._tool = self._tool_directions()
+
+    def full(self, xi: np.ndarray) -> np.ndarray:
+        """The unknowns in their units from what is in units of their spread."""
+        return self.mean + self.sigma * xi
+
+    def geometric_errors(self, x: np.ndarray) -> np.ndarray:
+        """All error parameters, shape (48,); those that cannot be told from others are zero."""
+        p = np.zeros(NUM_PARAMETERS)
+        p[self.chosen] = x[self.G]
+        return p
+
+    def constants(self, x: np.ndarray) -> Constants:
+        """The geometry at a value of the unknowns."""
+        return self.geometry.constants(self.geometric_errors(x))
+
+    def forward(self, constants: Constants, x: np.ndarray, q: np.ndarray) -> tuple[np.ndarray, Arm]:
+        """The tip of an arm that does not yield, near the value that the constants are for.
+
+        Returns:
+            Poses (n, 4, 4), and the arm at the constants.
+        """
+        arm = self.geometry.arm(constants, q)
+        step = arm.columns[..., 18:] @ (x[self.G] - constants.p[self.chosen])
+        return moved(arm.X_WE, step), arm
+
+    def total_load(self, x: np.ndarray, loads: np.ndarray) -> np.ndarray:
+        """Torques of gears and bearings (n, 18) from loads (n, 5, 18)."""
+        return np.concatenate(([1.0], x[self.M])) @ loads
+
+    def deflections(self, x: np.ndarray, loads: np.ndarray) -> np.ndarray:
+        """How gears and bearings yield in rad, (n, 18), to loads (n, 5, 18)."""
+        return -x[self.K] * self.compliance * self.total_load(x, loads)
+
+    def predict(
+        self,
+        constants: Constants,
+        x: np.ndarray,
+        theta: np.ndarray,
+        loads: np.ndarray,
+        twist: np.ndarray,
+    ) -> Prediction:
+        """The tip at encoder positions.
+
+        Args:
+            constants: of a geometry near that of x.
+            x: the unknowns.
+            theta: encoder positions in rad, (n, 6).
+            loads: as `ArmLoads.at` gives them, (n, 5, 18).
+            twist: of the tip, (n, 6).
+        """
+        unit = -self.compliance * self.total_load(x, loads)
+        yields = x[self.K] * unit
+        X_WE, arm = self.forward(constants, x, theta + yields[:, :6])
+        return self._complete(arm, X_WE, x, (unit, yields, yields[:, 6:]), loads, twist)
+
+    def predict_anew(
+        self,
+        constants: Constants,
+        x: np.ndarray,
+        configuration: tuple[np.ndarray, np.ndarray],
+        motion: tuple[np.ndarray, np.ndarray],
+        twist: np.ndarray,
+    ) -> Prediction:
+        """The same with loads worked out anew at the geometry of now.
+
+        Args:
+            constants, x, twist: as in `predict`.
+            configuration: encoder positions and about by how much the gears yield, in rad, (n, 6) each.
+            motion: velocities and accelerations of the joints, (n, 6) each.
+        """
+        theta, gears = configuration
+        X_WE, arm = self.forward(constants, x, theta + gears)
+        loads = self.loads.at(arm.frames, theta + gears, *motion)
+        unit = -self.compliance * self.total_load(x, loads)
+        yields = x[self.K] * unit
+        change = yields[:, :6] - gears
+        X_WE = moved(X_WE, (arm.columns[..., :6] @ change[..., None])[..., 0])
+        return self._complete(arm, X_WE, x, (unit, yields, yields[:, 6:]), loads, twist)
+
+    def _complete(self, arm: Arm, X_WE, x, deflection, loads, twist) -> Prediction:
+        """Adds the tilting bearings and the clock to a pose, and makes the columns."""
+        unit, yields, tilts = deflection
+        columns = arm.columns
+        springs = columns[..., :18]
+        step = (columns[..., 6:18] @ tilts[..., None])[..., 0] + twist * x[self.C]
+        H = np.empty((len(X_WE), 6, self.size))
+        H[..., self.G] = columns[..., 18:]
+        H[..., self.K] = springs * unit[:, None]
+        by_mass = (-x[self.K] * self.compliance) * loads[:, 1:]
+        H[..., self.M] = springs @ by_mass.swapaxes(-1, -2)
+        H[..., self.C] = twist
+        H *= self.sigma
+        return Prediction(moved(X_WE, step), H, yields[:, :6])
+
+    def tool_directions(self) -> np.ndarray:
+        """A displaced tool in units of the spreads: columns for 2 mm along x, y, z and 5 mrad about them."""
+        return self._tool
+
+    def _tool_directions(self) -> np.ndarray:
+        found = self.identifiable
+        independent, dependent = found.independent.tolist(), found.dependent.tolist()
+        columns = []
+        for i, entry in enumerate(self.parameters):
+            if entry.body != TOOL:
+                continue
+            column = np.zeros(self.size)
+            size = 2e-3 if entry.unit == "m" else 5e-3
+            if i in independent:
+                column[independent.index(i)] = size
+            else:
+                column[self.G] = size * found.combination[:, dependent.index(i)]
+            columns.append(column / self.sigma)
+        return np.array(columns).T
+
+
+def moved(X_WE: np.ndarray, steps: np.ndarray) -> np.ndarray:
+    """Poses (n, 4, 4), moved by small spatial displacements (n, 6) in world axes.
+
+    The rotation is that of Cayley's formula: exact as a rotation, and the angle to third order.
+    """
+    half = 0.5 * steps[:, :3]
+    across = skew(half)
+    share = 2.0 / (1.0 + (half * half).sum(-1))
+    out = X_WE.copy()
+    R = X_WE[:, :3, :3]
+    out[:, :3, :3] += (share[:, None, None] * (across + across @ across)) @ R
+    out[:, :3, 3] += steps[:, 3:]
+    return out

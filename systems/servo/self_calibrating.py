@@ -1,0 +1,281 @@
+"""A law that puts the tip on the path by knowing the robot: it calibrates robot, load and delays at work."""
+
+from dataclasses import dataclass, field
+from types import SimpleNamespace
+
+import numpy as np
+from pydrake.common.value import Value
+from pydrake.systems.framework import Context, DiscreteValues, LeafSystem
+
+from robots.description.model import NUM_JOINTS
+from systems.controller_model import ControllerModel
+from systems.estimation.drive_model import DriveModel, DriveModelConfig
+from systems.estimation.memory import History, Layout
+from systems.estimation.parameter_lead import ParameterLead
+from systems.estimation.preview_planner import PreviewPlanner, Wanted
+from systems.estimation.probe import Probe, ProbeConfig
+from systems.estimation.tip_estimator import Pair, TipEstimator, TipEstimatorConfig
+from systems.estimation.tip_model import TipModel, moved
+from systems.guard.guard import GuardConfig
+from systems.reference.reference import PathAhead
+from systems.samples import JointSample, PoseSample
+from systems.servo.law_config import LawConfig
+
+_REACH = 0.45  # s, how far back plans and encoders are remembered, beyond the delays that are believed
+_FIRST_LEARNT = 0.4  # s after the start: before that the robot is led onto its plan
+_UPSET = 3e-4  # rad, a following error that no drive makes on its own: the load has changed
+_UPSET_PAUSE = 0.3  # s without learning after it, so that the drives come to rest
+_START_UNREST = 0.5  # m/s^2, while the robot is led from where it stands onto its plan
+_STARTING = 1.5  # s
+
+# A row of the plan: motors, loads, links, tip, unrest, columns and correction of the drive model.
+_PLAN = Layout(
+    theta=(6,),
+    velocity=(6,),
+    acceleration=(6,),
+    loads=(5, 18),
+    motion=(12,),
+    twist=(6,),
+    unrest=(1,),
+    columns=(24,),
+    correction=(6,),
+)
+
+
+@dataclass
+class SelfCalibratingConfig(LawConfig):
+    """What the law knows beforehand and may do; read from a scenario file."""
+
+    drive: str = "cascade"
+    estimator: TipEstimatorConfig = field(default_factory=TipEstimatorConfig)
+    drives: DriveModelConfig = field(default_factory=DriveModelConfig)
+    probe: ProbeConfig = field(default_factory=ProbeConfig)
+    lead_frequency: float = 30.0  # rad/s, at most, with which parameters follow their estimate
+    lead_acceleration: float = 0.5  # m/s^2, at most, that this gives the tip
+
+
+class SelfCalibrating(LeafSystem):
+    """Calibrates, predicts and plans ahead; nothing is fed back through the dead time.
+
+    Ports:
+        in  ``reference``           PathAhead
+        in  ``joint_sample``        JointSample
+        in  ``pose_sample``         PoseSample
+        out ``position_command``    vector 6 in rad, NaN before the first tick
+        out ``velocity_command``    vector 6 in rad/s, likewise
+        out ``torque_feedforward``  vector 6 in N m, joint side; zero where drives take none
+        out ``correction``          vector 6 in rad and m, rotation first: what the geometry that was learnt
+                                    moves the tip by
+        out ``measurement``         vector 3: when the last usable sample arrived (s), how many were refused,
+                                    when the newest one was exposed (s)
+
+    Of each camera sample the encoder positions of the same instant are found; the pair teaches the
+    `TipEstimator`. The `ParameterLead` takes the estimate over, and the `PreviewPlanner` inverts the robot as
+    it is known then, on the path as far ahead as commands take to act. The `DriveModel` learns from the
+    encoders what the motors make of that. The parts are plain classes whose arrays all lie in this system's
+    discrete state: between ports of their own each would see the others a tick late.
+    """
+
+    title = "self-calibrating"
+    colour = "#0f766e"
+    uses_camera = False  # it needs one to learn, but what it knows stays true when the camera sees nothing
+    commands_motors = True
+    is_compared = False
+    Config = SelfCalibratingConfig
+
+    def __init__(self, model: ControllerModel, config: SelfCalibratingConfig, guard: GuardConfig) -> None:
+        """Builds the parts.
+
+        Raises:
+            ValueError: if a part refuses its configuration.
+        """
+        super().__init__()
+        self._model, self._config, self._guard = model, config, guard
+        self.period = model.period
+        self.tip_model = TipModel(model, config.estimator.spread)
+        self.estimator = TipEstimator(self.tip_model, config.estimator)
+        self._lead = ParameterLead(self.tip_model.size, config.lead_frequency, config.lead_acceleration)
+        self._planner = PreviewPlanner(self.tip_model, model.period)
+        self._drives = DriveModel(model.robot, model.payload, model.period, config.drives)
+        self._probe = Probe(model.robot, config.probe)
+        reach = _REACH + model.command_delay + model.camera_delay
+        length = int(np.ceil(reach / model.period))
+        self._plan, self._encoders = History(_PLAN.size, length), History(2 * NUM_JOINTS, length)
+        # Gears yield later than they are loaded, by what their damping holds back.
+        self._load_lag = float(np.median(self.tip_model.lag[:6]))
+        self._layout = Layout(
+            estimator=self.estimator.layout,
+            lead=self._lead.layout,
+            planner=self._planner.layout,
+            drives=self._drives.layout,
+            plan=self._plan.layout,
+            encoders=self._encoders.layout,
+            columns=(6, self.tip_model.size),
+            start_time=(1,),
+            planned=(1,),  # the last instant of the plan
+            compared=(1,),  # how many planned instants encoders have been compared at
+            paused_until=(1,),
+            amplitude=(6,),
+        )
+        self._reference = self.DeclareAbstractInputPort("reference", Value[object]())
+        self._joints = self.DeclareAbstractInputPort("joint_sample", Value(JointSample()))
+        self._camera = self.DeclareAbstractInputPort("pose_sample", Value(PoseSample()))
+        self._outputs = [
+            self.DeclareDiscreteState(np.full(NUM_JOINTS, np.nan)),
+            self.DeclareDiscreteState(np.full(NUM_JOINTS, np.nan)),
+            self.DeclareDiscreteState(np.zeros(NUM_JOINTS)),
+            self.DeclareDiscreteState(np.zeros(6)),
+            self.DeclareDiscreteState(np.array([-np.inf, 0.0, -np.inf])),
+        ]
+        self._memory = self.DeclareDiscreteState(self._first_memory())
+        names = "position_command", "velocity_command", "torque_feedforward", "correction", "measurement"
+        for name, state in zip(names, self._outputs, strict=True):
+            self.DeclareStateOutputPort(name, state)
+        self.DeclarePeriodicDiscreteUpdateEvent(model.period, 0.0, self._tick)
+
+    def _first_memory(self) -> np.ndarray:
+        vector = np.zeros(self._layout.size)
+        memory = self._layout.view(vector)
+        self.estimator.start(memory.estimator)
+        self._drives.start(memory.drives)
+        memory.lead.x[:] = self.tip_model.mean
+        memory.paused_until[0] = -np.inf
+        return vector
+
+    def memory(self, context: Context) -> SimpleNamespace:
+        """All that the law remembers, as arrays that must not be written to."""
+        return self._layout.view(context.get_discrete_state(self._memory).value())
+
+    def _tick(self, context: Context, discrete_state: DiscreteValues) -> None:
+        time = context.get_time()
+        reference: PathAhead = self._reference.Eval(context)
+        joints: JointSample = self._joints.Eval(context)
+        sample: PoseSample = self._camera.Eval(context)
+        memory = self._layout.view(discrete_state.get_mutable_value(int(self._memory)))
+        measurement = discrete_state.get_mutable_value(int(self._outputs[4]))
+        self._encoders.append(
+            memory.encoders, joints.time, np.concatenate((joints.position, joints.velocity))
+        )
+        self._compare_drives(memory, reference)
+        if sample.valid and sample.time > measurement[2]:
+            pair = self._pair(memory, sample)
+            measurement[2] = sample.time
+            if pair is not None:
+                self.estimator.add(memory.estimator, pair)
+                measurement[0] = time
+        self.estimator.work(memory.estimator)
+        if not joints.running:
+            # When it runs again it starts from where it stands then.
+            memory.planner.started[0] = 0.0
+            commands = joints.position, np.zeros(NUM_JOINTS), np.zeros(NUM_JOINTS)
+        else:
+            commands = self._command(memory, reference, time, joints.position)
+        for state, command in zip(self._outputs, commands, strict=False):
+            discrete_state.set_value(int(state), command)
+        learnt = memory.lead.x - self.tip_model.mean
+        discrete_state.set_value(int(self._outputs[3]), memory.columns @ learnt)
+
+    def _command(
+        self, memory: SimpleNamespace, reference: PathAhead, time: float, position: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Plans for the instant when a command of now acts, and says what to command."""
+        instant = time + self._model.command_delay
+        path_start = reference.path.path_start
+        (X_WE,), (V_WE,), _ = reference.sample(np.array([instant]))
+        if not memory.planner.started[0]:
+            J = self._planner.start(memory.planner, memory.lead.x, position, X_WE)
+            memory.start_time[0] = time
+            memory.planned[0] = instant - self.period
+            memory.amplitude[:] = self._probe.amplitude(position, J, path_start)
+        lead, since_start = memory.lead, time - memory.start_time[0]
+        columns = memory.columns[:, self.tip_model.G] if memory.columns.any() else None
+        self._lead.step(lead, self.estimator.x(memory.estimator), columns, self.period)
+        aside = self._probe.at(instant, path_start, memory.amplitude)
+        step = instant - memory.planned[0]
+        wanted = Wanted(X_WE, V_WE, aside)
+        plan = self._planner.step(memory.planner, (lead.x, lead.rate), wanted, since_start, step)
+        memory.columns[:, self.tip_model.G] = plan.columns[:, 18:]
+        motion = plan.theta, plan.velocity, plan.acceleration
+        drives = memory.drives
+        command = self._drives.command(drives, motion, plan.loads, self._model.payload)
+        starting = _START_UNREST if since_start < _STARTING and memory.planner.start_error.any() else 0.0
+        row = np.concatenate(
+            (
+                *motion,
+                plan.loads.ravel(),
+                plan.motion,
+                plan.twist,
+                lead.unrest + starting,
+                command.columns,
+                drives.correction,
+            )
+        )
+        self._plan.append(memory.plan, instant, row)
+        memory.planned[0] = instant
+        return command.position, command.velocity, command.torque
+
+    def _pair(self, memory: SimpleNamespace, sample: PoseSample) -> Pair | None:
+        """The encoders and the plan at the instant of an exposure."""
+        count = int(memory.encoders.count[0])
+        newest = memory.encoders.times[(count - 1) % self._encoders.length]
+        offset = self.estimator.x(memory.estimator)[self.tip_model.C]
+        exposure = min(sample.time + offset, newest)
+        encoders = self._encoders_at(memory, exposure)
+        loaded = self._plan.at(memory.plan, exposure - self._load_lag)
+        planned = self._plan.at(memory.plan, exposure)
+        if encoders is None or loaded is None or planned is None:
+            return None
+        then, now = _PLAN.view(loaded), _PLAN.view(planned)
+        X_WE = sample.X_WE.GetAsMatrix4()
+        # As it would have been seen had the clock been right: the column stands for all of the offset.
+        X_WE = moved(X_WE[None], ((exposure - sample.time) * now.twist)[None])[0]
+        return Pair(encoders, then.loads, then.motion, now.twist, X_WE, float(now.unrest[0]))
+
+    def _encoders_at(self, memory: SimpleNamespace, time: float) -> np.ndarray | None:
+        """Positions between two samples, a cubic through positions and velocities, rad, (6,)."""
+        place = self._encoders.around(memory.encoders, time)
+        if place is None:
+            return None
+        before, behind, s = place
+        rows, times = memory.encoders.rows, memory.encoders.times
+        if before == behind:
+            return rows[before, :6].copy()
+        h = times[behind] - times[before]
+        p0, v0, p1, v1 = rows[before, :6], rows[before, 6:], rows[behind, :6], rows[behind, 6:]
+        r = 1.0 - s
+        return (
+            (1.0 + 2.0 * s) * r * r * p0
+            + s * r * r * h * v0
+            + s * s * (3.0 - 2.0 * s) * p1
+            - s * s * r * h * v1
+        )
+
+    def _compare_drives(self, memory: SimpleNamespace, reference: PathAhead) -> None:
+        """Learns from where the motors were at planned instants that have passed."""
+        plan, count = memory.plan, int(memory.plan.count[0])
+        newest = memory.encoders.times[(int(memory.encoders.count[0]) - 1) % self._encoders.length]
+        first = memory.start_time[0] + self._model.command_delay + _FIRST_LEARNT
+        for k in range(max(int(memory.compared[0]), count - self._plan.length), count):
+            instant = plan.times[k % self._plan.length]
+            if instant > newest + 1e-9:
+                break
+            memory.compared[0] = k + 1
+            actual = self._encoders_at(memory, instant)
+            if actual is None or instant < first:
+                continue
+            row = _PLAN.view(plan.rows[k % self._plan.length])
+            y = row.theta - actual + row.correction
+            Phi = self._drives.features(row.velocity, row.acceleration, row.columns)
+            self._learn_drives(memory, (instant, Phi, y), instant > reference.path.path_start)
+
+    def _learn_drives(self, memory: SimpleNamespace, sample, on_path: bool) -> None:
+        instant, Phi, y = sample
+        drives = memory.drives
+        if on_path and np.abs(y - Phi @ drives.beta).max() > _UPSET:
+            memory.paused_until[0] = instant + _UPSET_PAUSE
+        if instant <= memory.paused_until[0]:
+            return
+        if np.isfinite(memory.paused_until[0]):
+            memory.paused_until[0] = -np.inf
+            self._drives.widen(drives)
+        self._drives.learn(drives, Phi, y)

@@ -1,0 +1,58 @@
+"""A robot of which everything is wrong, and what a camera and encoders say of it."""
+
+import numpy as np
+
+from robots.description.model import load_robot
+from systems.controller_model import ControllerModel
+from systems.estimation.tip_estimator import Pair
+from systems.estimation.tip_model import Spread, TipModel, moved
+
+PERIOD = 1e-2  # s, between two pairs
+CAMERA = np.repeat([1.75e-4, 5e-5], 3)  # rad and m, standard deviations of one sample
+
+
+def tip_model(payload: float = 7.0, **changes) -> TipModel:
+    model = ControllerModel(load_robot("irb1200"), payload, PERIOD, elasticity="structure")
+    return TipModel(model, Spread(**changes))
+
+
+def true_unknowns(model: TipModel, seed: int, share: float = 0.5) -> np.ndarray:
+    """Unknowns that are off by up to a share of their spreads."""
+    rng = np.random.default_rng(seed)
+    return model.mean + share * model.sigma * rng.uniform(-1.0, 1.0, model.size)
+
+
+class MovingArm:
+    """Joints on sine waves, seen at a multiple of the period."""
+
+    def __init__(self, model: TipModel, x: np.ndarray, seed: int = 0) -> None:
+        self.model, self.x = model, x
+        self._constants = model.constants(x)
+        rng = np.random.default_rng(seed)
+        self._noise = np.random.default_rng(seed + 1)
+        self._centre = np.array([0.5, 0.2, -0.1, 0.3, 0.8, 0.2])
+        self._speed, self._phase = rng.uniform(0.6, 2.5, 6), rng.uniform(0.0, 6.0, 6)
+
+    def joints(self, time: float, size: float) -> np.ndarray:
+        """Positions, velocities and accelerations, (3, 6)."""
+        u = self._speed * time + self._phase
+        return np.array(
+            [
+                self._centre + size * np.sin(u),
+                size * self._speed * np.cos(u),
+                -size * self._speed**2 * np.sin(u),
+            ]
+        )
+
+    def pair(self, time: float, size: float = 0.6, noise: float = 1.0) -> Pair:
+        theta, v, a = self.joints(time, size)
+        model, x, still = self.model, self.x, np.zeros((1, 6))
+        arm = model.forward(self._constants, x, theta[None])[1]
+        loads = model.loads.at(arm.frames, theta[None], v[None], a[None])
+        twist = arm.columns[:, :, :6] @ v
+        configuration, motion = (theta[None], still), (v[None], a[None])
+        found = model.predict_anew(self._constants, x, configuration, motion, twist)
+        for _ in range(3):  # until the loads are those of the arm that yields
+            found = model.predict_anew(self._constants, x, (theta[None], found.gears), motion, twist)
+        X_WE = moved(found.X_WE, (noise * CAMERA * self._noise.normal(size=6))[None])[0]
+        return Pair(theta, loads[0], np.concatenate((v, a)), twist[0], X_WE)

@@ -1,0 +1,48 @@
+"""The probe: smooth, at rest at its ends, within limits, and absent where it is not wanted."""
+
+import numpy as np
+import pytest
+
+from robots.description.model import load_robot
+from systems.estimation.probe import Probe, ProbeConfig
+
+PATH_START = 4.0
+HOME = np.array([0.9, 0.3, 0.2, 0.5, 0.9, 0.1])
+JACOBIAN = np.vstack([np.zeros((3, 6)), 0.5 * np.ones((3, 6))])
+
+
+def test_rates_are_derivatives_and_both_ends_are_at_rest():
+    probe = Probe(load_robot("irb1200"), ProbeConfig())
+    size, h = probe.amplitude(HOME, JACOBIAN, PATH_START), 1e-5
+    begin, length = probe.window(PATH_START)
+    for time in np.linspace(begin + 0.1, begin + length - 0.1, 7):
+        (p0, v0, _), (_, v, a), (p1, v1, _) = (
+            probe.at(t, PATH_START, size) for t in (time - h, time, time + h)
+        )
+        np.testing.assert_allclose(v, (p1 - p0) / (2.0 * h), atol=1e-7)
+        np.testing.assert_allclose(a, (v1 - v0) / (2.0 * h), atol=1e-6)
+    for time in (begin + 1e-6, begin + length - 1e-6):
+        assert max(np.abs(part).max() for part in probe.at(time, PATH_START, size)[:2]) < 1e-6
+    assert not np.any(probe.at(PATH_START, PATH_START, size))
+
+
+def test_it_keeps_to_joint_limits_and_to_the_excursion_of_the_tip():
+    robot = load_robot("irb1200")
+    probe = Probe(robot, ProbeConfig(largest_excursion=0.05))
+    near_a_limit = HOME.copy()
+    near_a_limit[2] = robot.upper[2] - 0.01
+    size = probe.amplitude(near_a_limit, JACOBIAN, PATH_START)
+    assert size[2] <= 0.01
+    assert np.linalg.norm(JACOBIAN[3:], axis=0) @ size <= 0.05 + 1e-12
+
+
+@pytest.mark.parametrize(("kind", "path_start"), [("none", 4.0), ("smooth", 1.2)])
+def test_there_is_none_without_leave_or_time(kind, path_start):
+    probe = Probe(load_robot("irb1200"), ProbeConfig(kind=kind))
+    assert not probe.amplitude(HOME, JACOBIAN, path_start).any()
+
+
+@pytest.mark.parametrize("change", [{"kind": "wild"}, {"amplitude": [0.1] * 5}, {"amplitude": [-0.1] * 6}])
+def test_refuses_what_cannot_be(change):
+    with pytest.raises(ValueError, match="probe: "):
+        Probe(load_robot("irb1200"), ProbeConfig(**change))

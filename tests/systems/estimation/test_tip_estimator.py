@@ -1,0 +1,145 @@
+"""The estimator on pairs of a known robot: what it finds, and the traps it does not fall into."""
+
+import numpy as np
+import pytest
+
+from robots.pose import pose_error
+from systems.estimation.tip_estimator import TipEstimator, TipEstimatorConfig
+from tests.systems.estimation.arms import PERIOD, MovingArm, tip_model, true_unknowns
+
+
+class Session:
+    """An estimator with its memory, fed by an arm."""
+
+    def __init__(self, seed: int, **config) -> None:
+        self.model = tip_model()
+        self.arm = MovingArm(self.model, true_unknowns(self.model, seed), seed)
+        self.estimator = TipEstimator(self.model, TipEstimatorConfig(**{"test_after": 100, **config}))
+        self.memory = self.estimator.layout.view(np.zeros(self.estimator.layout.size))
+        self.estimator.start(self.memory)
+        self.time, self.events = 0.0, []
+
+    def learn(self, duration: float, size: float = 0.6, change=None) -> None:
+        for _ in range(round(duration / PERIOD)):
+            self.time += PERIOD
+            pair = self.arm.pair(self.time, size)
+            event = self.estimator.add(self.memory, change(pair) if change else pair)
+            self.events += [event] if event else []
+            self.estimator.work(self.memory)
+
+    def error(self, seen: bool = False) -> float:
+        """The largest error of the tip in m: at 40 new configurations, or at those of the last second."""
+        errors = []
+        times = np.linspace(self.time - 1.0, self.time, 20) if seen else np.linspace(20.0, 60.0, 40)
+        for time in times:
+            pair = self.arm.pair(time, noise=0.0)
+            errors.append(pose_error(pair.X_WE, self.estimator.predict(self.memory, pair).X_WE[0])[3:])
+        return float(np.linalg.norm(errors, axis=1).max())
+
+
+def test_four_seconds_of_motion_are_enough():
+    session = Session(0)
+    assert session.error() > 5e-3
+    session.learn(4.0)
+    assert session.error() < 0.3e-3  # where it has not been
+    assert session.error(seen=True) < 30e-6  # half the noise of a sample
+    clock = session.model.C
+    found = session.estimator.x(session.memory)[clock]
+    assert found == pytest.approx(session.arm.x[clock], abs=5e-5)
+
+
+def test_the_error_is_what_the_covariance_says():
+    session = Session(1)
+    session.learn(3.0)
+    H = [
+        session.estimator.predict(session.memory, session.arm.pair(t, noise=0.0)).H[0]
+        for t in (1.0, 2.0, 7.0)
+    ]
+    pairs = [session.arm.pair(t, noise=0.0) for t in (1.0, 2.0, 7.0)]
+    for columns, pair in zip(H, pairs, strict=True):
+        r = pose_error(pair.X_WE, session.estimator.predict(session.memory, pair).X_WE[0])
+        P = columns @ session.estimator.covariance(session.memory) @ columns.T
+        assert r @ np.linalg.solve(P, r) < 35.0  # chi squared of six, one in 200000
+
+
+def test_seconds_at_rest_do_not_freeze_what_was_linearised_far_off():
+    kept, frozen = Session(2), Session(2, relinearise=np.inf)
+    for session in (kept, frozen):
+        session.learn(2.0, size=0.0)
+        session.learn(2.0)
+    assert kept.error() < 0.5e-3
+    assert frozen.error() > 2.0 * kept.error()
+
+
+@pytest.mark.parametrize("shift", [0.5e-3, 3e-3])
+def test_a_displaced_tool_is_seen_and_learnt(shift):
+    session = Session(3)
+    session.learn(3.0)
+
+    def displaced(pair):
+        X_WE = pair.X_WE.copy()
+        X_WE[:3, 3] += X_WE[:3, :3] @ np.array([shift, 0.0, 0.0])
+        return pair._replace(X_WE=X_WE)
+
+    session.learn(12 * PERIOD, change=displaced)
+    assert [event.kind for event in session.events] == ["tool displaced"]
+    session.learn(0.6, change=displaced)
+    assert len(session.events) == 1
+    pair = displaced(session.arm.pair(session.time, noise=0.0))
+    left = pose_error(pair.X_WE, session.estimator.predict(session.memory, pair).X_WE[0])
+    assert np.linalg.norm(left[3:]) < 40e-6
+
+
+def test_a_load_that_is_picked_up_is_named():
+    session = Session(4)
+    session.learn(3.0)
+    session.arm.x = session.arm.x.copy()
+    session.arm.x[session.model.M.start] += 6.0
+    session.learn(0.3)
+    assert [event.kind for event in session.events] == ["load changed"]
+    session.learn(1.5)
+    assert session.error(seen=True) < 60e-6
+
+
+def test_single_outliers_are_left_out():
+    clean, dirty = Session(5), Session(5)
+    rng = np.random.default_rng(0)
+
+    def reflection(pair):
+        X_WE = pair.X_WE.copy()
+        if rng.random() < 0.1:
+            X_WE[:3, 3] += 0.02
+        return pair._replace(X_WE=X_WE)
+
+    for session in (clean, dirty):
+        session.learn(2.0)
+    dirty.learn(2.0, change=reflection)
+    clean.learn(2.0)
+    assert not dirty.events
+    assert dirty.error(seen=True) < 2.0 * clean.error(seen=True) + 10e-6
+
+
+def test_it_learns_little_while_parameters_are_led_in():
+    calm, restless = Session(6), Session(6)
+    calm.learn(1.0)
+    restless.learn(1.0, change=lambda pair: pair._replace(unrest=0.5))
+    assert np.trace(restless.estimator.covariance(restless.memory)) > np.trace(
+        calm.estimator.covariance(calm.memory)
+    )
+
+
+@pytest.mark.slow
+def test_a_full_memory_neither_freezes_nor_winds_up():
+    session = Session(7)
+    session.learn(30.0)
+    keyframes = session.memory.keyframes
+    assert keyframes.first[0] > 0.0
+    assert session.error(seen=True) < 20e-6
+    assert np.linalg.eigvalsh(session.estimator.covariance(session.memory)).min() > 0.0
+
+
+def test_the_same_pairs_give_the_same_memory():
+    one, other = Session(8), Session(8)
+    for session in (one, other):
+        session.learn(0.5)
+    assert np.array_equal(one.memory.xi, other.memory.xi)

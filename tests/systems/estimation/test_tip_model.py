@@ -1,0 +1,56 @@
+"""The model of the tip: its derivatives by finite differences, and what a displaced tool is in it."""
+
+import numpy as np
+import pytest
+
+from robots.pose import pose_error
+from systems.estimation.tip_model import moved
+from tests.systems.estimation.arms import MovingArm, tip_model, true_unknowns
+
+
+def test_columns_are_the_derivatives_of_the_tip():
+    model = tip_model()
+    x = true_unknowns(model, 1)
+    pair = MovingArm(model, x).pair(0.7, noise=0.0)
+
+    def tip(unknowns):
+        rows = pair.theta[None], pair.loads[None], pair.twist[None]
+        return model.predict(model.constants(unknowns), unknowns, *rows)
+
+    H, step = tip(x).H[0], 1e-4
+    for k in range(model.size):
+        change = np.zeros(model.size)
+        change[k] = step * model.sigma[k]
+        difference = pose_error(tip(x + change).X_WE, tip(x - change).X_WE)[0] / (2.0 * step)
+        # What bearings and gears turn is small, and so is what the columns leave out: products of two.
+        np.testing.assert_allclose(H[:, k], difference, atol=2e-3 * model.sigma[k] + 2e-7, rtol=2e-3)
+
+
+def test_poses_near_the_constants_are_those_at_them():
+    model = tip_model()
+    x = true_unknowns(model, 2)
+    near = x.copy()
+    near[model.G] += 1e-4 * np.random.default_rng(0).uniform(-1.0, 1.0, near[model.G].shape)
+    q = np.random.default_rng(1).uniform(-1.0, 1.0, (5, 6))
+    linear = model.forward(model.constants(x), near, q)[0]
+    exact = model.forward(model.constants(near), near, q)[0]
+    assert np.abs(pose_error(exact, linear)).max() < 1e-7
+
+
+def test_the_directions_of_the_tool_displace_it():
+    model = tip_model()
+    pair = MovingArm(model, model.mean).pair(0.3, noise=0.0)
+    rows = pair.theta[None], pair.loads[None], pair.twist[None]
+    found = model.predict(model.constants(model.mean), model.mean, *rows)
+    by_tool = found.H[0] @ model.tool_directions()
+    # Its first three columns are 2 mm along the axes of the last link: a rigid displacement of any pose.
+    np.testing.assert_allclose(by_tool[:3, :3], 0.0, atol=1e-12)
+    np.testing.assert_allclose(np.linalg.norm(by_tool[3:, :3], axis=0), 2e-3, rtol=1e-9)
+    assert np.linalg.matrix_rank(by_tool[:3, 3:], tol=1e-4) == 3
+
+
+@pytest.mark.parametrize("angle", [1e-6, 1e-2])
+def test_moved_turns_by_the_angle(angle):
+    X = np.eye(4)[None]
+    step = np.array([[0.6 * angle, -0.8 * angle, 0.0, 1e-3, 2e-3, 3e-3]])
+    np.testing.assert_allclose(pose_error(moved(X, step), X), step, rtol=angle**2, atol=1e-15)
