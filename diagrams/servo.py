@@ -149,7 +149,10 @@ class Servo(Diagram):
 def law_config(scenario: Scenario, law: type[System] | System) -> LawConfig:
     """Gains and limits of a law: the scenario's, or those with which its class begins."""
     kind = law if isinstance(law, type) else type(law)
-    config = scenario.servo.laws.get(LAWS.name_of(kind) or "")
+    name = LAWS.name_of(kind) or ""
+    if name == "self_calibrating":
+        return scenario.servo.self_calibrating
+    config = scenario.servo.laws.get(name)
     return law_traits(kind).Config() if config is None else config
 
 

@@ -22,6 +22,7 @@ class ControllerModel:
     camera_delay: float = 0.0  # s, from an exposure to the arrival of its pose
     command_delay: float = 0.0  # s, from a command to its motion: transport and dead time
     elasticity: str = "joints"  # what yields: rigid (nothing), joints or structure
+    takes_torque: bool = True  # whether the drives take a torque feedforward
 
     @property
     def payload_centre(self) -> np.ndarray:

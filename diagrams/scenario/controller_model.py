@@ -38,6 +38,7 @@ def controller_model(scenario: Scenario, robot: RobotModel | None = None) -> Con
             drive.command_delay + drive.dead_time if config.command_delay is None else config.command_delay
         ),
         elasticity=config.elasticity or station.elasticity,
+        takes_torque=station.kind == "simulated" and station.interface == "direct",
     )
 
 

@@ -29,6 +29,7 @@ from systems.link.abb.signals import SignalCodec, SignalLayout
 from systems.link.qualisys.receiver import MocapReceiverConfig
 from systems.reference.paths import ReferenceConfig
 from systems.servo import LAWS, LawConfig
+from systems.servo.self_calibrating_config import SelfCalibratingConfig
 
 __all__ = ["Scenario", "ScenarioError", "load_scenario", "scenario_text", "shipped_scenarios"]
 
@@ -97,7 +98,10 @@ class ServoConfig:
     """The controller: what it believes, gains of each law, and the guard."""
 
     model: ControllerModelConfig = field(default_factory=ControllerModelConfig)
-    laws: dict[str, LawConfig] = field(default_factory=lambda: {name: LawConfig() for name in LAWS})
+    laws: dict[str, LawConfig] = field(
+        default_factory=lambda: {name: LawConfig() for name in LAWS if name != "self_calibrating"}
+    )
+    self_calibrating: SelfCalibratingConfig = field(default_factory=SelfCalibratingConfig)
     feedforward: FeedforwardConfig = field(default_factory=FeedforwardConfig)
     guard: GuardConfig = field(default_factory=GuardConfig)
 

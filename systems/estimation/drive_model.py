@@ -8,8 +8,8 @@ import numpy as np
 from pydrake.multibody.plant import MultibodyPlant
 from scipy.linalg import expm
 
-from robots.description.model import RobotModel
 from robots.dynamics.plant import add_robot
+from systems.controller_model import ControllerModel
 from systems.estimation.memory import Layout
 
 _FILTERED = 5  # torque that is needed beside the feedforward; rotor, viscous, Coulomb; the load of a kilogram
@@ -24,7 +24,6 @@ _STEEPEST = 0.05  # rad/s, what learning may add to the speed of a joint
 class DriveModelConfig:
     """How the motors are believed to be controlled, and how well that is known."""
 
-    takes_torque: bool = True  # whether the drives take a torque feedforward
     position: float = 25.0  # 1/s, gain of the position loop of the cascade
     velocity: float = 100.0  # 1/s, of the speed loop, joint torque per speed and inertia
     integral: float = 10.0  # 1/s
@@ -55,13 +54,13 @@ class DriveModel:
     for all that loads are wrong by. It is not that of the payload, and nobody else may take it for that.
     """
 
-    def __init__(self, robot: RobotModel, payload: float, period: float, config: DriveModelConfig) -> None:
+    def __init__(self, model: ControllerModel, config: DriveModelConfig) -> None:
         """Works out the gains of the cascade and the filter G for one period."""
-        self._config, self._period = config, period
-        self._payload = payload
+        robot, period = model.robot, model.period
+        self._config, self._period, self._takes_torque = config, period, model.takes_torque
         # Kept as a member: the parts only refer to it. Its context is scratch memory, written before use.
         self._plant = MultibodyPlant(0.0)
-        self._parts = add_robot(self._plant, robot, "rigid", min(payload, robot.payload.largest_mass))
+        self._parts = add_robot(self._plant, robot, "rigid", min(model.payload, robot.payload.largest_mass))
         self._plant.Finalize()
         self._context = self._plant.CreateDefaultContext()
         inertia = np.diag(self._plant.CalcMassMatrix(self._context))
@@ -112,13 +111,13 @@ class DriveModel:
         self._plant.SetPositions(self._context, theta)
         needed = rotor + viscous + coulomb + gears + self._parts.load(self._context)
         torque, missing = np.zeros(6), needed
-        if self._config.takes_torque:
+        if self._takes_torque:
             # It arrives when the motion does; drives hold it for a period, so it is that of its middle.
             last = memory.w[0] if memory.started[0] else needed
             torque, missing = 1.5 * needed - 0.5 * last, np.zeros(6)
         self._filter(memory, np.array([missing, rotor, viscous, coulomb, loads[1, :6]]), needed)
         position, velocity = theta.copy(), v.copy()
-        if not self._config.takes_torque:
+        if not self._takes_torque:
             integral, error = memory.z[0, :, 0], memory.z[0, :, 1]
             position += error
             velocity += (missing - self._kp * error - self._ki * integral) / self._kd
@@ -137,7 +136,7 @@ class DriveModel:
             memory.z[..., 0] = w / self._ki
         else:
             last = memory.w.copy()
-            last[0] = w[0] if self._config.takes_torque else last[0]
+            last[0] = w[0] if self._takes_torque else last[0]
             inputs = np.stack([last, w - last], -1)
             memory.z[:] = np.einsum("jab,kjb->kja", self._step, np.concatenate([memory.z, inputs], -1))
         memory.w[:] = w

@@ -11,6 +11,7 @@ LAWS = NamedClasses(
         "pbvs": "systems.servo.pbvs:Pbvs",
         "position_level": "systems.servo.position_level:PositionLevel",
         "compensation": "systems.servo.compensation:Compensation",
+        "self_calibrating": "systems.servo.self_calibrating:SelfCalibrating",
     },
 )
 

@@ -1,6 +1,5 @@
 """A law that puts the tip on the path by knowing the robot: it calibrates robot, load and delays at work."""
 
-from dataclasses import dataclass, field
 from types import SimpleNamespace
 
 import numpy as np
@@ -9,17 +8,17 @@ from pydrake.systems.framework import Context, DiscreteValues, LeafSystem
 
 from robots.description.model import NUM_JOINTS
 from systems.controller_model import ControllerModel
-from systems.estimation.drive_model import DriveModel, DriveModelConfig
+from systems.estimation.drive_model import DriveModel
 from systems.estimation.memory import History, Layout
 from systems.estimation.parameter_lead import ParameterLead
 from systems.estimation.preview_planner import PreviewPlanner, Wanted
-from systems.estimation.probe import Probe, ProbeConfig
-from systems.estimation.tip_estimator import Pair, TipEstimator, TipEstimatorConfig
+from systems.estimation.probe import Probe
+from systems.estimation.tip_estimator import Pair, TipEstimator
 from systems.estimation.tip_model import TipModel, moved
 from systems.guard.guard import GuardConfig
 from systems.reference.reference import PathAhead
 from systems.samples import JointSample, PoseSample
-from systems.servo.law_config import LawConfig
+from systems.servo.self_calibrating_config import SelfCalibratingConfig
 
 _REACH = 0.45  # s, how far back plans and encoders are remembered, beyond the delays that are believed
 _FIRST_LEARNT = 0.4  # s after the start: before that the robot is led onto its plan
@@ -40,18 +39,6 @@ _PLAN = Layout(
     columns=(24,),
     correction=(6,),
 )
-
-
-@dataclass
-class SelfCalibratingConfig(LawConfig):
-    """What the law knows beforehand and may do; read from a scenario file."""
-
-    drive: str = "cascade"
-    estimator: TipEstimatorConfig = field(default_factory=TipEstimatorConfig)
-    drives: DriveModelConfig = field(default_factory=DriveModelConfig)
-    probe: ProbeConfig = field(default_factory=ProbeConfig)
-    lead_frequency: float = 30.0  # rad/s, at most, with which parameters follow their estimate
-    lead_acceleration: float = 0.5  # m/s^2, at most, that this gives the tip
 
 
 class SelfCalibrating(LeafSystem):
@@ -96,7 +83,7 @@ class SelfCalibrating(LeafSystem):
         self.estimator = TipEstimator(self.tip_model, config.estimator)
         self._lead = ParameterLead(self.tip_model.size, config.lead_frequency, config.lead_acceleration)
         self._planner = PreviewPlanner(self.tip_model, model.period)
-        self._drives = DriveModel(model.robot, model.payload, model.period, config.drives)
+        self._drives = DriveModel(model, config.drives)
         self._probe = Probe(model.robot, config.probe)
         reach = _REACH + model.command_delay + model.camera_delay
         length = int(np.ceil(reach / model.period))

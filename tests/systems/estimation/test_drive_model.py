@@ -5,6 +5,7 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from robots.description.model import load_robot
+from systems.controller_model import ControllerModel
 from systems.estimation.drive_model import DEAD_TIME, MASS, SIZE, DriveModel, DriveModelConfig
 
 PERIOD = 4e-3
@@ -17,8 +18,9 @@ def motion(time: float):
     return 0.3 * np.sin(w * time + u), 0.3 * w * np.cos(w * time + u), -0.3 * w**2 * np.sin(w * time + u)
 
 
-def drives(**config):
-    model = DriveModel(load_robot("irb1200"), 7.0, PERIOD, DriveModelConfig(**config))
+def drives(takes_torque=True, **config):
+    belief = ControllerModel(load_robot("irb1200"), 7.0, PERIOD, takes_torque=takes_torque)
+    model = DriveModel(belief, DriveModelConfig(**config))
     memory = model.layout.view(np.zeros(model.layout.size))
     model.start(memory)
     return model, memory

@@ -1,0 +1,20 @@
+"""What the self-calibrating law knows beforehand and may do."""
+
+from dataclasses import dataclass, field
+
+from systems.estimation.drive_model import DriveModelConfig
+from systems.estimation.probe import ProbeConfig
+from systems.estimation.tip_estimator import TipEstimatorConfig
+from systems.servo.law_config import LawConfig
+
+
+@dataclass
+class SelfCalibratingConfig(LawConfig):
+    """What the law knows beforehand and may do; read from a scenario file."""
+
+    drive: str = "cascade"
+    estimator: TipEstimatorConfig = field(default_factory=TipEstimatorConfig)
+    drives: DriveModelConfig = field(default_factory=DriveModelConfig)
+    probe: ProbeConfig = field(default_factory=ProbeConfig)
+    lead_frequency: float = 30.0  # rad/s, at most, with which parameters follow their estimate
+    lead_acceleration: float = 0.5  # m/s^2, at most, that this gives the tip

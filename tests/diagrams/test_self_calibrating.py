@@ -1,0 +1,59 @@
+"""The self-calibrating law against the simulated station: from a nominal robot onto the path."""
+
+import numpy as np
+import pytest
+
+from diagrams.runs.simulation import Experiment, run
+from diagrams.scenario.scenario import load_scenario
+from robots.pose import pose_error
+
+WRONG = [  # what the controller believes of springs and load
+    "servo.model.payload=6.65",
+    "servo.model.stiffness=[1.2]",
+    "servo.model.structure=1.2",
+]
+
+
+def tip_errors(log) -> tuple[np.ndarray, np.ndarray]:
+    """Distances of the true tip from the path in m, on the path and at rest in the end."""
+    errors = np.linalg.norm(pose_error(log.X_WE_desired, log.X_WE_true)[:, 3:], axis=1)
+    return errors[log.time >= log.path_start], errors[log.time >= log.path_end - 0.5]
+
+
+def test_the_tip_comes_onto_the_path_before_it_begins():
+    settings = ["station.elasticity=structure", *WRONG, "reference.settle=3"]
+    experiment = Experiment(load_scenario("misaligned", settings), "self_calibrating")
+    experiment.advance(until=4.5)
+    log = experiment.log()
+    errors = np.linalg.norm(pose_error(log.X_WE_desired, log.X_WE_true)[:, 3:], axis=1)
+    assert errors[0] > 10e-3
+    assert errors[log.time >= 3.0].max() < 0.15e-3
+    assert not any(log.guard_counts.values())
+
+
+def test_the_same_seed_gives_the_same_commands():
+    scenario = load_scenario("misaligned", ["reference.settle=2"])
+    commands = []
+    for _ in range(2):
+        experiment = Experiment(scenario, "self_calibrating")
+        experiment.advance(until=1.2)
+        commands.append(experiment.log().position_command)
+    assert np.array_equal(*commands)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("name", "settings", "moving"),
+    [
+        ("misaligned", ["station.drive.dead_time=0.003", "servo.model.command_delay=0.004"], 0.05e-3),
+        ("dead-time", ["station.drive.dead_time=0.139", "servo.model.command_delay=0.14"], 0.08e-3),
+        ("cell", ["station.drive.command_delay=0.007032", "servo.model.command_delay=0.004032"], 0.05e-3),
+    ],
+)
+def test_a_lap_from_a_nominal_robot(name, settings, moving):
+    scenario = load_scenario(name, ["station.elasticity=structure", *WRONG, *settings])
+    log = run(scenario, "self_calibrating")
+    on_path, at_rest = tip_errors(log)
+    assert on_path.max() < moving
+    assert at_rest.mean() < 0.005e-3
+    assert not any(log.guard_counts.values())
