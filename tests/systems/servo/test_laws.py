@@ -233,7 +233,7 @@ def test_a_pose_out_of_reach_gives_no_command_and_the_law_goes_on_when_it_return
     np.testing.assert_allclose(rig.tick(), joints_at(HOME), atol=1e-6)
 
 
-@pytest.mark.parametrize("law", LAWS)
+@pytest.mark.parametrize("law", [law for law in LAWS if law != "self_calibrating"])  # it has no gains
 @pytest.mark.parametrize("label", ["translation", "rotation", "correction_limit", "correction_limit_deg"])
 def test_refuses_gains_and_limits_that_are_not_positive(law: str, label: str):
     config = LawConfig()
