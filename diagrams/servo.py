@@ -6,8 +6,9 @@ from pydrake.systems.primitives import Adder, ConstantVectorSource
 from diagrams.scenario.controller_model import controller_model
 from diagrams.scenario.scenario import Scenario
 from robots.description.model import NUM_JOINTS, RobotModel
+from systems.controller_model import ControllerModel
 from systems.feedforward import FEEDFORWARDS
-from systems.guard.guard import CommandGuard
+from systems.guard.guard import CommandGuard, GuardConfig
 from systems.reference.reference import Reference
 from systems.servo import LAWS, LawConfig
 from systems.servo.contract import SIZES, check_ports, law_traits
@@ -55,10 +56,12 @@ class Servo(Diagram):
         self.traits = law_traits(law)
         config = law_config(scenario, law)
         self.drive = config.drive
-        self.law = law(self.model, config, scenario.servo.guard) if isinstance(law, type) else law
+        self.law = _built(law, self.model, config, scenario.servo.guard) if isinstance(law, type) else law
         check_ports(self.law)
         builder = DiagramBuilder()
         self.reference = builder.AddNamedSystem("reference", Reference(scenario.reference, self.model.period))
+        if hasattr(self.law, "check_path"):
+            self.law.check_path(self.reference.path)
         builder.AddNamedSystem("law", self.law)
         feedforward = scenario.servo.feedforward
         self.has_torque = feedforward.kind != "none" or self.law.HasOutputPort("torque_feedforward")
@@ -87,7 +90,7 @@ class Servo(Diagram):
             if self.law.HasOutputPort(name):
                 commands[name] = self.law.GetOutputPort(name)
         if feedforward.kind != "none":
-            model = FEEDFORWARDS[feedforward.kind](self.model, feedforward)
+            model = FEEDFORWARDS.find(feedforward.kind)(self.model, feedforward)
             ahead = builder.AddNamedSystem("feedforward", model)
             builder.ConnectInput(joints, ahead.GetInputPort("joint_sample"))
             self._add_feedforward(builder, ahead, commands)
@@ -161,3 +164,14 @@ def law_name(law: str | type[System] | System) -> str:
     if isinstance(law, str):
         return law
     return law.__name__ if isinstance(law, type) else type(law).__name__
+
+
+def _built(law: type[System], model: ControllerModel, config: LawConfig, guard: GuardConfig) -> System:
+    """The law's system. Raises ValueError if the class is not made as a law is."""
+    try:
+        built = law(model, config, guard)
+    except TypeError as error:
+        raise ValueError(f"law {law.__name__}: {' '.join(str(error).split())}") from error
+    if not isinstance(built, System):
+        raise ValueError(f"law {law.__name__}: it must be a LeafSystem or a Diagram")
+    return built

@@ -229,7 +229,8 @@ def _check(scenario: Scenario) -> None:
         _in_range("station.drive.payload", scenario.station.drive.payload, _RANGES["station.payload"])
     _check_model(scenario.servo.model)
     LAWS.find(scenario.law)
-    _one_of("servo.feedforward.kind", scenario.servo.feedforward.kind, ("none", *FEEDFORWARDS))
+    if scenario.servo.feedforward.kind != "none":
+        FEEDFORWARDS.find(scenario.servo.feedforward.kind)
     _one_of("station.kind", scenario.station.kind, STATIONS)
     _one_of("station.camera.kind", scenario.station.camera.kind, CAMERAS)
     _one_of("station.interface", scenario.station.interface, ("direct", "egm"))

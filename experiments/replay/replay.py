@@ -16,7 +16,7 @@ from diagrams.record.log import RunLog
 from experiments.metrics.run_metrics import known_poses, path_window
 from experiments.replay.scene import FRAME_RATE, RobotPicture, draw_frame, draw_path, open_meshcat, rgba
 from experiments.report.files import write_text
-from experiments.report.style import WANTED_COLOR, law_colors, law_title
+from experiments.report.style import WANTED_COLOR, law_colors, law_file_name, law_title
 from robots.description.geometric_errors import GeometricErrors
 from robots.description.model import RobotModel
 from robots.pose import pose_error
@@ -64,13 +64,13 @@ def write_replay(
     _animate(animation, "wanted/frame", shown.time, shown.X_WE_desired, times)
     for law, log in logs.items():
         X_WE = known_poses(log)
-        p_WE = X_WE[path_window(log), :3, 3]
-        draw_path(meshcat, f"{law}/path", p_WE, PATH_RADIUS, rgba(colors[law]))
+        p_WE, place = X_WE[path_window(log), :3, 3], law_file_name(law)
+        draw_path(meshcat, f"{place}/path", p_WE, PATH_RADIUS, rgba(colors[law]))
         if law == shown_law:
-            draw_frame(meshcat, f"{law}/tip", length=0.1, radius=0.003, alpha=1.0)
+            draw_frame(meshcat, f"{place}/tip", length=0.1, radius=0.003, alpha=1.0)
         else:
-            meshcat.SetObject(f"{law}/tip", Sphere(TIP_RADIUS), rgba(colors[law]))
-        _animate(animation, f"{law}/tip", log.time, X_WE, times)
+            meshcat.SetObject(f"{place}/tip", Sphere(TIP_RADIUS), rgba(colors[law]))
+        _animate(animation, f"{place}/tip", log.time, X_WE, times)
     animation.set_loop_mode(MeshcatAnimation.LoopMode.kLoopRepeat)
     meshcat.PublishRecording()
     write_text(path, _with_legend(meshcat.StaticHtml(), colors, shown_law))

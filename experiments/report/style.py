@@ -1,5 +1,6 @@
 """How laws look and what they are called, the same in the table, the report and the replay."""
 
+import re
 from collections.abc import Iterable
 
 from systems.servo import LAWS
@@ -25,6 +26,11 @@ def law_colors(laws: Iterable[str]) -> dict[str, str]:
             unknown += 1
         colors[law] = colour
     return colors
+
+
+def law_file_name(law: str) -> str:
+    """The name of a law without what a file or a path in a scene cannot have."""
+    return re.sub(r"[^\w-]+", "_", law)
 
 
 def _traits(law: str) -> LawTraits:

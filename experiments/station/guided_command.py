@@ -17,6 +17,7 @@ from experiments.cli.console import count, progress_bar
 from experiments.cli.prepare import Prepared
 from experiments.cli.workers import SimulationError
 from experiments.report.files import write_json
+from experiments.report.style import law_file_name
 from experiments.station.guided import compare_on_station
 
 
@@ -87,7 +88,7 @@ def guide(
         (law, n, record) for law, all_ in comparison.records.items() for n, record in enumerate(all_, 1)
     ]
     for law, number, record in records:
-        write_log(stage / f"{law}-{number}.npz", record)
+        write_log(stage / f"{law_file_name(law)}-{number}.npz", record)
     print_link(console, link)
     console.print("Counts, delays and clocks of the wire are in link.json, whole logs in *.npz")
     for law, _, record in records:

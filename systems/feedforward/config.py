@@ -17,7 +17,7 @@ class CorrectionConfig:
 class FeedforwardConfig:
     """Which inverse model runs beside the law; read from a scenario file."""
 
-    kind: str = "none"  # none, rigid, flexible_joint or elastic_structure
+    kind: str = "none"  # none, rigid, flexible_joint, elastic_structure or FILE.py:CLASS
     # By which shares stiffness and damping, and masses and inertias, of the model are above the robot's.
     stiffness_error: float = 0.0
     inertia_error: float = 0.0

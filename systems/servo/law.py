@@ -17,6 +17,7 @@ from robots.kinematics.forward import robust_solve, rotation_about
 from robots.pose import Rows, error_of_rows
 from systems.controller_model import ControllerModel
 from systems.guard.guard import GuardConfig
+from systems.reference.paths import CartesianPath
 from systems.samples import JointSample, PoseSample
 from systems.servo.law_config import LawConfig
 
@@ -133,6 +134,9 @@ class ServoLaw(LeafSystem):
         ):
             self.DeclareStateOutputPort(name, state)
         self.DeclarePeriodicDiscreteUpdateEvent(period, 0.0, self._tick)
+
+    def check_path(self, path: CartesianPath) -> None:
+        """Refuses a path that the law cannot follow. Raises ValueError."""
 
     def initial_state(self, moment: LawInput) -> np.ndarray:
         """The memory with which the law begins; where a law says nothing else, the measured positions."""

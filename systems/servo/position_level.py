@@ -4,20 +4,67 @@ import math
 
 import numpy as np
 
-from robots.pose import Rows, angular_velocity, euler_difference, euler_rates, rotation_rows, zyx_angles
+from robots.description.model import NUM_JOINTS
+from robots.kinematics.forward import rotation_about
+from robots.pose import Rows, error_of_rows, rotation_vector
+from systems.controller_model import ControllerModel
+from systems.guard.guard import GuardConfig
+from systems.reference.paths import CartesianPath
+from systems.servo.euler_correction import EulerCorrection
 from systems.servo.law import LawInput, LawOutput, ServoLaw
+from systems.servo.law_config import LawConfig
+
+_TURN, _SHIFT, _JOINTS = slice(0, 3), slice(3, 6), slice(6, 24)
+
+
+class RotationVectorCorrection:
+    """The correction C of the orientation as a rotation, R_WC = R_WD C, without a singular orientation.
+
+    With e the rotation vector of R_WE^T R_WD, in the axes of the tool, C goes on to C exp(K e~ dt). Where a
+    constant turn D of the tool is all that is wrong, R_WE = R_WC D, each step shrinks e by K dt of itself,
+    however large it is. C is kept as its rotation vector in rad.
+    """
+
+    def initial(self, X_WE: Rows, X_WD: Rows) -> np.ndarray:
+        """The correction with which the command is X_WE, shape (3,)."""
+        return -_error_in_tool(X_WD, X_WE)
+
+    def check_path(self, path: CartesianPath) -> None:
+        """Any path will do."""
+
+    def rate(self, X_WD: Rows, X_WE: Rows) -> np.ndarray:
+        """e in rad, shape (3,)."""
+        return _error_in_tool(X_WD, X_WE)
+
+    def moved(self, turn: np.ndarray, step: np.ndarray) -> np.ndarray:
+        """The correction after a small turn (rad) on top of it."""
+        return rotation_vector(_exp(turn) @ _exp(step))
+
+    def command(
+        self, turn: np.ndarray, rate: np.ndarray, R_WD: np.ndarray, w_WD: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Orientation and angular velocity to command, and the correction as a rotation vector in the world.
+
+        Args:
+            turn: the correction.
+            rate: K e in rad/s.
+            R_WD, w_WD: wanted orientation and angular velocity in rad/s.
+        """
+        R_WC = R_WD @ _exp(turn)
+        return R_WC, w_WD + R_WC @ rate, R_WD @ turn
 
 
 class PositionLevel(ServoLaw):
     """Commands q(z_d + c) with dc/dt = K (z_d - z_m), Probst (2024) eqs. (5.18), (5.19).
 
     Corrected: c starts at minus the initial error, so that the first command is where the robot stands
-    (the source adds the error and jumps by twice of it), and Euler angle differences are wrapped.
+    (the source adds the error and jumps by twice of it), and c turns the tool by a rotation and integrates
+    rotation vectors, where the source has Euler angles. With ``angles: euler`` it has them too, differences
+    wrapped, and refuses paths near their singular orientation.
     The initial error is taken from the nominal kinematics, because that is what makes the start smooth
     also for a robot whose geometry is wrong. The correction is limited.
 
-    The memory holds c (Euler angles alpha, beta, gamma in rad, then the position in m) and the joints of the
-    last tick.
+    The memory holds c (orientation in rad, then the position in m) and the joints of the last tick.
     """
 
     title = "Position level"
@@ -25,47 +72,71 @@ class PositionLevel(ServoLaw):
     is_compared = True
     memory_size = 24
 
+    def __init__(self, model: ControllerModel, config: LawConfig, guard: GuardConfig) -> None:
+        """Checks the configuration.
+
+        Raises:
+            ValueError: as `ServoLaw`; also if ``angles`` is unknown.
+        """
+        super().__init__(model, config, guard)
+        if config.angles not in _CORRECTIONS:
+            raise ValueError(
+                f"position_level: angles must be one of {', '.join(_CORRECTIONS)}, got '{config.angles}'"
+            )
+        self._orientation = _CORRECTIONS[config.angles]()
+
+    def check_path(self, path: CartesianPath) -> None:
+        """Refuses a path whose orientations the form of the correction has not. Raises ValueError."""
+        self._orientation.check_path(path)
+
     def initial_state(self, moment: LawInput) -> np.ndarray:
         """c at minus the initial error, the joints where they are measured."""
         rows, _ = self.kinematics.rows_and_jacobian(moment.position)
-        return np.concatenate([_euler_difference(rows, moment.X_WD), moment.position, np.zeros(12)])
+        shift = [row[3] - wanted[3] for row, wanted in zip(rows, moment.X_WD, strict=True)]
+        turn = self._orientation.initial(rows, moment.X_WD)
+        return np.concatenate([turn, shift, moment.position, np.zeros(2 * NUM_JOINTS)])
 
     def step(self, moment: LawInput, memory: np.ndarray) -> LawOutput:
         """Integrates the correction and commands the joints for the corrected pose."""
-        c, rate = memory[:6].tolist(), [0.0] * 6
+        turn, shift = memory[_TURN], memory[_SHIFT]
+        turning = moving = np.zeros(3)
         if moment.measured is not None:
-            difference = _euler_difference(*moment.measured)
-            rate = [gain * part for gain, part in zip(self.gains, difference, strict=True)]
-        c = self._limited([part + self.period * speed for part, speed in zip(c, rate, strict=True)])
-        turn, shift = c[:3], c[3:]
-
-        wanted_zyx = zyx_angles(moment.X_WD)
-        zyx = [a + b for a, b in zip(wanted_zyx, turn, strict=True)]
-        X_WC = [
-            (*axes, row[3] + way)
-            for axes, row, way in zip(rotation_rows(zyx), moment.X_WD, shift, strict=True)
-        ]
-        *wanted_w, x, y, z = moment.V_WD
-        *turning, dx, dy, dz = rate
-        zyx_rates = [a + b for a, b in zip(turning, euler_rates(wanted_zyx, wanted_w), strict=True)]
-        V_WC = (*angular_velocity(zyx, zyx_rates), x + dx, y + dy, z + dz)
-        joints = self.joints_at(X_WC, V_WC, memory[6:])
-        correction = np.array([*angular_velocity(zyx, turn), *shift])
-        return LawOutput(joints[:6], joints[6:12], correction, np.concatenate([c, joints]))
-
-    def _limited(self, correction: list[float]) -> list[float]:
-        """A correction, angle and length cut to their limits."""
-        limited = []
-        for part, limit in (
-            (correction[:3], self.angle_limit),
-            (correction[3:], self.config.correction_limit),
-        ):
-            size = math.hypot(*part)
-            limited += part if size <= limit else [limit / size * value for value in part]
-        return limited
+            wanted, seen = moment.measured
+            turning = self.config.rotation * self._orientation.rate(wanted, seen)
+            moving = self.config.translation * np.array(
+                [a[3] - b[3] for a, b in zip(wanted, seen, strict=True)]
+            )
+            turn = self._orientation.moved(turn, self.period * turning)
+            shift = shift + self.period * moving
+        turn = _limited(turn, self.angle_limit)
+        shift = _limited(shift, self.config.correction_limit)
+        X_WD, V_WD = np.array(moment.X_WD), np.array(moment.V_WD)
+        R_WC, w_WC, correction = self._orientation.command(turn, turning, X_WD[:, :3], V_WD[:3])
+        X_WC = np.column_stack([R_WC, X_WD[:, 3] + shift]).tolist()
+        joints = self.joints_at(X_WC, [*w_WC.tolist(), *(V_WD[3:] + moving).tolist()], memory[_JOINTS])
+        return LawOutput(
+            joints[:6],
+            joints[6:12],
+            np.concatenate([correction, shift]),
+            np.concatenate([turn, shift, joints]),
+        )
 
 
-def _euler_difference(X_WD: Rows, X_WE: Rows) -> list[float]:
-    """z_d - z with wrapped angles (alpha, beta, gamma) in rad, then the position in m, eq. (5.10)."""
-    angles = euler_difference(zyx_angles(X_WD), zyx_angles(X_WE))
-    return [*angles, *(wanted[3] - seen[3] for wanted, seen in zip(X_WD, X_WE, strict=True))]
+_CORRECTIONS = {"rotation_vector": RotationVectorCorrection, "euler": EulerCorrection}
+
+
+def _error_in_tool(X_WD: Rows, X_WE: Rows) -> np.ndarray:
+    """The rotation vector of R_WE^T R_WD, (3,) in rad: the error's in the axes of the tool."""
+    return np.array(error_of_rows(X_WD, X_WE)[:3]) @ np.array(X_WE)[:, :3]
+
+
+def _exp(turn: np.ndarray) -> np.ndarray:
+    """The rotation matrix of a rotation vector in rad."""
+    angle = math.sqrt(float(turn @ turn))
+    return rotation_about(turn / (angle or 1.0), angle)
+
+
+def _limited(correction: np.ndarray, limit: float) -> np.ndarray:
+    """A correction, cut to its limit in angle or length."""
+    size = math.sqrt(float(correction @ correction))
+    return correction if size <= limit else limit / size * correction

@@ -1,0 +1,168 @@
+"""A law of one's own: the tutorial as printed, any system with the ports, and what is refused."""
+
+import json
+import re
+from pathlib import Path
+
+import numpy as np
+import pytest
+from pydrake.common.value import Value
+from pydrake.systems.framework import Context, DiagramBuilder, DiscreteValues, LeafSystem
+
+from diagrams.runs.simulation import Experiment
+from diagrams.scenario.scenario import load_scenario
+from experiments.metrics.run_metrics import error_metrics
+from robots.dynamics.newton_inverse import inverse_kinematics
+from robots.kinematics.forward import Kinematics
+from systems.controller_model import ControllerModel
+from systems.guard.guard import GuardConfig
+from systems.reference.reference import PathAhead
+from systems.samples import JointSample, PoseSample
+from systems.servo import LAWS, LawConfig
+from tests.experiments.commands import SHORT, files, refusal, truetip
+
+TUTORIAL = Path(__file__).resolve().parents[2] / "docs" / "own_law.md"
+LONG_ENOUGH = ["reference.path=circle", "reference.acceleration=8", "reference.settle=1", "reference.dwell=1"]
+
+
+def printed() -> str:
+    (code,) = re.findall(r"```python\n(.*?)```", TUTORIAL.read_text(), re.S)
+    return code
+
+
+@pytest.fixture
+def my_law(tmp_path: Path) -> str:
+    (tmp_path / "my_law.py").write_text(printed())
+    return f"{tmp_path / 'my_law.py'}:MyLaw"
+
+
+def refused(tmp_path: Path, text: str, name: str = "Mine") -> str:
+    """The line that refuses a law in a file with this text."""
+    (tmp_path / "mine.py").write_text(text)
+    out = tmp_path / "out"
+    line = refusal(truetip("run", f"--law={tmp_path / 'mine.py'}:{name}", *SHORT, f"--out={out}"))
+    assert not out.exists()
+    return line
+
+
+def test_the_printed_law_is_short_and_brings_the_tip_where_the_open_loop_does_not(my_law: str):
+    assert len(printed().splitlines()) <= 40
+    scenario = load_scenario("misaligned", LONG_ENOUGH)
+    static = {}
+    for law in ("open_loop", my_law):
+        experiment = Experiment(scenario, law)
+        experiment.advance()
+        static[law] = np.linalg.norm(error_metrics(experiment.log(), "true")["static_mm"])
+    assert static["open_loop"] > 10.0
+    assert static[my_law] < 0.5  # five time constants of its gain of 4 /s, 50 um of noise
+
+
+def test_run_and_compare_take_it_beside_the_shipped_ones(my_law: str, tmp_path: Path):
+    arguments = [f"--laws=open_loop,{my_law}", "--quick", *SHORT, f"--out={tmp_path / 'out'}"]
+    result = truetip("compare", *arguments, "--json=-", "--jobs=1")
+    assert result.exit_code == 0, result.output
+    runs = json.loads(result.stdout)["runs"]
+    assert list(runs) == ["open_loop", my_law]
+    assert len(runs[my_law]["true"]["static_deg"]) == 3
+    report = (tmp_path / "out" / "report.html").read_text()
+    assert "My law" in report
+    assert "#7a5195" in report
+    alone = truetip("run", f"--law={my_law}", *SHORT, f"--out={tmp_path / 'alone'}")
+    assert alone.exit_code == 0, alone.output
+    assert "summary.json" in files(tmp_path / "alone")
+
+
+class Bare(LeafSystem):
+    """Nothing but the six ports: joints for the wanted pose of the path ahead, by analytic inverse."""
+
+    uses_camera = False
+
+    def __init__(self, model: ControllerModel, config: LawConfig, guard: GuardConfig) -> None:
+        super().__init__()
+        self._model, self._inverse = model, inverse_kinematics(model.robot, model.payload)
+        self._kinematics = Kinematics(model.robot)
+        self._ahead = self.DeclareAbstractInputPort("reference", Value[object]())
+        self._joints = self.DeclareAbstractInputPort("joint_sample", Value(JointSample()))
+        for name in ("position_command", "velocity_command"):
+            self.DeclareStateOutputPort(name, self.DeclareDiscreteState(np.full(6, np.nan)))
+        self.DeclarePeriodicDiscreteUpdateEvent(model.period, 0.0, self._tick)
+
+    def _tick(self, context: Context, discrete_state: DiscreteValues) -> None:
+        path: PathAhead = self._ahead.Eval(context)
+        X, V, _ = path.sample(np.array([context.get_time() + self._model.preview]))
+        last = discrete_state.get_vector(0).value()
+        q = self._inverse.nearest(X[0], self._joints.Eval(context).position if np.isnan(last[0]) else last)
+        discrete_state.set_value(0, q)
+        discrete_state.set_value(1, np.linalg.solve(self._kinematics.jacobian(q), V[0]))
+
+
+def test_any_system_with_the_ports_is_a_law_made_already_or_as_a_class_or_in_a_diagram():
+    scenario = load_scenario("misaligned", [s.removeprefix("--set=") for s in SHORT])
+    shipped = Experiment(scenario, "open_loop")
+    shipped.advance(until=1.0)
+    model = shipped.servo.model
+    builder = DiagramBuilder()
+    inside = builder.AddSystem(Bare(model, LawConfig(), GuardConfig()))
+    for index in range(inside.num_input_ports()):
+        port = inside.get_input_port(index)
+        builder.ExportInput(port, port.get_name())
+    for index in range(inside.num_output_ports()):
+        port = inside.get_output_port(index)
+        builder.ExportOutput(port, port.get_name())
+    builder.ExportInput(builder.AddSystem(BlindEye()).get_input_port(), "pose_sample")
+    for law in (Bare, Bare(model, LawConfig(), GuardConfig()), builder.Build()):
+        experiment = Experiment(scenario, law)
+        experiment.advance(until=1.0)
+        commands = experiment.log().position_command[1:]
+        assert commands == pytest.approx(shipped.log().position_command[1:], abs=1e-8)
+
+
+class BlindEye(LeafSystem):
+    """A diagram has no traits of its own, so it uses the camera: this one looks at it, and no more."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.DeclareAbstractInputPort("pose_sample", Value(PoseSample()))
+
+
+def test_what_is_no_law_is_refused_in_one_line(tmp_path: Path):
+    assert "there is no file nowhere.py" in refusal(truetip("run", "--law=nowhere.py:Mine", *SHORT))
+    assert "FILE.py:CLASS, got 'mpc'" in refusal(truetip("compare", "--laws=open_loop,mpc", *SHORT))
+    assert "'pbvs' is there twice" in refusal(truetip("compare", "--laws=pbvs,pbvs", *SHORT))
+    assert "has no class 'Mine'" in refused(tmp_path, "x = 1\n")
+
+
+@pytest.mark.parametrize(
+    ("text", "why"),
+    [
+        ("def broken(:\n", "SyntaxError"),
+        ("import nothing_of_that_name\n", "ModuleNotFoundError: No module named 'nothing_of_that_name'"),
+        (
+            "from pydrake.systems.primitives import Adder\n"
+            "class Mine(Adder):\n    def __init__(self, *_): super().__init__(2, 6)\n",
+            "law Mine: input port 'joint_sample' is missing",
+        ),
+        (
+            "from systems.servo.open_loop import OpenLoop\n"
+            "class Mine(OpenLoop):\n"
+            "    def __init__(self, *a):\n        super().__init__(*a)\n"
+            "        self.DeclareVectorInputPort('crystal_ball', 1)\n",
+            "nothing for input port 'crystal_ball'",
+        ),
+        (
+            "from systems.servo.open_loop import OpenLoop\nclass Mine(OpenLoop):\n    Config = dict\n",
+            "Config must be a dataclass that extends LawConfig",
+        ),
+        ("class Mine:\n    pass\n", "Mine"),
+    ],
+    ids=["syntax", "import", "missing port", "unknown port", "config", "no system"],
+)
+def test_a_file_that_cannot_be_used_is_refused_in_one_line(tmp_path: Path, text: str, why: str):
+    assert why in refused(tmp_path, text)
+
+
+def test_every_shipped_law_says_what_it_is():
+    for name, law in LAWS.items():
+        assert LAWS.name_of(law) == name
+        assert law.title != "Law"
+        assert re.fullmatch("#[0-9a-f]{6}", law.colour)
