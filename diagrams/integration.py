@@ -3,8 +3,10 @@
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
-from pydrake.systems.analysis import ApplySimulatorConfig, Simulator, SimulatorConfig
+from pydrake.systems.analysis import ApplySimulatorConfig, GetIntegrationSchemes, Simulator, SimulatorConfig
 from pydrake.systems.framework import Context
+
+from robots.configuration.quantity import choice, quantity
 
 # Beyond this rate the explicit runge_kutta3 with its tiny steps takes longer than the implicit radau3.
 _EXPLICIT_RATE_LIMIT = 4000.0  # 1/s
@@ -26,9 +28,10 @@ class IntegratorConfig:
     that the tip is right to less than a micrometre, as the bench shows.
     """
 
-    scheme: str = "auto"  # or any name of Drake's GetIntegrationSchemes
-    accuracy: float | None = None
-    max_step: float | None = None  # s
+    # Or any name of Drake's GetIntegrationSchemes
+    scheme: str = choice("auto", lambda: ("auto", *GetIntegrationSchemes()))
+    accuracy: float | None = quantity(None, 1e-12, 1e-1)
+    max_step: float | None = quantity(None, 1e-6, 0.1, "s")
 
 
 @dataclass(frozen=True)

@@ -4,7 +4,9 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from robots.configuration.quantity import choice, numbers, quantity
 from robots.description.model import RobotModel
+from robots.dynamics.plant import ELASTICITIES
 
 
 @dataclass(frozen=True)
@@ -34,10 +36,10 @@ class ControllerModel:
 class Mismatch:
     """Random deviations of the belief from the station, uniform within +- the share; the seed draws them."""
 
-    stiffness: float = 0.0  # of every spring: gears, bearings, beams
-    payload: float = 0.0  # of its mass
-    friction: float = 0.0  # of every joint
-    seed: int = 0
+    stiffness: float = quantity(0.0, 0.0, 0.9)  # of every spring: gears, bearings, beams
+    payload: float = quantity(0.0, 0.0, 0.9)  # of its mass
+    friction: float = quantity(0.0, 0.0, 0.9)  # of every joint
+    seed: int = quantity(0, 0, 2**32 - 1)
 
 
 @dataclass
@@ -45,12 +47,12 @@ class ControllerModelConfig:
     """What the controller believes, as a scenario says it; what is left empty is as in the station."""
 
     robot: str = ""  # a shipped robot or the path of a robot file
-    payload: float | None = None  # kg
-    payload_centre_mm: list[float] = field(default_factory=list)  # three, in the frame of the flange
-    camera_delay: float | None = None  # s
-    command_delay: float | None = None  # s, transport and dead time
-    stiffness: list[float] = field(default_factory=list)  # of the gears: one factor, or six
-    structure: float | None = None  # one factor of all bearings and beams
-    friction: list[float] = field(default_factory=list)  # one factor, or six
-    elasticity: str = ""  # rigid, joints or structure
+    payload: float | None = quantity(None, 0.0, 1000.0, "kg")
+    payload_centre_mm: list[float] = numbers((), (0, 3), unit="mm")  # three, in the frame of the flange
+    camera_delay: float | None = quantity(None, 0.0, 1.0, "s")
+    command_delay: float | None = quantity(None, 0.0, 1.0, "s")  # transport and dead time
+    stiffness: list[float] = numbers((), (0, 1, 6), 0.01, 100.0)  # of the gears: one factor, or six
+    structure: float | None = quantity(None, 0.01, 100.0)  # one factor of all bearings and beams
+    friction: list[float] = numbers((), (0, 1, 6), 0.01, 100.0)  # one factor, or six
+    elasticity: str = choice("", ("", *ELASTICITIES))  # rigid, joints or structure
     mismatch: Mismatch = field(default_factory=Mismatch)

@@ -77,21 +77,14 @@ def _believed_robot(
 ) -> RobotModel:
     """The robot with the believed springs, friction and payload."""
     structure = 1.0 if config.structure is None else config.structure
-    try:
-        factors = Factors(
-            gears=draw.gears * _per_joint("stiffness", config.stiffness),
-            bearings=draw.bearings * structure,
-            beams=draw.beams * structure,
-            friction=draw.friction * _per_joint("friction", config.friction),
-        )
-    except ValueError as error:
-        raise ScenarioError(f"servo.model: {error}") from error
+    factors = Factors(
+        gears=draw.gears * _per_joint(config.stiffness),
+        bearings=draw.bearings * structure,
+        beams=draw.beams * structure,
+        friction=draw.friction * _per_joint(config.friction),
+    )
     limits = robot.payload
     if config.payload_centre_mm:
-        if len(config.payload_centre_mm) != 3:
-            raise ScenarioError(
-                f"servo.model.payload_centre_mm must be three numbers, got {config.payload_centre_mm}"
-            )
         limits = replace(limits, center_of_mass=1e-3 * np.array(config.payload_centre_mm))
     is_own = config.payload is not None or config.mismatch.payload > 0.0
     if is_own and payload > limits.largest_mass > 0.0:
@@ -101,8 +94,6 @@ def _believed_robot(
     return varied(replace(robot, payload=limits), factors)
 
 
-def _per_joint(name: str, given: list[float]) -> np.ndarray:
-    """Factors of the joints, shape (6,), from one or six."""
-    if len(given) not in (0, 1, NUM_JOINTS):
-        raise ScenarioError(f"servo.model.{name} must be one factor or {NUM_JOINTS}, got {given}")
+def _per_joint(given: list[float]) -> np.ndarray:
+    """Factors of the joints, shape (6,), from none, one or six."""
     return np.ones(NUM_JOINTS) * (given or [1.0])

@@ -1,25 +1,24 @@
 """The one configuration of an experiment, read from YAML and checked before anything is built."""
 
-import math
-from collections.abc import Collection
-from dataclasses import dataclass, field, fields, is_dataclass
-from typing import Any
+from dataclasses import dataclass, field
 
 import numpy as np
-from pydrake.common.yaml import yaml_dump, yaml_load_typed
-from pydrake.systems.analysis import GetIntegrationSchemes
+from pydrake.common.yaml import yaml_dump_typed
 
 from diagrams.integration import IntegratorConfig
-from diagrams.scenario.scenario_file import ScenarioError, conformed, one_line, read_tree, shipped_scenarios
+from diagrams.scenario.scenario_file import ScenarioError, read_scenario_nodes, shipped_scenarios
+from robots.configuration.nodes import ConfigurationError
+from robots.configuration.quantity import choice, numbers, quantity
+from robots.configuration.typed import typed
 from robots.description.geometric_errors import GeometricErrors
 from robots.description.model import NUM_JOINTS, Placement
 from robots.dynamics.plant import ELASTICITIES
-from systems.cell.drive import KINDS, DriveConfig
+from systems.cell.drive import DriveConfig
 from systems.cell.encoders import EncoderConfig
 from systems.cell.events.station_events import StationEvent
 from systems.cell.marker_camera import MarkerCameraConfig
-from systems.cell.network_faults import SHARES, FaultConfig
-from systems.cell.pose_camera import CAMERAS, CameraConfig
+from systems.cell.network_faults import FaultConfig
+from systems.cell.pose_camera import CameraConfig
 from systems.controller_model import ControllerModelConfig
 from systems.feedforward import FEEDFORWARDS, FeedforwardConfig
 from systems.guard.guard import GuardConfig
@@ -47,13 +46,15 @@ class LinkConfig:
     """Where the controller and the camera of a real station are, and what to do when they fall silent."""
 
     address: str = "127.0.0.1"  # of this machine, to listen on for the controller
-    port: int = 6510  # where the controller sends its messages
+    port: int = quantity(6510, 0, 65535)  # where the controller sends its messages
     controller: str = ""  # its address; empty to take whoever speaks first
-    connect: float = 10.0  # s to wait for controller and camera
-    break_after: float = 0.1  # s of silence after which the controller counts as gone
-    on_break: str = "end"  # what a run does then, or when the controller stops: end, or resume
-    resume_within: float = 10.0  # s in which it must be back
-    signal_port: int = 0  # of this machine, where test signals arrive; 0 for none
+    connect: float = quantity(10.0, 0.1, 3600.0, "s")  # to wait for controller and camera
+    # Silence after which the controller counts as gone
+    break_after: float = quantity(0.1, 0.01, 10.0, "s")
+    # What a run does then, or when the controller stops: end, or resume
+    on_break: str = choice("end", ("end", "resume"))
+    resume_within: float = quantity(10.0, 0.1, 3600.0, "s")  # in which it must be back
+    signal_port: int = quantity(0, 0, 65535)  # of this machine, where test signals arrive; 0 for none
     signals: SignalLayout = field(default_factory=SignalLayout)
     has_camera: bool = True
     camera: MocapReceiverConfig = field(default_factory=MocapReceiverConfig)
@@ -65,20 +66,22 @@ class LinkConfig:
 class Variation:
     """By how much springs and friction of the true robot are off its drawing: drawn within +- the shares."""
 
-    stiffness: float = 0.0  # of each gear, bearing and beam
-    friction: float = 0.0  # viscous and Coulomb, of each joint
-    seed: int = 0
+    stiffness: float = quantity(0.0, 0.0, 0.9)  # of each gear, bearing and beam
+    friction: float = quantity(0.0, 0.0, 0.9)  # viscous and Coulomb, of each joint
+    seed: int = quantity(0, 0, 2**32 - 1)
 
 
 @dataclass
 class StationConfig:
     """The robot cell: what the controller does not see, and what it is connected to."""
 
-    kind: str = "simulated"  # or egm: a controller and a camera at the addresses of ``link``
-    period: float = 4e-3  # s, between two commands and between two joint samples
-    elasticity: str = "joints"  # of the true robot: rigid, joints or structure
-    payload: float = 0.0  # kg at the flange
-    payload_centre_mm: list[float] = field(default_factory=list)  # three; empty: as the robot's file has it
+    # egm: a controller and a camera at the addresses of ``link``
+    kind: str = choice("simulated", ("simulated", "egm"))
+    period: float = quantity(4e-3, 5e-4, 0.1, "s")  # between two commands and between two joint samples
+    elasticity: str = choice("joints", ELASTICITIES)  # of the true robot: rigid, joints or structure
+    payload: float = quantity(0.0, 0.0, 1000.0, "kg")  # at the flange
+    # Three, of the payload in the flange's frame; empty: as the robot's file has it
+    payload_centre_mm: list[float] = numbers((), (0, 3), unit="mm")
     variation: Variation = field(default_factory=Variation)
     link_growth_ppm_per_hour: float = 0.0  # of the warming links
     encoder: EncoderConfig = field(default_factory=EncoderConfig)
@@ -86,7 +89,8 @@ class StationConfig:
     drive: DriveConfig = field(default_factory=DriveConfig)
     camera: CameraConfig = field(default_factory=CameraConfig)
     markers: MarkerCameraConfig = field(default_factory=MarkerCameraConfig)  # of a camera that is not a pose
-    interface: str = "direct"  # from command to drives: direct, or egm as a controller under EGM plans
+    # From command to drives: egm as a controller under EGM plans
+    interface: str = choice("direct", ("direct", "egm"))
     egm: EgmConfig = field(default_factory=EgmConfig)
     link: LinkConfig = field(default_factory=LinkConfig)
     faults: FaultConfig = field(default_factory=FaultConfig)
@@ -113,7 +117,7 @@ class Scenario:
     description: str = ""
     robot: str = "irb1200"  # a shipped robot or the path of a robot file
     law: str = "numerical_ik"  # the law that `truetip run` runs
-    seed: int = 0  # of the camera's noise
+    seed: int = quantity(0, 0, 2**32 - 1)  # of the camera's noise
     home_deg: np.ndarray = field(
         default_factory=lambda: np.zeros(NUM_JOINTS)
     )  # the branch nearest to it is used
@@ -122,62 +126,6 @@ class Scenario:
     reference: ReferenceConfig = field(default_factory=ReferenceConfig)
     servo: ServoConfig = field(default_factory=ServoConfig)
     integrator: IntegratorConfig = field(default_factory=IntegratorConfig)
-
-
-STATIONS = ("simulated", "egm")
-
-# Where a number is allowed to lie; a delay of 4 means milliseconds written as seconds.
-_RANGES: dict[str, tuple[float, float, str]] = {
-    "seed": (0, 2**32 - 1, ""),
-    "station.period": (5e-4, 0.1, "s"),
-    "station.payload": (0.0, 1000.0, "kg"),
-    "station.drive.command_delay": (0.0, 1.0, "s"),
-    "station.drive.dead_time": (0.0, 1.0, "s"),
-    "station.camera.period": (5e-4, 1.0, "s"),
-    "station.camera.delay": (0.0, 1.0, "s"),
-    "station.camera.position_sigma": (0.0, 0.02, "m"),
-    "station.camera.orientation_sigma_deg": (0.0, 10.0, "deg"),
-    "station.egm.motion.gain": (0.0, 20.0, "1/s"),
-    "station.egm.motion.bandwidth": (0.0, 1000.0, "Hz"),
-    "station.egm.motion.ramp_in": (0.0, 10.0, "s"),
-    "station.egm.motion.largest_speed_deviation_deg_s": (0.0, 1000.0, "deg/s"),
-    "station.egm.motion.stop_time": (0.0, 10.0, "s"),
-    "station.egm.run.timeout": (0.01, 60.0, "s"),
-    "station.egm.run.condition_deg": (1e-6, 360.0, "deg"),
-    "station.egm.run.condition_time": (1e-3, 3600.0, "s"),
-    "station.link.port": (0, 65535, ""),
-    "station.link.signal_port": (0, 65535, ""),
-    "station.link.camera.server.port": (0, 65535, ""),
-    "station.link.connect": (0.1, 3600.0, "s"),
-    "station.link.break_after": (0.01, 10.0, "s"),
-    "station.link.resume_within": (0.1, 3600.0, "s"),
-    **{f"station.faults.{name}": (0.0, 1.0, "") for name in SHARES},
-    "station.faults.jitter": (0.0, 1.0, "s"),
-    "station.faults.clock_drift_ppm": (-1e5, 1e5, "ppm"),
-    "reference.acceleration": (1e-3, 100.0, "1/s^2"),
-    "reference.settle": (0.0, 600.0, "s"),
-    "reference.dwell": (0.0, 600.0, "s"),
-    "reference.preview": (0.0, 1.0, "s"),
-    "servo.model.mismatch.stiffness": (0.0, 0.9, ""),
-    "servo.model.mismatch.payload": (0.0, 0.9, ""),
-    "servo.model.mismatch.friction": (0.0, 0.9, ""),
-    "servo.model.mismatch.seed": (0, 2**32 - 1, ""),
-    "servo.feedforward.stiffness_error": (-0.9, 10.0, ""),
-    "servo.feedforward.inertia_error": (-0.9, 10.0, ""),
-    "servo.guard.hold_after": (1e-3, 10.0, "s"),
-    "servo.guard.stop_after": (1e-3, 60.0, "s"),
-    "servo.guard.stop_time": (1e-3, 10.0, "s"),
-    "servo.guard.resume_time": (1e-3, 60.0, "s"),
-    "servo.guard.largest_deviation": (1e-4, 2.0, "m"),
-    "servo.guard.largest_deviation_deg": (0.01, 180.0, "deg"),
-}
-_LAW_RANGES: dict[str, tuple[float, float, str]] = {
-    "translation": (1e-3, 1000.0, "1/s"),
-    "rotation": (1e-3, 1000.0, "1/s"),
-    "correction_limit": (1e-4, 2.0, "m"),
-    "correction_limit_deg": (0.01, 180.0, "deg"),
-    "correction_speed_limit_deg_s": (0.01, 1000.0, "deg/s"),
-}
 
 
 def load_scenario(name: str, settings: list[str] | None = None) -> Scenario:
@@ -195,91 +143,44 @@ def load_scenario(name: str, settings: list[str] | None = None) -> Scenario:
             says what and where.
     """
     try:
-        tree = conformed(read_tree(name, settings or []), Scenario())
-        scenario = yaml_load_typed(schema=Scenario, data=yaml_dump(tree))
-        _check(scenario)
-    except ScenarioError as error:
-        prefix = "" if str(error).startswith(("scenario", "--set")) else f"scenario {name}: "
-        raise ScenarioError(f"{prefix}{error}") from error
-    except Exception as error:  # the parser raises a dozen types, all of them about this file
-        raise ScenarioError(f"scenario {name}: {one_line(error)}") from error
+        node = read_scenario_nodes(name, settings or [], Scenario)
+        scenario = typed(node, Scenario)
+        found = _contradiction(scenario)
+        if found:
+            keys, reason = found
+            raise node.at(keys).refuse(reason)
+    except ScenarioError:
+        raise
+    except ConfigurationError as error:
+        raise ScenarioError(str(error)) from error
     return scenario
 
 
 def scenario_text(scenario: Scenario) -> str:
     """The whole scenario as YAML that `load_scenario` reads back."""
-    return str(yaml_dump(_plain(scenario)))
+    return str(yaml_dump_typed(scenario))
 
 
-def _lookup(scenario: Any, path: str) -> Any:
-    for part in path.split("."):
-        scenario = getattr(scenario, part)
-    return scenario
-
-
-def _check(scenario: Scenario) -> None:
-    """Refuses what cannot be. Raises ScenarioError."""
-    for path, bounds in _RANGES.items():
-        _in_range(path, _lookup(scenario, path), bounds)
-    for law, config in scenario.servo.laws.items():
-        _one_of(f"servo.laws.{law}.drive", config.drive, KINDS)
-        for label, bounds in _LAW_RANGES.items():
-            _in_range(f"servo.laws.{law}.{label}", getattr(config, label), bounds)
-    if scenario.station.drive.payload is not None:
-        _in_range("station.drive.payload", scenario.station.drive.payload, _RANGES["station.payload"])
-    _check_model(scenario.servo.model)
-    LAWS.find(scenario.law)
-    if scenario.servo.feedforward.kind != "none":
-        FEEDFORWARDS.find(scenario.servo.feedforward.kind)
-    _one_of("station.kind", scenario.station.kind, STATIONS)
-    _one_of("station.camera.kind", scenario.station.camera.kind, CAMERAS)
-    _one_of("station.interface", scenario.station.interface, ("direct", "egm"))
-    _one_of("station.link.on_break", scenario.station.link.on_break, ("end", "resume"))
-    SignalCodec(scenario.station.link.signals)
-    _one_of("station.elasticity", scenario.station.elasticity, ELASTICITIES)
-    integrator = scenario.integrator
-    _one_of("integrator.scheme", integrator.scheme, ("auto", *GetIntegrationSchemes()))
-    if integrator.accuracy is not None:
-        _in_range("integrator.accuracy", integrator.accuracy, (1e-12, 1e-1, "relative"))
-    if integrator.max_step is not None:
-        _in_range("integrator.max_step", integrator.max_step, (1e-6, 0.1, "s"))
-
-
-def _check_model(model: ControllerModelConfig) -> None:
-    if model.payload is not None:
-        _in_range("servo.model.payload", model.payload, _RANGES["station.payload"])
-    for label in ("camera_delay", "command_delay"):
-        if getattr(model, label) is not None:
-            _in_range(f"servo.model.{label}", getattr(model, label), _RANGES["station.camera.delay"])
-    for label in ("stiffness", "friction"):
-        for factor in getattr(model, label):
-            _in_range(f"servo.model.{label}", factor, (0.01, 100.0, ""))
-    if model.structure is not None:
-        _in_range("servo.model.structure", model.structure, (0.01, 100.0, ""))
-    if model.elasticity:
-        _one_of("servo.model.elasticity", model.elasticity, ELASTICITIES)
-
-
-def _in_range(path: str, value: float, bounds: tuple[float, float, str]) -> None:
-    low, high, unit = bounds
-    if not (math.isfinite(value) and low <= value <= high):
-        raise ScenarioError(
-            f"{path} must be between {low:.10g} and {high:.10g} {unit}".rstrip() + f", got {value:.10g}"
+def _contradiction(scenario: Scenario) -> tuple[list[str | int], str] | None:
+    """What no single number shows: the place of values that cannot be true together, and why; or None."""
+    guard = scenario.servo.guard
+    if not guard.hold_after < guard.stop_after:
+        return ["servo", "guard", "hold_after"], (
+            f"servo.guard.hold_after={guard.hold_after:g} s must be below servo.guard.stop_after="
+            f"{guard.stop_after:g} s"
         )
-
-
-def _one_of(path: str, value: str, allowed: Collection[str]) -> None:
-    if value not in allowed:
-        raise ScenarioError(f"{path} must be one of {', '.join(allowed)}, got '{value}'")
-
-
-def _plain(value: Any) -> Any:
-    """Dataclasses and arrays as mappings and lists, for a YAML text."""
-    if is_dataclass(value):
-        plain = {entry.name: _plain(getattr(value, entry.name)) for entry in fields(value)}
-        return {"_tag": f"!{type(value).__name__}", **plain} if isinstance(value, StationEvent) else plain
-    if isinstance(value, dict):
-        return {key: _plain(entry) for key, entry in value.items()}
-    if isinstance(value, (list, tuple, np.ndarray)):
-        return [_plain(entry) for entry in value]
-    return value.item() if isinstance(value, np.generic) else value
+    try:
+        LAWS.find(scenario.law)
+    except ValueError as error:
+        return ["law"], str(error)
+    kind = scenario.servo.feedforward.kind
+    try:
+        if kind != "none":
+            FEEDFORWARDS.find(kind)
+    except ValueError as error:
+        return ["servo", "feedforward", "kind"], str(error)
+    try:
+        SignalCodec(scenario.station.link.signals)
+    except ValueError as error:
+        return ["station", "link", "signals"], f"station.link.signals: {error}"
+    return None

@@ -10,21 +10,21 @@ the last link) and E the tool. At zero joint angles the frame of link i sits at
 ``translation`` in the frame of link i-1, turned by ``rotation_zyx_deg``.
 """
 
-import math
 from collections.abc import Callable
-from dataclasses import dataclass, field, fields, is_dataclass
+from dataclasses import dataclass, field
 from importlib.resources import files
 from pathlib import Path
-from typing import Any
 
 import numpy as np
-from pydrake.common.yaml import yaml_load_typed
 from pydrake.math import RigidTransform, RotationMatrix
 
+from robots.configuration.extended import FileKind, read_extended
+from robots.configuration.nodes import ConfigurationError
+from robots.configuration.quantity import numbers, positive, quantity
+from robots.configuration.typed import typed
 from robots.description.beam import Beam, beam_surrogate
 from robots.description.counterbalance_spring import CounterbalanceSpring
 from robots.description.drive_train import DriveTrain, drive_trains
-from robots.description.extended_file import whole_text
 from robots.drivetrain.counterbalance import Counterbalance
 from robots.drivetrain.stiffness import SpringRow
 from robots.drivetrain.train import DriveTrains
@@ -33,7 +33,7 @@ from robots.pose import rotation_from_zyx
 NUM_JOINTS = 6
 
 
-class RobotFileError(ValueError):
+class RobotFileError(ConfigurationError):
     """A robot file is missing, cannot be parsed, or describes an impossible robot."""
 
 
@@ -57,7 +57,7 @@ class JointLimits:
 
     lower_deg: float = 0.0
     upper_deg: float = 0.0
-    speed_deg_s: float = 0.0
+    speed_deg_s: float = positive(0.0, "deg/s")
     source: str = ""
 
 
@@ -69,8 +69,8 @@ class Tilting:
     they are z and x.
     """
 
-    stiffness: list[float] = field(default_factory=list)  # N m / rad, two
-    damping: list[float] = field(default_factory=list)  # N m s / rad, two
+    stiffness: list[float] = numbers((), (2,), 0.0, unit="N m / rad", is_open=True)
+    damping: list[float] = numbers((), (2,), 0.0, unit="N m s / rad")
     source: str = ""
 
 
@@ -89,12 +89,12 @@ class Joint:
 class Link:
     """A body, rigid without a ``beam``; ``inertia`` holds the principal moments about the centre of mass."""
 
-    mass: float = 0.0  # kg
+    mass: float = positive(0.0, "kg")
     inertia: np.ndarray = field(default_factory=lambda: np.zeros(3))  # kg m^2, along x, y, z
     source: str = ""
     center_of_mass: np.ndarray = field(default_factory=lambda: np.zeros(3))  # m, in the link frame
     center_of_mass_source: str = ""
-    radius: float = 0.05  # m, of the capsules that picture the link
+    radius: float = positive(0.05, "m")  # of the capsules that picture the link
     radius_source: str = ""
     beam: Beam | None = None
 
@@ -106,7 +106,7 @@ class PayloadLimits:
     The inertia of a smaller payload is taken in proportion to its mass.
     """
 
-    largest_mass: float = 0.0  # kg
+    largest_mass: float = quantity(0.0, 0.0, unit="kg")
     inertia: np.ndarray = field(default_factory=lambda: np.zeros(3))  # kg m^2, about its centre
     source: str = ""
     center_of_mass: np.ndarray = field(default_factory=lambda: np.zeros(3))  # m, in the flange frame
@@ -118,7 +118,7 @@ class Calibration:
     """What has been measured on one robot, in a file that a calibration wrote; empty for a robot as drawn."""
 
     of: str = ""  # the robot that was calibrated: what stood in its scenario
-    compliance: list[float] = field(default_factory=lambda: [0.0] * NUM_JOINTS)  # rad per N m of gravity
+    compliance: list[float] = numbers([0.0] * NUM_JOINTS, (NUM_JOINTS,), unit="rad / (N m)")  # of gravity
     source: str = ""
 
 
@@ -238,18 +238,21 @@ def load_robot(name: str) -> RobotModel:
     Raises:
         RobotFileError: if there is no such robot, or its file is not a valid robot.
     """
-    path = _file(name, Path())
     try:
-        robot = yaml_load_typed(schema=RobotModel, data=whole_text(path, _file))
-    except Exception as error:  # the parser raises a dozen types, all of them about this file
-        raise RobotFileError(f"robot file {path}: {' '.join(str(error).split())}") from error
-    problem = _problem(robot)
-    if problem:
-        raise RobotFileError(f"robot file {path}: {problem}")
+        node = read_extended(name, FileKind(RobotModel, _find, merges_lists=True))
+        robot = typed(node, RobotModel)
+        keys, problem = _problem(robot)
+        if problem:
+            raise node.at(keys).refuse(problem)
+    except RobotFileError:
+        raise
+    except ConfigurationError as error:
+        raise RobotFileError(str(error)) from error
     return robot
 
 
-def _file(name: str, beside: Path) -> Path:
+def _find(name: str, beside: Path) -> tuple[Path, str]:
+    """Path and label of a robot file."""
     is_file = name.endswith((".yaml", ".yml"))
     path = beside / name if is_file else Path(str(_data_folder() / f"{name}.yaml"))
     if not path.is_file():
@@ -257,53 +260,36 @@ def _file(name: str, beside: Path) -> Path:
             f"robot '{name}': no file {path}; "
             f"give the path of a YAML file or one of {', '.join(shipped_robots())}"
         )
-    return path
+    return path, f"robot file {path}"
 
 
 def _data_folder():
     return files("robots") / "data"
 
 
-def _problem(robot: RobotModel) -> str:
-    """The first reason why the robot is impossible, or an empty string."""
+_Keys = tuple[str | int, ...]
+
+
+def _problem(robot: RobotModel) -> tuple[_Keys, str]:
+    """The place of the first reason why the robot is impossible, and the reason, empty if there is none."""
     if len(robot.joints) != NUM_JOINTS or len(robot.links) != NUM_JOINTS:
-        return f"needs {NUM_JOINTS} joints and links, got {len(robot.joints)} and {len(robot.links)}"
-    malformed = _malformed_number(robot, "")
-    if malformed:
-        return malformed
-    problems = [_joint_problem(joint, number) for number, joint in enumerate(robot.joints, 1)]
+        counts = f"{len(robot.joints)} and {len(robot.links)}"
+        return (), f"needs {NUM_JOINTS} joints and links, got {counts}"
+    problems: list[tuple[_Keys, str]] = [
+        (("joints", index), _joint_problem(joint, index + 1)) for index, joint in enumerate(robot.joints)
+    ]
     if robot.base_link.beam is not None:
-        problems.append("base_link: stands still and takes no beam")
-    bodies = {"base_link": robot.base_link} | {f"link {n}": link for n, link in enumerate(robot.links, 1)}
-    for label, link in bodies.items():
-        problems.append(_not_positive(label, {"mass": link.mass, "radius": link.radius}))
-        problems.append(_inertia_problem(label, link.inertia))
-        problems.append(_beam_problem(label, link))
-    if not any(problems):
-        problems.append(_refusal(lambda: robot.counterbalance_at_axis_2))
-    if len(robot.calibration.compliance) != NUM_JOINTS:
-        problems.append(
-            f"calibration: needs {NUM_JOINTS} compliances, got {len(robot.calibration.compliance)}"
-        )
-    if robot.payload.largest_mass < 0.0:
-        problems.append(f"payload: largest_mass must not be negative, got {robot.payload.largest_mass}")
+        problems.append((("base_link", "beam"), "base_link: stands still and takes no beam"))
+    bodies: list[tuple[_Keys, str, Link]] = [(("base_link",), "base_link", robot.base_link)]
+    bodies += [(("links", index), f"link {index + 1}", link) for index, link in enumerate(robot.links)]
+    for keys, label, link in bodies:
+        problems.append(((*keys, "inertia"), _inertia_problem(label, link.inertia)))
+        problems.append(((*keys, "beam"), _beam_problem(label, link)))
+    if not any(problem for _, problem in problems):
+        problems.append((("counterbalance",), _refusal(lambda: robot.counterbalance_at_axis_2)))
     if robot.payload.largest_mass > 0.0:
-        problems.append(_inertia_problem("payload", robot.payload.inertia))
-    return next(filter(None, problems), "")
-
-
-def _malformed_number(part: Any, where: str) -> str:
-    """The first number below ``part`` that is not finite, or vector that is not three long."""
-    if isinstance(part, float) and not math.isfinite(part):
-        return f"{where} must be finite, got {part}"
-    if isinstance(part, np.ndarray) and not (part.shape == (3,) and np.isfinite(part).all()):
-        return f"{where} must be three finite numbers, got {part.tolist()}"
-    below = []
-    if isinstance(part, list):
-        below = [(f"{where}[{number}]", item) for number, item in enumerate(part, 1)]
-    elif is_dataclass(part):
-        below = [(f"{where}.{item.name}".lstrip("."), getattr(part, item.name)) for item in fields(part)]
-    return next(filter(None, (_malformed_number(item, name) for name, item in below)), "")
+        problems.append((("payload", "inertia"), _inertia_problem("payload", robot.payload.inertia)))
+    return next((each for each in problems if each[1]), ((), ""))
 
 
 def _joint_problem(joint: Joint, number: int) -> str:
@@ -317,7 +303,6 @@ def _joint_problem(joint: Joint, number: int) -> str:
         if getattr(train, label) < 0.0:
             return f"joint {number}: {label} must not be negative, got {getattr(train, label)}"
     positive = {
-        "speed_deg_s": limits.speed_deg_s,
         "ratio": train.ratio,
         "rotor_inertia": train.rotor_inertia,
         "stiffness": train.stiffness,
@@ -341,9 +326,7 @@ def _tilting_problem(where: str, joint: Joint) -> str:
         return ""
     if len(tilting.stiffness) != 2 or len(tilting.damping) != 2:
         return f"{where} needs two stiffnesses and two dampings, got {tilting.stiffness}, {tilting.damping}"
-    if min(tilting.damping) < 0.0:
-        return f"{where}: damping must not be negative, got {min(tilting.damping)}"
-    return _not_positive(where, {"stiffness": min(tilting.stiffness)})
+    return ""
 
 
 def _beam_problem(where: str, link: Link) -> str:

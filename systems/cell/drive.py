@@ -16,6 +16,7 @@ from pydrake.systems.primitives import (
     ZeroOrderHold,
 )
 
+from robots.configuration.quantity import positive, quantity
 from robots.description.model import NUM_JOINTS, RobotModel
 from robots.dynamics.plant import add_robot
 from systems.cell.command_interpolator import CommandInterpolator
@@ -28,17 +29,17 @@ KINDS = ("position", "velocity", "cascade")
 class PiGains:
     """A PI controller; the output is a motor torque in N m."""
 
-    proportional: float = 0.0  # per joint-side rad (position) or rad/s (velocity)
-    integral: float = 0.0  # the same, per second
+    proportional: float = quantity(0.0, 0.0)  # per joint-side rad (position) or rad/s (velocity)
+    integral: float = quantity(0.0, 0.0)  # the same, per second
 
 
 @dataclass
 class CascadeGains:
     """Position controller around a PI velocity controller, as industrial drives have it."""
 
-    position: float = 25.0  # 1/s
-    velocity: float = 100.0  # 1/s, joint torque per velocity error and joint inertia
-    integral: float = 10.0  # 1/s, the inverse of the integral action time
+    position: float = positive(25.0, "1/s")
+    velocity: float = positive(100.0, "1/s")  # joint torque per velocity error and joint inertia
+    integral: float = quantity(10.0, 0.0, unit="1/s")  # the inverse of the integral action time
 
 
 @dataclass
@@ -52,9 +53,11 @@ class DriveConfig:
     position: PiGains = field(default_factory=lambda: PiGains(80.0, 1.0))
     velocity: PiGains = field(default_factory=lambda: PiGains(100.0, 1.0))
     cascade: CascadeGains = field(default_factory=CascadeGains)
-    command_delay: float = 4e-3  # s, transport: from the issue of a command to the instant the drive is at it
-    dead_time: float = 0.0  # s, of the controller's interface, on top of the transport
-    payload: float | None = None  # kg, the load that the drives are told; None for the station's
+    # Transport, from the issue of a command to the instant the drive is at it
+    command_delay: float = quantity(4e-3, 0.0, 1.0, "s")
+    dead_time: float = quantity(0.0, 0.0, 1.0, "s")  # of the controller's interface, on top of the transport
+    # The load that the drives are told; None for the station's
+    payload: float | None = quantity(None, 0.0, 1000.0, "kg")
 
 
 class Drive(Diagram):

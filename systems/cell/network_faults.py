@@ -5,25 +5,27 @@ from typing import NamedTuple
 
 import numpy as np
 
+from robots.configuration.quantity import quantity
+
 
 @dataclass
 class FaultConfig:
     """What goes wrong; shares are of datagrams; read from a scenario file."""
 
-    loss: float = 0.0  # share that never arrives
-    duplication: float = 0.0  # share that arrives twice
-    reordering: float = 0.0  # share that is overtaken by the next one
-    jitter: float = 0.0  # s, largest additional delay
-    burst: float = 0.0  # share at which a burst of losses begins
-    burst_length: int = 10  # datagrams
-    garbage: float = 0.0  # share before which a datagram of random bytes arrives
-    wrong_sender: float = 0.0  # share of which a changed copy arrives from another port
+    loss: float = quantity(0.0, 0.0, 1.0)  # share that never arrives
+    duplication: float = quantity(0.0, 0.0, 1.0)  # share that arrives twice
+    reordering: float = quantity(0.0, 0.0, 1.0)  # share that is overtaken by the next one
+    jitter: float = quantity(0.0, 0.0, 1.0, "s")  # largest additional delay
+    burst: float = quantity(0.0, 0.0, 1.0)  # share at which a burst of losses begins
+    burst_length: int = quantity(10, 1, 100000)  # datagrams
+    garbage: float = quantity(0.0, 0.0, 1.0)  # share before which a datagram of random bytes arrives
+    wrong_sender: float = quantity(0.0, 0.0, 1.0)  # share of which a changed copy arrives from another port
     stall_at: float = -1.0  # s of the cell's time at which nothing gets through any more; negative: never
     stall_for: float = 1.0  # s
     stop_at: float = -1.0  # s at which the controller's program is stopped; negative: never
     lost_body_at: float = -1.0  # s from which the camera does not see the body; negative: never
     lost_body_for: float = 1.0  # s
-    clock_drift_ppm: float = 0.0  # of the camera's clock against the controller's
+    clock_drift_ppm: float = quantity(0.0, -1e5, 1e5, "ppm")  # of the camera's clock against the controller's
 
     def is_stalled(self, time: float) -> bool:
         """Whether nothing gets through."""

@@ -9,6 +9,7 @@ from pydrake.math import RigidTransform
 from pydrake.systems.framework import Context, DiscreteValues, LeafSystem, ValueProducer
 from scipy.stats import norm
 
+from robots.configuration.quantity import quantity
 from systems.samples import PoseSample
 
 CAMERAS = ("pose", "features", "images")
@@ -26,11 +27,12 @@ class CameraConfig:
 
     # Where poses come from: the true one with noise, or markers by their features or images.
     kind: str = "pose"
-    period: float = 4e-3  # s, between exposures
-    delay: float = 4e-3  # s, transport delay: from exposure to arrival
-    position_sigma: float = 0.0  # m, standard deviation of one sample along each axis
-    orientation_sigma_deg: float = 0.0  # standard deviation of one sample about each axis
-    dropout_probability: float = 0.0  # of a single sample to be lost
+    period: float = quantity(4e-3, 5e-4, 1.0, "s")  # between exposures
+    delay: float = quantity(4e-3, 0.0, 1.0, "s")  # transport delay: from exposure to arrival
+    position_sigma: float = quantity(0.0, 0.0, 0.02, "m")  # standard deviation of one sample along each axis
+    # Standard deviation of one sample about each axis
+    orientation_sigma_deg: float = quantity(0.0, 0.0, 10.0, "deg")
+    dropout_probability: float = quantity(0.0, 0.0, 1.0)  # of a single sample to be lost
     dropouts: list[list[float]] = field(default_factory=list)  # s, windows [start, end) without a sample
     outlier_probability: float = 0.0  # of a single sample to be a reflection, valid but wrong
     outlier_mm: float = 20.0  # standard deviation of what it is off along each axis

@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass, field
 
+from robots.configuration.quantity import choice, quantity
 from systems.feedforward.prefilter import PrefilterConfig
 
 
@@ -9,8 +10,9 @@ from systems.feedforward.prefilter import PrefilterConfig
 class CorrectionConfig:
     """How the joints make up for a structure that yields."""
 
-    method: str = "least_squares"  # or geometric, with axes 1 to 3 and for the position of the tip alone
-    limit_deg: float = 3.0  # of each joint's correction
+    # Geometric: with axes 1 to 3 and for the position of the tip alone
+    method: str = choice("least_squares", ("least_squares", "geometric"))
+    limit_deg: float = quantity(3.0, 0.0, 90.0, "deg", is_open=True)  # of each joint's correction
 
 
 @dataclass
@@ -19,7 +21,7 @@ class FeedforwardConfig:
 
     kind: str = "none"  # none, rigid, flexible_joint, elastic_structure or FILE.py:CLASS
     # By which shares stiffness and damping, and masses and inertias, of the model are above the robot's.
-    stiffness_error: float = 0.0
-    inertia_error: float = 0.0
+    stiffness_error: float = quantity(0.0, -0.9, 10.0)
+    inertia_error: float = quantity(0.0, -0.9, 10.0)
     correction: CorrectionConfig = field(default_factory=CorrectionConfig)
     prefilter: PrefilterConfig = field(default_factory=PrefilterConfig)

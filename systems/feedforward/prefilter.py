@@ -6,6 +6,8 @@ import numpy as np
 from scipy.linalg import expm
 from scipy.signal import besselap
 
+from robots.configuration.quantity import choice, quantity
+
 KINDS = ("none", "critically_damped", "bessel")
 
 
@@ -16,9 +18,10 @@ class PrefilterConfig:
     ``none`` is for a reference that is known in advance, with its derivatives.
     """
 
-    kind: str = "none"  # none, critically_damped or bessel
-    order: int = 4  # the highest derivative that it gives
-    cutoff_hz: float = 20.0  # corner of each stage if critically damped; -3 dB of a Bessel filter
+    kind: str = choice("none", KINDS)  # none, critically_damped or bessel
+    order: int = quantity(4, 1, 10)  # the highest derivative that it gives
+    # Corner of each stage if critically damped; -3 dB of a Bessel filter
+    cutoff_hz: float = quantity(20.0, 0.0, 1000.0, "Hz", is_open=True)
 
 
 class Prefilter:

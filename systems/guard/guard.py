@@ -7,6 +7,7 @@ import numpy as np
 from pydrake.common.value import Value
 from pydrake.systems.framework import BasicVector, Context, DiscreteValues, LeafSystem, ValueProducer
 
+from robots.configuration.quantity import quantity
 from robots.description.model import NUM_JOINTS, RobotModel
 from systems.samples import JointSample
 
@@ -39,14 +40,16 @@ _NO_DEVIATION = np.zeros(NUM_JOINTS)
 class GuardConfig:
     """What the guard allows; read from a scenario file."""
 
-    hold_after: float = 0.05  # s without a usable sample: the correction is held, the path goes on
-    stop_after: float = 0.5  # s without a usable sample or command: smooth stop
-    stop_time: float = 0.25  # s from full motion to rest
+    # Without a usable sample: the correction is held, the path goes on
+    hold_after: float = quantity(0.05, 1e-3, 10.0, "s")
+    stop_after: float = quantity(0.5, 1e-3, 60.0, "s")  # without a usable sample or command: smooth stop
+    stop_time: float = quantity(0.25, 1e-3, 10.0, "s")  # from full motion to rest
     resume: bool = False  # whether to go on when what caused a stop is over
-    resume_time: float = 1.0  # s, at least, from rest back to the law's command
-    speed_share: float = 1.0  # of the robot's largest joint speeds
-    largest_deviation: float = 0.2  # m from the path: a sample further away is taken for a false detection
-    largest_deviation_deg: float = 40.0
+    resume_time: float = quantity(1.0, 1e-3, 60.0, "s")  # at least, from rest back to the law's command
+    speed_share: float = quantity(1.0, 0.0, 1.0, is_open=True)  # of the robot's largest joint speeds
+    # From the path: a sample further away is taken for a false detection
+    largest_deviation: float = quantity(0.2, 1e-4, 2.0, "m")
+    largest_deviation_deg: float = quantity(40.0, 0.01, 180.0, "deg")
 
 
 class CommandGuard(LeafSystem):

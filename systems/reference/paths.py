@@ -13,6 +13,7 @@ from typing import NamedTuple, overload
 
 import numpy as np
 
+from robots.configuration.quantity import quantity
 from robots.pose import rotation_from_zyx, rotation_vector
 
 _CLOSED = 1e-9  # m and rad, the ends of a path that is closed are that near to each other
@@ -63,11 +64,13 @@ class ReferenceConfig:
     """Which path the tool shall take, and when; read from a scenario file."""
 
     path: str = "rectangle"  # "rectangle", "circle", "figure_eight" or "points"
-    acceleration: float = 0.7  # 1/s^2, k_a: peak acceleration in segments (or turns) per s^2
-    settle: float = 0.0  # s at the start pose before the path begins
-    dwell: float = 2.0  # s at rest at the end; with "points" at every point
-    laps: int = 1  # how often the path is run, one after the other; more than once it must be closed
-    preview: float = 0.0  # s that the preview ports of the Reference look ahead
+    # k_a, peak acceleration in segments (or turns) per s^2
+    acceleration: float = quantity(0.7, 1e-3, 100.0, "1/s^2")
+    settle: float = quantity(0.0, 0.0, 600.0, "s")  # at the start pose before the path begins
+    dwell: float = quantity(2.0, 0.0, 600.0, "s")  # at rest at the end; with "points" at every point
+    # How often the path is run, one after the other; more than once it must be closed
+    laps: int = quantity(1, 1, 10000)
+    preview: float = quantity(0.0, 0.0, 1.0, "s")  # that the preview ports of the Reference look ahead
     waypoints: list[Waypoint] = field(default_factory=rectangle_waypoints)  # of "rectangle" and "points"
     circle: CircleConfig = field(default_factory=CircleConfig)
     figure_eight: FigureEightConfig = field(default_factory=FigureEightConfig)

@@ -2,17 +2,21 @@
 
 from dataclasses import dataclass
 
+from robots.configuration.quantity import choice, quantity
+
 
 @dataclass
 class LawConfig:
     """What every law has; a law with more extends it."""
 
-    translation: float = 5.0  # 1/s
-    rotation: float = 5.0  # 1/s
-    drive: str = "position"  # the drive that the law commands: position, velocity or cascade
-    correction_limit: float = 0.1  # m, the largest correction of the position
-    correction_limit_deg: float = 20.0  # the largest correction of the orientation
-    correction_speed_limit_deg_s: float = 30.0  # of one joint, where a law corrects velocities
-    angles: str = (
-        "rotation_vector"  # how position_level corrects the orientation; or euler, as the source does
-    )
+    translation: float = quantity(5.0, 1e-3, 1000.0, "1/s")
+    rotation: float = quantity(5.0, 1e-3, 1000.0, "1/s")
+    # The drive that the law commands
+    drive: str = choice("position", ("position", "velocity", "cascade"))
+    correction_limit: float = quantity(0.1, 1e-4, 2.0, "m")  # the largest correction of the position
+    # The largest correction of the orientation
+    correction_limit_deg: float = quantity(20.0, 0.01, 180.0, "deg")
+    # Of one joint, where a law corrects velocities
+    correction_speed_limit_deg_s: float = quantity(30.0, 0.01, 1000.0, "deg/s")
+    # How position_level corrects the orientation; euler, as the source does
+    angles: str = choice("rotation_vector", ("rotation_vector", "euler"))

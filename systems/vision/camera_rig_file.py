@@ -1,10 +1,9 @@
 """A measuring cell as the text of its YAML file, and a cell with the cameras that a calibration has found."""
 
-from dataclasses import asdict, replace
-from typing import Any
+from dataclasses import replace
 
 import numpy as np
-from pydrake.common.yaml import yaml_dump
+from pydrake.common.yaml import yaml_dump_typed
 
 from robots.pose import zyx_from_rotation
 from systems.vision.camera_model import Cameras
@@ -13,7 +12,7 @@ from systems.vision.camera_rig import Lens, MeasuringCell
 
 def cell_text(cell: MeasuringCell) -> str:
     """The cell as YAML with all digits of its numbers, which `measuring_cell.load_cell` reads back."""
-    return str(yaml_dump(asdict(cell, dict_factory=_plain)))
+    return str(yaml_dump_typed(cell))
 
 
 def with_cameras(cell: MeasuringCell, cameras: Cameras, source: str) -> MeasuringCell:
@@ -41,7 +40,3 @@ def with_cameras(cell: MeasuringCell, cameras: Cameras, source: str) -> Measurin
         for i, camera in enumerate(cell.cameras)
     ]
     return replace(cell, cameras=found)
-
-
-def _plain(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
-    return {name: value.tolist() if isinstance(value, np.ndarray) else value for name, value in pairs}

@@ -5,9 +5,8 @@ from importlib.resources import files
 from pathlib import Path
 from typing import TypeVar
 
-from pydrake.common.yaml import yaml_load_typed
-
-from systems.vision.yaml_lines import first_misfit, line_of
+from robots.configuration.nodes import read_nodes
+from robots.configuration.typed import typed
 
 Problem = tuple[Sequence[str | int], str]  # a place in a file, and what is wrong there
 
@@ -30,11 +29,12 @@ def load_data_file(
             and line.
     """
     path = data_file(name, kind)
-    data = _read(path, schema)
+    node = read_nodes(path, f"{kind} file {path}")
+    data = typed(node, schema)
     problem = problem_of(data)
     if problem:
-        place, reason = problem
-        raise ValueError(f"{kind} file {path}, line {line_of(path, place)}: {reason}")
+        keys, reason = problem
+        raise node.at(keys).refuse(reason)
     return data
 
 
@@ -59,19 +59,3 @@ def data_file(name: str, kind: str) -> Path:
             f"{kind} '{name}': no file {path}; give the path of a YAML file or one of {', '.join(shipped)}"
         )
     return path
-
-
-def _read(path: Path, schema: type[_Schema]) -> _Schema:
-    """Reads a dataclass tree from a YAML file.
-
-    Raises:
-        ValueError: if the file is not YAML or does not fit the schema; one line that names file and line.
-    """
-    try:
-        return yaml_load_typed(schema=schema, filename=str(path))
-    except Exception as error:  # the parser raises a dozen types, all of them about this file
-        misfit = first_misfit(path, schema)
-        if misfit:
-            line, reason = misfit
-            raise ValueError(f"file {path}, line {line}: {reason}") from error
-        raise ValueError(f"file {path}: {' '.join(str(error).split())}") from error

@@ -8,6 +8,7 @@ import numpy as np
 from pydrake.common.eigen_geometry import Quaternion
 from pydrake.math import RigidTransform, RollPitchYaw, RotationMatrix
 
+from robots.configuration.quantity import quantity
 from robots.description.model import NUM_JOINTS, RobotModel
 from robots.dynamics.newton_inverse import inverse_kinematics
 from robots.kinematics.analytic_inverse import JointLimitError, UnreachableError
@@ -31,9 +32,10 @@ _STANDING = np.full(NUM_JOINTS, math.nan)
 class EgmRunConfig:
     """How the RAPID program calls EGM; read from a scenario file."""
 
-    timeout: float = 0.2  # s without a command, after which EGM ends
-    condition_deg: float = 0.01  # converged when every joint is so close to its reference
-    condition_time: float = 60.0  # s of convergence after which EGM ends
+    timeout: float = quantity(0.2, 0.01, 60.0, "s")  # without a command, after which EGM ends
+    # Converged when every joint is so close to its reference
+    condition_deg: float = quantity(0.01, 1e-6, 360.0, "deg")
+    condition_time: float = quantity(60.0, 1e-3, 3600.0, "s")  # of convergence after which EGM ends
     restart_after: float = 0.5  # s after its end until EGM is run again; negative: never
 
 

@@ -7,6 +7,7 @@ import numpy as np
 from pydrake.common.value import Value
 from pydrake.systems.framework import BasicVector, Context, DiscreteValues, LeafSystem, ValueProducer
 
+from robots.configuration.quantity import quantity
 from robots.description.model import NUM_JOINTS
 
 _POSITION, _VELOCITY, _RAMP = slice(0, 6), slice(6, 12), 12
@@ -17,11 +18,13 @@ _WIDTH = 13
 class EgmMotionConfig:
     """The settings that EGM has on a controller, Probst (2024), table A.1; read from a scenario file."""
 
-    gain: float = 20.0  # 1/s, 0 to 20: speed per difference between reference and position
-    bandwidth: float = 100.0  # Hz, of the low-pass filter on the speed; 0 for none
-    ramp_in: float = 0.005  # s, in which EGM takes over
-    largest_speed_deviation_deg_s: float = 300.0  # of one joint, largest speed that EGM may add (assumed)
-    stop_time: float = 0.2  # s, from full speed to rest when EGM ends (assumed)
+    # 0 to 20: speed per difference between reference and position
+    gain: float = quantity(20.0, 0.0, 20.0, "1/s")
+    bandwidth: float = quantity(100.0, 0.0, 1000.0, "Hz")  # of the low-pass filter on the speed; 0 for none
+    ramp_in: float = quantity(0.005, 0.0, 10.0, "s")  # in which EGM takes over
+    # Of one joint, largest speed that EGM may add (assumed)
+    largest_speed_deviation_deg_s: float = quantity(300.0, 0.0, 1000.0, "deg/s")
+    stop_time: float = quantity(0.2, 0.0, 10.0, "s")  # from full speed to rest when EGM ends (assumed)
 
 
 class EgmMotion(LeafSystem):

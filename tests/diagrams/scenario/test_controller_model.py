@@ -86,8 +86,8 @@ def test_a_wrong_belief_of_the_stiffness_leaves_the_open_loop_beside_its_path():
 @pytest.mark.parametrize(
     ("setting", "message"),
     [
-        ("stiffness=[1, 2]", r"servo.model.stiffness must be one factor or 6, got \[1"),
-        ("payload_centre_mm=[1]", "payload_centre_mm must be three numbers"),
+        ("stiffness=[1, 2]", r"servo.model.stiffness must be 1 or 6 numbers, got \[1, 2\]"),
+        ("payload_centre_mm=[1]", "payload_centre_mm must be 3 numbers"),
         ("elasticity=gears", "servo.model.elasticity must be one of rigid, joints, structure, got 'gears'"),
     ],
 )

@@ -61,14 +61,15 @@ def test_a_measured_orientation_is_taken_as_it_is(tmp_path: Path):
 REFUSED = {
     "singular": ("[3000, 3000]", "[3000, 0]", "camera 01: focal_length_px .* matrix is singular"),
     "window": ("[192, 329, 3071, 1983]", "[192, 329, 3072, 1983]", "camera 01: window_px must lie in 0, 0"),
-    "two numbers": ("[1451.98, 1229.47, 3283.72]", "[1451.98, 1229.47]", "position_mm must be 3 finite"),
-    "decimal comma": ("[1451.98, 1229.47, 3283.72]", '["1451,98", 1, 1]', "decimal points, got '1451,98'"),
+    "two numbers": ("[1451.98, 1229.47, 3283.72]", "[1451.98, 1229.47]", "position_mm must be 3 numbers"),
+    "decimal comma": ("[1451.98, 1229.47, 3283.72]", '["1451,98", 1, 1]', "decimal points, got .'1451,98'"),
     "metres": ("[1451.98, 1229.47, 3283.72]", "[1.45198, 1.22947, 3.28372]", "is it in metres"),
     "rate": ("frame_rate_hz: 250", "frame_rate_hz: 0", "frame_rate_hz must be positive, got 0"),
-    "no number": ("radial: [-0.08, 0.02, 0]", "radial: [.nan, 0, 0]", "radial must be 3 finite numbers"),
-    "field": ("sensor_px:", "sensor_size:", "has no field 'sensor_size', only name, sensor_px"),
-    "mapping": ("target_mm: [450, 0, 450]", "target_mm: {x: 450}", "target_mm must be numbers .* a mapping"),
-    "not YAML": ("3283.72]\n", "3283.72\n", "expected ',' or ']'"),
+    "no number": ("radial: [-0.08, 0.02, 0]", "radial: [.nan, 0, 0]", r"radial\[0\] must be finite, got nan"),
+    "field": ("sensor_px:", "sensor_size:", "unknown key 'sensor_size'; known here: name, sensor_px"),
+    "twice": ("frame_rate_hz: 250", "frame_rate_hz: 250\nname: B", "key 'name' is given twice"),
+    "mapping": ("target_mm: [450, 0, 450]", "target_mm: {x: 450}", "target_mm must be 3 numbers, got {'x'"),
+    "not YAML": ("frame_rate_hz: 250", "frame_rate_hz: 250: 3", "no valid YAML: mapping values are not"),
 }
 
 
@@ -78,7 +79,7 @@ def test_a_wrong_cell_file_is_refused_by_file_and_line(tmp_path: Path, old: str,
     file.write_text(SHIPPED.replace(old, new, 1))
     with pytest.raises(ValueError, match=message) as error:
         load_cell(str(file))
-    line = 1 + SHIPPED[: SHIPPED.index(old)].count("\n")
+    line = 1 + SHIPPED[: SHIPPED.index(old)].count("\n") + new.count("\n")
     assert str(file) in str(error.value)
     assert f"line {line}" in str(error.value)
     assert "\n" not in str(error.value)

@@ -40,9 +40,9 @@ REFUSED = {
     "infinite": (
         "- [-131, -81, 123]",
         "- [-131, -81, .inf]",
-        "markers_mm must be rows of three finite numbers",
+        r"markers_mm\[0\]\[2\] must be finite, got inf",
     ),
-    "decimal comma": ("- [-92, 16, 110]", "- ['-92,0', 16, 110]", "with decimal points, got '-92,0'"),
+    "decimal comma": ("- [-92, 16, 110]", "- ['-92,0', 16, 110]", "with decimal points, got .'-92,0'"),
     "size": ("marker_diameter_mm: 16", "marker_diameter_mm: 0", "marker_diameter_mm must be positive, got 0"),
 }
 
@@ -59,7 +59,7 @@ def test_a_wrong_body_file_is_refused_by_file_and_line(tmp_path: Path, old: str,
 def test_a_marker_with_two_coordinates_is_refused_by_the_file(tmp_path: Path):
     file = tmp_path / "body.yaml"
     file.write_text(SHIPPED.replace("- [-92, 16, 110]", "- [-92, 16]"))
-    with pytest.raises(ValueError, match=r"body\.yaml"):
+    with pytest.raises(ValueError, match=r"body\.yaml, line 16: markers_mm must be rows of 3 numbers"):
         load_body(str(file))
 
 

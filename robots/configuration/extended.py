@@ -1,0 +1,47 @@
+"""Files that extend others: what a file says on top of what another one says."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from robots.configuration.nodes import ConfigurationError, Node, read_nodes
+from robots.configuration.typed import merged
+
+_DEEPEST = 8  # files that extend one another
+
+
+@dataclass(frozen=True)
+class FileKind:
+    """One kind of configuration file.
+
+    Attributes:
+        schema: the dataclass that it holds.
+        find: gives path and label of a file by the name that stands after ``extends`` and the folder of the
+            file that says so.
+        merges_lists: whether lists of groups of the same length are merged entry by entry, else replaced.
+    """
+
+    schema: Any
+    find: Callable[[str, Path], tuple[Path, str]]
+    merges_lists: bool = False
+
+
+def read_extended(name: str, kind: FileKind, beside: Path | None = None, depth: int = 0) -> Node:
+    """The nodes of a file on top of those of the file that it names after ``extends``, if it does.
+
+    Raises:
+        ConfigurationError: if a file is missing or no mapping, or files extend each other in a circle.
+    """
+    path, label = kind.find(name, beside or Path())
+    if depth > _DEEPEST:
+        raise ConfigurationError(f"{label}: 'extends' runs in a circle")
+    node = read_nodes(path, label)
+    if not isinstance(node.value, dict):
+        raise ConfigurationError(f"{label}: must be a mapping of keys to values")
+    own = Node({key: entry for key, entry in node.value.items() if key != "extends"}, node.place)
+    base = node.value.get("extends")
+    if base is None or not base.value:
+        return own
+    below = read_extended(str(base.value), kind, path.parent, depth + 1)
+    return merged(below, own, kind.schema, merges_lists=kind.merges_lists)

@@ -1,0 +1,108 @@
+"""YAML as nodes that know where they stand, so that a refusal can name file and line."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import yaml
+
+
+class ConfigurationError(ValueError):
+    """Something written cannot be used; the message says where it stands, what it is and what is allowed."""
+
+
+@dataclass(frozen=True)
+class Node:
+    """A value, or nodes by their keys or in their order, with the place where it was written."""
+
+    value: Any  # dict[str, Node], list[Node] or a plain value
+    place: str  # such as "scenario mine.yaml, line 3"
+    tag: str = ""  # without the "!", of a member of a union
+
+    @property
+    def plain(self) -> Any:
+        """The value without places."""
+        if isinstance(self.value, dict):
+            tag = {"_tag": f"!{self.tag}"} if self.tag else {}
+            return tag | {key: node.plain for key, node in self.value.items()}
+        return [node.plain for node in self.value] if isinstance(self.value, list) else self.value
+
+    def at(self, keys: Sequence[str | int]) -> "Node":
+        """The node that names and list indices lead to; the last one on the way if there is no more."""
+        node = self
+        for key in keys:
+            inside = node.value
+            if isinstance(inside, dict) and key in inside:
+                node = inside[str(key)]
+            elif isinstance(inside, list) and isinstance(key, int) and key < len(inside):
+                node = inside[key]
+            else:
+                break
+        return node
+
+    def refuse(self, reason: str) -> ConfigurationError:
+        """The error that says what is wrong with this node."""
+        return ConfigurationError(f"{self.place}: {reason}")
+
+
+def read_nodes(path: Path, label: str) -> Node:
+    """Reads a YAML file.
+
+    Args:
+        path: which one.
+        label: how messages call it, such as ``"robot file kr16.yaml"``.
+
+    Raises:
+        ConfigurationError: if it is not YAML, holds more than one document or names a key twice.
+    """
+    try:
+        text = path.read_text(encoding="utf-8")
+    except (OSError, UnicodeDecodeError) as error:
+        raise ConfigurationError(f"{label}: {_one_line(error)}") from error
+    return parse(text, label)
+
+
+def parse(text: str, label: str, has_lines: bool = True) -> Node:
+    """The nodes of a YAML text; see `read_nodes`."""
+    loader = yaml.SafeLoader(text)
+    try:
+        root = loader.get_single_node()
+        if root is None:
+            return Node(None, label)
+        return _node(loader, root, label, has_lines)
+    except (yaml.YAMLError, ValueError) as error:
+        if isinstance(error, ConfigurationError):
+            raise
+        mark = getattr(error, "problem_mark", None)
+        line = f", line {mark.line + 1}" if mark and has_lines else ""
+        problem = getattr(error, "problem", None) or error
+        raise ConfigurationError(f"{label}{line}: no valid YAML: {_one_line(problem)}") from error
+    finally:
+        loader.dispose()
+
+
+def _node(loader: yaml.SafeLoader, node: yaml.Node, label: str, has_lines: bool) -> Node:
+    place = f"{label}, line {node.start_mark.line + 1}" if has_lines else label
+    own_tag = node.tag.removeprefix("!") if node.tag.startswith("!") else ""
+    if isinstance(node, yaml.MappingNode):
+        entries: dict[str, Node] = {}
+        for key, value in node.value:
+            where = f"{label}, line {key.start_mark.line + 1}" if has_lines else label
+            if not isinstance(key, yaml.ScalarNode):
+                raise ConfigurationError(f"{where}: a key must be a name")
+            if key.value in entries:
+                raise ConfigurationError(f"{where}: key '{key.value}' is given twice")
+            entries[key.value] = _node(loader, value, label, has_lines)
+        return Node(entries, place, own_tag)
+    if isinstance(node, yaml.SequenceNode):
+        return Node([_node(loader, each, label, has_lines) for each in node.value], place, own_tag)
+    if own_tag:
+        if node.value:
+            raise ConfigurationError(f"{place}: !{own_tag} must be followed by a group, got '{node.value}'")
+        return Node({}, place, own_tag)
+    return Node(loader.construct_object(node), place)
+
+
+def _one_line(error: object) -> str:
+    return " ".join(str(error).split())
