@@ -9,7 +9,7 @@ from pydrake.math import RigidTransform
 from pydrake.systems.framework import Context, DiscreteValues, LeafSystem, ValueProducer
 from scipy.stats import norm
 
-from robots.configuration.quantity import quantity
+from robots.configuration.quantity import choice, quantity
 from systems.samples import PoseSample
 
 CAMERAS = ("pose", "features", "images")
@@ -26,7 +26,7 @@ class CameraConfig:
     """What a pose camera needs to know; read from a scenario file."""
 
     # Where poses come from: the true one with noise, or markers by their features or images.
-    kind: str = "pose"
+    kind: str = choice("pose", CAMERAS)
     period: float = quantity(4e-3, 5e-4, 1.0, "s")  # between exposures
     delay: float = quantity(4e-3, 0.0, 1.0, "s")  # transport delay: from exposure to arrival
     position_sigma: float = quantity(0.0, 0.0, 0.02, "m")  # standard deviation of one sample along each axis
