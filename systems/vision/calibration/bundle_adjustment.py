@@ -18,7 +18,7 @@ from systems.vision.calibration.camera_parameters import (
 )
 from systems.vision.camera_model import Cameras
 
-_STEPS = 200
+_STEPS = 60  # of all; with a good first guess about ten suffice
 _CONVERGED = 1e-9  # relative decrease of the sum of squares
 _EXACT = 1e-12  # mean square of the residuals over what is expected: there is no noise
 _LEAST_INFORMATION = 1e-14  # of a combination of parameters, relative to the best known one
@@ -52,6 +52,7 @@ class Adjusted:
     wand_residual: np.ndarray  # px, (n, f, 2, 2)
     sigma: float  # px, standard deviation of a pixel as the residuals show it
     steps: int
+    converged: bool  # or the largest number of steps was not enough
 
 
 def adjust(cameras: Cameras, scene: Scene, wand_p_W: np.ndarray, with_lens: bool = True) -> Adjusted:
@@ -69,15 +70,15 @@ def adjust(cameras: Cameras, scene: Scene, wand_p_W: np.ndarray, with_lens: bool
     free = np.tile(np.arange(NUM) >= (0 if with_lens else NUM_LENS), len(cameras))
     damping, steps = 1e-3, 0
     now = _Linearized(cameras, scene, wand_p_W)
+    converged = now.cost <= _EXACT * now.count
     if not np.isfinite(now.cost):
         raise UndeterminedError("the first guess of the cameras has points behind them")
-    while steps < _STEPS and now.cost > _EXACT * now.count:
+    while not converged and steps < _STEPS:
         steps += 1
         change, shift = now.step(free, damping)
         then = _Linearized(moved_cameras(cameras, change), scene, wand_p_W + shift)
         if not then.cost < now.cost:
-            if now.cost - then.cost > -_CONVERGED * now.cost:  # rounding is all that is left
-                break
+            converged = now.cost - then.cost > -_CONVERGED * now.cost  # rounding is all that is left
             damping *= 10.0
             if damping > 1e12:
                 raise UndeterminedError("the adjustment of the cameras leads nowhere")
@@ -85,8 +86,7 @@ def adjust(cameras: Cameras, scene: Scene, wand_p_W: np.ndarray, with_lens: bool
         gained, now = now.cost - then.cost, then
         cameras, wand_p_W = now.cameras, now.wand_p_W
         damping = max(0.1 * damping, 1e-12)
-        if gained < _CONVERGED * now.cost:
-            break
+        converged = gained < _CONVERGED * now.cost or now.cost <= _EXACT * now.count
     freedom = now.count - free.sum() - 6 * len(wand_p_W)
     factor = np.sqrt(now.cost / freedom) if freedom > 0 else 1.0
     return Adjusted(
@@ -97,6 +97,7 @@ def adjust(cameras: Cameras, scene: Scene, wand_p_W: np.ndarray, with_lens: bool
         now.wand_residual,
         float(factor * scene.pixel_sigma),
         steps,
+        converged,
     )
 
 

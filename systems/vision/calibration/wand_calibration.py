@@ -24,6 +24,9 @@ MINIMUM_PLACES = 20
 
 _OUTLIER = 5.0  # sigma
 _ROUNDS = 8  # of leaving out
+# The frame tells the wand's length as well as data sheets tell the lenses: to a percent, at worst to a third.
+_WRONG_SCALE = 1.6
+_FRAME_OFF = 5.0  # times what is expected of the frame's pixels: its lengths contradict that of the wand
 _LARGEST_SIGMA = 3.0  # px; no camera is that bad, so points have wrong names or a lens is another one
 
 
@@ -65,7 +68,8 @@ def calibrate_with_wand(
         pixel_sigma: px, expected along u and v.
 
     Raises:
-        UndeterminedError: if cameras or points are too few, or do not determine what is asked of them.
+        UndeterminedError: if cameras or points are too few, do not determine what is asked of them, or show
+            another ratio of wand and frame than the kit has.
     """
     seen = ~np.isnan(run.wand_pixels[..., 0])  # (n, f, 2)
     _refuse_too_little(run, seen, names)
@@ -86,6 +90,7 @@ def calibrate_with_wand(
         run.frame_exposures,
     )
     cameras = placed_cameras(guess, scene, names)
+    _refuse_wrong_scale(cameras, scene)
     everything = ~np.isnan(pixels[..., 0])
     cameras = _once(cameras, scene, everything, with_lens=False)[0].cameras
     found, used = _adjusted(cameras, scene, names)
@@ -94,6 +99,9 @@ def calibrate_with_wand(
             f"wand: pixels scatter by {found.sigma:.1f} px, {pixel_sigma:g} px are expected: are ends or "
             "points exchanged, or lengths or lenses not those of the kit and the cell?"
         )
+    if not found.converged:
+        raise UndeterminedError(f"wand: the adjustment did not converge in {found.steps} steps")
+    _refuse_contradicting_frame(found, scene)
     return _report(found, used, run)
 
 
@@ -111,6 +119,31 @@ def _refuse_too_little(run: WandRun, seen: np.ndarray, names: list[str]) -> None
             raise UndeterminedError(
                 f"camera {name}: saw {count} points of the wand, needs {MINIMUM_WAND_POINTS}"
             )
+
+
+def _refuse_wrong_scale(cameras: Cameras, scene: Scene) -> None:
+    """Refuses a wand that has another length, seen by cameras that the frame has placed."""
+    ends = triangulated_wand(cameras, scene.wand_pixels, scene.pixel_sigma)
+    length = float(np.nanmedian(np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1)))
+    if not 1.0 / _WRONG_SCALE < scene.wand_length / length < _WRONG_SCALE:
+        raise UndeterminedError(
+            f"wand: its length is given as {1e3 * scene.wand_length:g} mm, but by the scale of the L-frame "
+            f"it is about {1e3 * length:.0f} mm; is the unit right (mm), and is it the wand of this kit?"
+        )
+
+
+def _refuse_contradicting_frame(found: Adjusted, scene: Scene) -> None:
+    """Refuses a frame that is not where it was seen, in the scale of the wand."""
+    exposures = np.ones(found.known_residual.shape[:2])
+    if scene.known_exposures is not None:
+        exposures = np.maximum(scene.known_exposures, 1)
+    off = np.sqrt(np.nanmean(exposures[..., None] * found.known_residual**2))
+    if off > _FRAME_OFF * scene.pixel_sigma:
+        raise UndeterminedError(
+            f"frame: its points are {off / scene.pixel_sigma:.0f} times as far from where the wand puts them "
+            f"as pixels that scatter by {scene.pixel_sigma:g} px allow; is the length of the wand, "
+            f"{1e3 * scene.wand_length:g} mm, that of the wand that was used?"
+        )
 
 
 def _refuse_contradiction(seen: np.ndarray, used: np.ndarray, names: list[str]) -> None:
