@@ -276,7 +276,11 @@ def _settings(
 ) -> list[str]:
     """The changes of a scenario that options of their own make, behind those of --set."""
     own = {"law": law, "servo.feedforward.kind": feedforward, "station.camera.kind": camera}
-    return [*(settings or []), *(f"{key}={value}" for key, value in own.items() if value)]
+    # An empty name is a name that does not exist, and not what YAML makes of nothing.
+    return [
+        *(settings or []),
+        *(f"{key}={value or repr('')}" for key, value in own.items() if value is not None),
+    ]
 
 
 def _write(

@@ -28,7 +28,7 @@ from experiments.cli.json_output import human_console, json_output
 from experiments.cli.option_limits import at_least
 from experiments.cli.options import JsonOption, OutOption, RobotOption, ScenarioOption, SetOption
 from experiments.cli.prepare import Prepared, check, prepare
-from experiments.cli.staging import staged_file, staged_folder
+from experiments.cli.staging import YAML, staged_file, staged_folder
 from experiments.metrics.run_metrics import summary
 from experiments.report.files import write_text
 from robots.calibration.identification import identify
@@ -87,9 +87,8 @@ def calibrate_command(
         prepared = prepare(scenario, settings or [], robot)
         check(prepared, ["open_loop"])
         stage = stack.enter_context(staged_folder(out))
-        robot_file, urdf_file = (
-            stack.enter_context(staged_file(name)) if name else None for name in (write, urdf)
-        )
+        robot_file = stack.enter_context(staged_file(write, *YAML)) if write else None
+        urdf_file = stack.enter_context(staged_file(urdf, ".urdf", ".xml")) if urdf else None
         stack.enter_context(output.staged())
         measured = _read(wanted) if measurements else _simulated(prepared, wanted)
         study = _study(prepared, wanted, measured)

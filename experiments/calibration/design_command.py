@@ -13,7 +13,7 @@ from rich.markup import escape
 from experiments.cli.console import print_files, progress_bar, refusing
 from experiments.cli.json_output import human_console, json_output
 from experiments.cli.options import JsonOption, PictureOption
-from experiments.cli.staging import staged_file
+from experiments.cli.staging import PAGE, TABLE, staged_file
 from experiments.report.files import write_text
 from experiments.report.plot_page import Section, write_plot_page
 from experiments.report.robot_plot import joints_figure, tips_figure
@@ -58,8 +58,8 @@ def design_command(
     """Choose the configurations at which measurements say most about the robot's errors."""
     human = human_console(json_file)
     with json_output(json_file) as output, refusing(ValueError, OSError), ExitStack() as stack:
-        page = stack.enter_context(staged_file(report))
-        table = stack.enter_context(staged_file(out)) if out else None
+        page = stack.enter_context(staged_file(report, *PAGE))
+        table = stack.enter_context(staged_file(out, *TABLE)) if out else None
         stack.enter_context(output.staged())
         model = load_robot(robot)
         before, started = _peak_mb(), time.perf_counter()

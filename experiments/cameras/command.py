@@ -24,7 +24,7 @@ from experiments.cli.json_output import human_console, json_output
 from experiments.cli.option_limits import at_least, positive
 from experiments.cli.options import JobsOption, JsonOption, ScenarioOption, SetOption
 from experiments.cli.prepare import prepare
-from experiments.cli.staging import staged_file
+from experiments.cli.staging import PAGE, TABLE, YAML, staged_file
 from experiments.report.files import write_text
 from systems.vision.calibration.observation_file import observation_text, read_observations
 from systems.vision.calibration.wand import CalibrationKit, SimulatedWandRun, WandRun, simulate_wand_run
@@ -81,10 +81,9 @@ def calibrate_cameras_command(
         positive("--pixel-sigma", pixel_sigma)
         nominal, kit = load_cell(cell), CalibrationKit(wand_length_mm=wand_length)
         names = [camera.name for camera in nominal.cameras]
-        page = stack.enter_context(staged_file(out))
-        seen_file, cell_file = (
-            stack.enter_context(staged_file(name)) if name else None for name in (observations, write)
-        )
+        page = stack.enter_context(staged_file(out, *PAGE))
+        seen_file = stack.enter_context(staged_file(observations, *TABLE)) if observations else None
+        cell_file = stack.enter_context(staged_file(write, *YAML)) if write else None
         stack.enter_context(output.staged())
         # The camera system's own frame is that of the L-frame.
         start, truth = nominal.camera_model(nominal.base.pose()), None
@@ -134,7 +133,7 @@ def study_cameras_command(
     with json_output(json_file) as output, refusing(ValueError, OSError), ExitStack() as stack:
         at_least("--jobs", 1, jobs)
         prepared = prepare(scenario, settings or [])
-        page = stack.enter_context(staged_file(out))
+        page = stack.enter_context(staged_file(out, *PAGE))
         stack.enter_context(output.staged())
         setup = study_setup(prepared)
         covariance_on_path, covariance_in_workspace = covariances(setup)

@@ -38,7 +38,7 @@ class JsonOutput:
         if self._json_file is None or self._json_file == STDOUT:
             yield
             return
-        with staged_file(self._json_file) as self._staged:
+        with staged_file(self._json_file, ".json") as self._staged:
             yield
 
     def write(self, numbers: Any) -> None:

@@ -7,6 +7,10 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
+PAGE = (".html", ".htm")
+YAML = (".yaml", ".yml")
+TABLE = (".csv", ".txt")
+
 
 @contextmanager
 def staged_folder(folder: str | Path) -> Iterator[Path]:
@@ -37,17 +41,33 @@ def staged_folder(folder: str | Path) -> Iterator[Path]:
 
 
 @contextmanager
-def staged_file(path: str | Path) -> Iterator[Path]:
+def staged_file(path: str | Path, *suffixes: str) -> Iterator[Path]:
     """The same for a single file: gives the path to write to, in the temporary folder.
 
+    Args:
+        path: of the file.
+        suffixes: one of which its name must have, so that other programs know what it holds.
+
     Raises:
-        OSError: if the file cannot be written; one line that says which and why.
+        OSError: if the file cannot be written or has another suffix; one line that says which and why.
     """
     path = Path(path)
     if path.is_dir():
         raise OSError(f"cannot write the file {path}: it is a folder")
+    if suffixes and path.suffix.lower() not in suffixes:
+        raise OSError(f"cannot write the file {path}: its name must end in {' or '.join(suffixes)}")
     with staged_folder(path.parent) as stage:
         yield stage / path.name
+
+
+def keep_files(stage: Path, folder: Path) -> None:
+    """Copies what has been staged so far to ``folder``, for work that will end in an error.
+
+    File by file, because the staged folder itself is readable by its owner alone.
+    """
+    folder.mkdir(parents=True, exist_ok=True)
+    for path in stage.iterdir():
+        shutil.copyfile(path, folder / path.name)
 
 
 def _nearest_existing(folder: Path) -> Path:

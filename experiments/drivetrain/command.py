@@ -10,7 +10,7 @@ import typer
 from experiments.cli.console import print_files, refusing
 from experiments.cli.json_output import human_console, json_output
 from experiments.cli.options import JsonOption
-from experiments.cli.staging import staged_file
+from experiments.cli.staging import PAGE, staged_file
 from experiments.drivetrain.figures import (
     PLAY_APPROXIMATIONS,
     THRESHOLDS,
@@ -54,7 +54,7 @@ def drivetrain_command(
         ["hysteresis and its exact inverse", f"w = {WEIGHTS}, r = {THRESHOLDS}"],
     ]
     with json_output(json_file) as output, refusing(OSError), ExitStack() as stack:
-        page = stack.enter_context(staged_file(out))
+        page = stack.enter_context(staged_file(out, *PAGE))
         stack.enter_context(output.staged())
         sections = [
             Section(

@@ -20,7 +20,7 @@ from experiments.cli.options import (
     PictureOption,
     StudiedRobotOption,
 )
-from experiments.cli.staging import staged_file
+from experiments.cli.staging import PAGE, staged_file
 from experiments.modes.study import SHOWN_MODES, ModalStudy, modes_json, spread, study_modes
 from experiments.modes.view import frequency_figure, show_mode, write_animation
 from experiments.report.plot_page import Section, html_table, write_plot_page
@@ -40,8 +40,13 @@ def modes_command(
     mode: Annotated[int, typer.Option(metavar="N", help="The mode that is animated, from 1.")] = 1,
     out: PictureOption = Path("out/modes.html"),
     animation: Annotated[
-        Path, typer.Option(metavar="FILE.html", help="The mode in motion, stretched.")
-    ] = Path("out/modes-animation.html"),
+        Path | None,
+        typer.Option(
+            metavar="FILE.html",
+            help="The mode in motion, stretched.",
+            show_default="beside --out, as out/modes-animation.html",
+        ),
+    ] = None,
     json_file: JsonOption = None,
     meshcat: Annotated[bool, typer.Option("--meshcat", help="Show the motion live in a browser.")] = False,
 ) -> None:
@@ -52,7 +57,8 @@ def modes_command(
         mass = model.payload.largest_mass if payload is None else payload
         if not 1 <= mode <= SHOWN_MODES:
             raise ValueError(f"--mode must be between 1 and {SHOWN_MODES}, got {mode}")
-        page, motion = (stack.enter_context(staged_file(path)) for path in (out, animation))
+        animation = animation or out.with_name(f"{out.stem}-animation.html")
+        page, motion = (stack.enter_context(staged_file(path, *PAGE)) for path in (out, animation))
         stack.enter_context(output.staged())
         with progress_bar(f"{grid * grid} positions") as progress:
             study = study_modes(model, elasticity, mass, grid, progress)

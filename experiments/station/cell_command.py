@@ -51,7 +51,10 @@ def cell_command(
         if duration is not None and not duration > 0.0:
             raise ValueError(f"--duration must be positive, got {duration:g} s")
         prepared = prepare(scenario, [*(settings or []), *fault_settings(faults)], robot)
-        files = [stack.enter_context(staged_file(name)) if name else None for name in (truth, json_file)]
+        files = [
+            stack.enter_context(staged_file(name, suffix)) if name else None
+            for name, suffix in ((truth, ".npz"), (json_file, ".json"))
+        ]
         link = prepared.scenario.station.link
         camera = stack.enter_context(VirtualCameraServer(_camera_config(prepared.scenario)))
         loop = CellLoop(

@@ -1,7 +1,6 @@
 """What ``truetip compare`` and ``truetip run`` do on a real station."""
 
 import ipaddress
-import shutil
 import sys
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -15,6 +14,7 @@ from diagrams.record.log import RunLog
 from diagrams.runs.real_time import RealTimeRecord
 from experiments.cli.console import count, progress_bar
 from experiments.cli.prepare import Prepared
+from experiments.cli.staging import keep_files
 from experiments.cli.workers import SimulationError
 from experiments.report.files import write_json
 from experiments.report.style import law_file_name
@@ -93,7 +93,7 @@ def guide(
     console.print("Counts, delays and clocks of the wire are in link.json, whole logs in *.npz")
     for law, _, record in records:
         if not len(record.log.time) or record.log.time[-1] <= record.log.path_start:
-            shutil.copytree(stage, out, dirs_exist_ok=True)
+            keep_files(stage, out)
             raise SimulationError(
                 f"law {law}: {record.ended} before the path had begun; see {out / 'link.json'}"
             )

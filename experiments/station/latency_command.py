@@ -23,7 +23,7 @@ from experiments.cli.options import (
     YesOption,
 )
 from experiments.cli.prepare import Prepared, prepare
-from experiments.cli.staging import staged_file
+from experiments.cli.staging import PAGE, YAML, staged_file
 from experiments.report.files import write_text
 from experiments.report.plot_page import Section, write_plot_page
 from experiments.station.clients import station_clients
@@ -52,8 +52,8 @@ def latency_command(
         name, changes = on_station(scenario, list(settings or []), "egm", with_cell)
         prepared = prepare(name, changes)
         ask_before_moving(human, prepared, with_cell or yes)
-        page = stack.enter_context(staged_file(report))
-        written = stack.enter_context(staged_file(write)) if write else None
+        page = stack.enter_context(staged_file(report, *PAGE))
+        written = stack.enter_context(staged_file(write, *YAML)) if write else None
         stack.enter_context(output.staged())
         record = _measured(prepared, LatencyConfig(joint, amplitude, duration), with_cell)
         found = evaluate(record)

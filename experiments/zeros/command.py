@@ -10,7 +10,7 @@ from rich.markup import escape
 from experiments.cli.console import print_files, progress_bar, refusing
 from experiments.cli.json_output import human_console, json_output
 from experiments.cli.options import GridOption, JsonOption, PayloadOption, PictureOption, StudiedRobotOption
-from experiments.cli.staging import staged_file
+from experiments.cli.staging import PAGE, staged_file
 from experiments.report.plot_page import Section, html_table, write_plot_page
 from experiments.zeros.plots import beam_figure, plane_figure, workspace_figure
 from experiments.zeros.study import (
@@ -45,7 +45,7 @@ def zeros_command(
     with (
         json_output(json_file) as output,
         refusing(ValueError, OSError),
-        staged_file(out) as page,
+        staged_file(out, *PAGE) as page,
         output.staged(),
     ):
         if example is not None:

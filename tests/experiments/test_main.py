@@ -40,6 +40,7 @@ REFUSED = {
         "cannot follow the path 'circle'",
     ),
     "no such law": (["run", "--law=magic"], "law must be one of open_loop, numerical_ik"),
+    "empty law": (["run", "--law="], "law must be one of open_loop, numerical_ik"),
     "no cycle": (["compare", "--cycles=0"], "--cycles must be at least 1, got 0"),
     "no process": (["compare", "--jobs=0"], "--jobs must be at least 1, got 0"),
     "no pace": (["run", "--realtime=0"], "--realtime must be positive, got 0"),
@@ -48,6 +49,9 @@ REFUSED = {
     "json is a folder": (["compare", "--json=."], "it is a folder"),
     "json in a file": (["compare", "--json=broken.yaml/x.json"], "cannot write in folder broken.yaml"),
     "no picture": (["diagram", "--out=diagram.png"], "must be one of .svg, .dot"),
+    "json without its suffix": (["compare", "--json=x"], "x: its name must end in .json"),
+    "page without its suffix": (["zeros", "--out=x"], "x: its name must end in .html"),
+    "table of a robot": (["calibrate", "--write=robot.csv"], "robot.csv: its name must end in .yaml or .yml"),
     "no depth": (["diagram", "--depth=0"], "--depth must be at least 1, got 0"),
 }
 

@@ -79,6 +79,12 @@ def test_the_pages_open(tmp_path: Path):
     assert not [line for line in moving.console if "rror" in line]
 
 
+def test_the_animation_stands_beside_the_page(tmp_path: Path):
+    result = truetip("modes", f"--out={tmp_path / 'here' / 'arm.html'}", "--grid=2")
+    assert result.exit_code == 0, result.output
+    assert files(tmp_path) == {"here", "here/arm.html", "here/arm-animation.html"}
+
+
 REFUSED = {
     "robot": ("--robot=kr211", "robot 'kr211': no file"),
     "payload": ("--payload=300", "payload of KUKA KR 210 R2700 extra must be between 0 and 210.0 kg"),

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from experiments.cli.staging import staged_file, staged_folder
+from experiments.cli.staging import PAGE, keep_files, staged_file, staged_folder
 from tests.experiments.commands import files
 
 
@@ -27,6 +27,30 @@ def test_work_that_fails_leaves_older_results_as_they_were(tmp_path: Path):
         fail()
     assert files(tmp_path) == {"a.txt"}
     assert (tmp_path / "a.txt").read_text() == "old"
+
+
+def test_what_is_kept_of_work_that_fails_can_be_read_like_any_other_result(tmp_path: Path):
+    (tmp_path / "ordinary").mkdir()
+
+    def fail() -> None:
+        with staged_folder(tmp_path / "results") as stage:
+            (stage / "a.txt").write_text("a")
+            keep_files(stage, tmp_path / "results")
+            raise RuntimeError("the robot did not answer")
+
+    with pytest.raises(RuntimeError, match="did not answer"):
+        fail()
+    assert files(tmp_path / "results") == {"a.txt"}
+    assert (tmp_path / "results").stat().st_mode == (tmp_path / "ordinary").stat().st_mode
+
+
+def test_a_file_whose_name_says_something_else_is_refused(tmp_path: Path):
+    refused = pytest.raises(OSError, match=r"page.txt: its name must end in \.html or \.htm")
+    with refused, staged_file(tmp_path / "page.txt", *PAGE):
+        pytest.fail("the work began")
+    with staged_file(tmp_path / "page.HTML", *PAGE) as path:
+        path.write_text("")
+    assert files(tmp_path) == {"page.HTML"}
 
 
 def test_a_file_is_replaced_whole(tmp_path: Path):
