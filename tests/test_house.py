@@ -17,11 +17,16 @@ import pytest
 ROOT = Path(__file__).resolve().parents[1]
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text())
 FLOORS = ["robots", "systems", "diagrams", "experiments"]  # from the ground up
-DATA = {"robots": "data", "diagrams": "scenario/data"}
+DATA = {"robots": "data", "diagrams": "scenario/data", "experiments": "report/assets"}
 
 SOURCES = sorted(path for floor in FLOORS for path in (ROOT / floor).rglob("*.py"))
 TESTS = sorted((ROOT / "tests").rglob("*.py"))
-DATA_FILES = sorted(path for floor in FLOORS for path in (ROOT / floor).rglob("*.y*ml"))
+DATA_FILES = sorted(
+    path
+    for floor in FLOORS
+    for path in (ROOT / floor).rglob("*.*")
+    if path.suffix in {".yaml", ".yml", ".html", ".css", ".js"}
+)
 FOLDERS = sorted({path.parent for path in [*SOURCES, *TESTS, *DATA_FILES]})
 ROOT_FILES = [path for path in ROOT.iterdir() if path.suffix in {".md", ".toml"} or path.name == "Makefile"]
 

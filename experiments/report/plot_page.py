@@ -6,12 +6,11 @@ from html import escape
 from pathlib import Path
 
 import plotly.graph_objects as go
-from plotly.offline import get_plotlyjs
+from markupsafe import Markup
 
-from experiments.report.files import write_text
-from experiments.report.page import page
+from experiments.report.page import write_page
 
-_CONFIG = {"responsive": True, "displayModeBar": False}
+_CONFIG = {"responsive": True, "displayModeBar": False, "showSendToCloud": False, "plotlyServerURL": ""}
 
 
 @dataclass(frozen=True)
@@ -23,6 +22,21 @@ class Section:
     content: go.Figure | str
     height: int = 480  # px, of a figure
 
+    @property
+    def html(self) -> Markup:
+        """The content as it stands in the page."""
+        if not isinstance(self.content, go.Figure):
+            return Markup(self.content)
+        figure = go.Figure(self.content)
+        figure.update_layout(
+            height=self.height,
+            margin={"l": 60, "r": 20, "t": 20, "b": 50},
+            paper_bgcolor="rgba(0,0,0,0)",
+            plot_bgcolor="rgba(0,0,0,0)",
+            font={"color": "#7a8696"},
+        )
+        return Markup(figure.to_html(full_html=False, include_plotlyjs=False, config=_CONFIG))
+
 
 def write_plot_page(path: str | Path, title: str, verdict: str, sections: Sequence[Section]) -> None:
     """Writes a self-contained page.
@@ -30,24 +44,7 @@ def write_plot_page(path: str | Path, title: str, verdict: str, sections: Sequen
     Raises:
         OSError: if it cannot be written.
     """
-    # The library stands before the figures, whose scripts call it as soon as they are read.
-    body = [f"<script>{get_plotlyjs()}</script>"]
-    body.append(f"<header><p class=eyebrow>truetip</p><h1>{escape(title)}</h1>")
-    body.append(f"<p class=verdict>{escape(verdict)}</p></header>")
-    for section in sections:
-        content = section.content
-        if isinstance(content, go.Figure):
-            content.update_layout(
-                height=section.height,
-                margin={"l": 60, "r": 20, "t": 20, "b": 50},
-                paper_bgcolor="rgba(0,0,0,0)",
-                plot_bgcolor="rgba(0,0,0,0)",
-                font={"color": "#7a8696"},
-            )
-            content = content.to_html(full_html=False, include_plotlyjs=False, config=_CONFIG)
-        note = f"<p class=note>{escape(section.note)}</p>" if section.note else ""
-        body.append(f"<section class=card><h2>{escape(section.title)}</h2>{note}{content}</section>")
-    write_text(path, page(escape(title), "\n".join(body), "", "{}", ""))
+    write_page(path, "plot_page.html", title=title, verdict=verdict, sections=sections)
 
 
 def html_table(head: Sequence[str], rows: Sequence[Sequence[str]]) -> str:

@@ -1,10 +1,13 @@
 """The report, the replay and the table of a comparison, as a reader meets them."""
 
+import base64
 import dataclasses
 import re
 import socket
 from io import StringIO
+from urllib.parse import unquote
 
+import cv2
 import numpy as np
 import pytest
 from rich.console import Console
@@ -56,6 +59,30 @@ def test_the_report_draws_every_plot_without_an_error(report, logs):
     assert (
         "<title>misaligned: visual servoing compared</title>" in opened.dom
     )  # the scenario's script did not run
+
+
+def test_no_figure_can_be_uploaded(report):
+    """The library's own button would send what the robot did to its maker."""
+    opened = open_page(report)
+    assert 'data-title="Download plot' in opened.dom  # there are buttons
+    assert 'data-title="Share' not in opened.dom
+
+
+def test_every_plot_has_a_picture_for_printing_with_its_whole_width_and_a_legend(report, logs):
+    """A browser prints neither what WebGL has drawn nor a plot that is wider than the paper."""
+    dom = open_page(report, milliseconds=20000).dom
+    pictures = dict(re.findall(r'<img class="paper-only" id="([\w-]+)-on-paper"[^>]* src="([^"]*)"', dom))
+    assert set(pictures) == {"path", "distance", "position", "orientation", "bars-mm", "bars-deg", "events"}
+    for name in ("distance", "position", "orientation"):
+        svg = unquote(pictures[name])
+        assert 'width="760"' in svg
+        assert "path starts" in svg
+        assert "dwell" in svg
+        assert all(law_title(law) in svg for law in logs)
+    encoded = np.frombuffer(base64.b64decode(pictures["path"].partition(",")[2]), dtype=np.uint8)
+    image = cv2.imdecode(encoded, cv2.IMREAD_UNCHANGED)
+    assert image is not None
+    assert len(np.unique(image.reshape(-1, image.shape[-1]), axis=0)) > 100  # lines of many shades, not blank
 
 
 def test_the_report_is_small_and_asks_the_network_for_nothing(report):

@@ -1,12 +1,10 @@
-"""The script of the report: draws its plots with plotly.js, in the colours of the reader's theme."""
-
-SCRIPT = r"""
 "use strict";
 const data = JSON.parse(document.getElementById("data").textContent);
 const hidden = new Set();
 let showMeasured = true, magnification = 1;
 const css = name => getComputedStyle(document.documentElement).getPropertyValue(name).trim();
-const narrow = () => window.innerWidth < 520;
+let onPaper = null; // the figures that are drawn for printing, while they are collected
+const narrow = () => !onPaper && window.innerWidth < 520;
 const bare = {responsive: true, displayModeBar: false};
 const config = () => narrow() ? bare : {responsive: true, displaylogo: false, displayModeBar: "hover",
   modeBarButtonsToRemove: ["select2d", "lasso2d", "autoScale2d", "resetCameraLastSave3d", "orbitRotation",
@@ -25,6 +23,10 @@ function layout(extra) {
     modebar: {bgcolor: "rgba(0,0,0,0)", color: css("--line"), activecolor: css("--soft")}}, extra);
 }
 const shown = law => !hidden.has(law.id);
+function show(id, traces, figureLayout, figureConfig) {
+  if (onPaper) onPaper[id] = {data: traces, layout: figureLayout};
+  else Plotly.react(id, traces, figureLayout, figureConfig);
+}
 
 /* Dashed marks where errors begin to count and where the path is at rest. */
 function marks() {
@@ -50,7 +52,7 @@ function stacked(id, rows, log) {
     hovermode: "x", xaxis: axis({title: titled("time in s"), range: [data.laws[0].true.t[0],
       data.marks.path_end], anchor: "y" + (rows.length > 1 ? rows.length : "")})};
   rows.forEach((row, i) => {
-    const name = i ? "y" + (i + 1) : "y", top = 1 - i * (height + gap);
+    const name = i ? "y" + (i + 1) : "y", isFirst = i === 0, top = 1 - i * (height + gap);
     extra["yaxis" + (i ? i + 1 : "")] = axis({title: titled(row.title), domain: [Math.max(0, top - height),
       top],
       type: log ? "log" : "linear", range: row.range && row.range.slice(), exponentformat: "none",
@@ -58,15 +60,16 @@ function stacked(id, rows, log) {
     for (const law of data.laws) {
       const noise = row.of(law.measured), truth = row.of(law.true);
       if (showMeasured && !log) traces.push({x: law.measured.t, y: noise, yaxis: name, type: "scatter",
-        mode: "markers",
+        mode: "markers", showlegend: false,
         marker: {color: law.color, size: 2.5, opacity: 0.28}, hoverinfo: "skip", visible: shown(law)});
       traces.push({x: law.true.t, y: truth, yaxis: name, type: "scatter", mode: "lines", name: law.title,
+        showlegend: isFirst,
         /* In a range that fits the laws the open loop only passes through: keep it in the background. */
         line: {color: law.color, width: !log && law.id === "open_loop" ? 0.8 : 1.7}, visible: shown(law),
           hovertemplate: "%{y:.3f}"});
     }
   });
-  Plotly.react(id, traces, layout(extra), config());
+  show(id, traces, layout(extra), config());
 }
 
 function drawPath() {
@@ -99,7 +102,7 @@ function drawPath() {
       tickfont: {color: css("--soft"), size: 11}, showspikes: false};
   });
   scene.aspectratio = ratio;
-  Plotly.react("path", traces, layout({scene, margin: {l: 0, r: 0, t: 0, b: 0}, uirevision: "path"}),
+  show("path", traces, layout({scene, margin: {l: 0, r: 0, t: 0, b: 0}, uirevision: "path"}),
     config());
 }
 
@@ -107,14 +110,14 @@ function drawBars(id, unit, digits) {
   const laws = data.laws.filter(shown).reverse(), names = laws.map(law => law.title);
   const values = key => laws.map(law => law.bars[key + "_" + unit]);
   const all = values("max").concat(values("static")).filter(v => v > 0);
-  if (!all.length) { Plotly.react(id, [], layout({}), bare); return; }
+  if (!all.length) { show(id, [], layout({}), bare); return; }
   const low = Math.floor(Math.log10(Math.min(...all)) - 0.3), high = Math.log10(Math.max(...all));
   const text = v => v === null ? "" : v >= 0.01 ? v.toFixed(digits) : v.toPrecision(1);
   const bar = (key, opacity, label) => ({type: "bar", orientation: "h", y: names, x: values(key), name: label,
     marker: {color: laws.map(law => law.color), opacity}, text: values(key).map(v => label + " " + text(v)),
     textposition: "outside", cliponaxis: false, textfont: {size: 12, color: css("--ink")},
     hovertemplate: label + " %{x:.4g} " + (unit === "mm" ? "mm" : "°") + "<extra>%{y}</extra>"});
-  Plotly.react(id, [bar("static", 0.45, "static"), bar("max", 1, "largest")], layout({barmode: "group",
+  show(id, [bar("static", 0.45, "static"), bar("max", 1, "largest")], layout({barmode: "group",
     bargap: 0.28,
     margin: {l: 10, r: 14, t: 6, b: 44}, xaxis: axis({type: "log", dtick: narrow() ? 2 : 1,
       exponentformat: "none", tickangle: 0,
@@ -131,12 +134,12 @@ function drawEvents() {
     customdata: law.events.map(e => e[2]), marker: {color: law.color, size: 9, symbol: "line-ns-open",
       line: {width: 2}},
     hovertemplate: "%{x:.3f} s<br>%{customdata}<extra>" + law.title + "</extra>"}));
-  Plotly.react("events", traces, layout({shapes: marks(), margin: {l: 10, r: 14, t: 10, b: 44},
+  show("events", traces, layout({shapes: marks(), margin: {l: 10, r: 14, t: 10, b: 44},
     xaxis: axis({title: titled("time in s"), range: [data.laws[0].true.t[0], data.marks.path_end]}),
     yaxis: axis({type: "category", tickfont: {color: css("--ink"), size: 12}})}), bare);
 }
 
-function draw() {
+function drawAll() {
   const xyz = ["x", "y", "z"];
   drawPath();
   stacked("distance", [{title: "distance in mm", of: t => t.norm_mm}, {title: "angle in °",
@@ -149,6 +152,21 @@ function draw() {
   drawBars("bars-deg", "deg", 2);
   drawEvents();
 }
+function draw() { drawAll(); preparePrint(); }
+
+/* All figures in the colours of paper and with a legend, which a reader of the screen has in the buttons. */
+window.figuresForPaper = () => {
+  document.documentElement.classList.add("paper");
+  onPaper = {};
+  drawAll();
+  const figures = onPaper;
+  onPaper = null;
+  document.documentElement.classList.remove("paper");
+  for (const id of ["path", "distance", "position", "orientation", "events"])
+    if (figures[id]) Object.assign(figures[id].layout, {showlegend: true,
+      legend: {orientation: "h", x: 0, y: 1.02, yanchor: "bottom"}});
+  return figures;
+};
 
 for (const button of document.querySelectorAll(".chips button")) {
   button.addEventListener("click", () => {
@@ -162,8 +180,8 @@ for (const button of document.querySelectorAll(".chips button")) {
 }
 const select = document.getElementById("magnification");
 magnification = Number(select.value);
-select.addEventListener("change", () => { magnification = Number(select.value); drawPath(); });
+select.addEventListener("change", () => { magnification = Number(select.value); drawPath();
+  preparePrint(); });
 matchMedia("(prefers-color-scheme: dark)").addEventListener("change", draw);
 draw();
 document.body.dataset.drawn = "yes";
-"""
