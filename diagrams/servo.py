@@ -1,10 +1,13 @@
 """The controller as a diagram: the same one against a simulated and against a real station."""
 
-from pydrake.systems.framework import Diagram, DiagramBuilder, OutputPort, System
+from typing import Any
+
+from pydrake.systems.framework import Context, Diagram, DiagramBuilder, OutputPort, System
 from pydrake.systems.primitives import Adder, ConstantVectorSource
 
 from diagrams.scenario.controller_model import controller_model
 from diagrams.scenario.scenario import Scenario
+from diagrams.tick_clock import timed
 from robots.description.model import NUM_JOINTS, RobotModel
 from systems.controller_model import ControllerModel
 from systems.feedforward import FEEDFORWARDS
@@ -169,9 +172,15 @@ def law_name(law: str | type[System] | System) -> str:
 def _built(law: type[System], model: ControllerModel, config: LawConfig, guard: GuardConfig) -> System:
     """The law's system. Raises ValueError if the class is not made as a law is."""
     try:
-        built = law(model, config, guard)
+        built = timed(law)(model, config, guard)
     except TypeError as error:
         raise ValueError(f"law {law.__name__}: {' '.join(str(error).split())}") from error
     if not isinstance(built, System):
         raise ValueError(f"law {law.__name__}: it must be a LeafSystem or a Diagram")
     return built
+
+
+def learnt(servo: Servo, root_context: Context) -> dict[str, Any] | None:
+    """What a law that learns has found out until now, as its ``learnt(context)`` says; None for others."""
+    report = getattr(servo.law, "learnt", None)
+    return None if report is None else dict(report(servo.law.GetMyContextFromRoot(root_context)))

@@ -31,6 +31,7 @@ from experiments.cli.options import (
     CameraOption,
     FeedforwardOption,
     JobsOption,
+    LapsOption,
     OutOption,
     RobotOption,
     ScenarioOption,
@@ -50,6 +51,7 @@ from experiments.diagram.view import write_diagram
 from experiments.drivetrain.command import drivetrain_command
 from experiments.feedforward.command import feedforward_command
 from experiments.frames.commands import align_command, chain_command, frame_command, tool_command
+from experiments.metrics.run_metrics import timing, with_timing
 from experiments.modes.command import modes_command
 from experiments.replay.live import LiveView, advance_live
 from experiments.report.report import verdict
@@ -134,6 +136,7 @@ def compare_command(
     cycles: Annotated[
         int, typer.Option(metavar="N", help="Runs of each law; those after the first serve repeatability.")
     ] = 3,
+    laps: LapsOption = None,
     jobs: JobsOption = None,
 ) -> None:
     """Run several laws on one scenario, by default the open loop and three others, and compare them."""
@@ -143,7 +146,7 @@ def compare_command(
         at_least("--jobs", 1, jobs)
         cycles = 1 if is_quick else cycles
         chosen = named_laws(laws)
-        changes = _settings(settings, None, feedforward, camera)
+        changes = _settings(settings, None, feedforward, camera, laps)
         name, changes = on_station(scenario, changes, station, with_cell)
         prepared = prepare(name, changes, robot, is_quick)
         check(prepared, chosen)
@@ -162,7 +165,7 @@ def compare_command(
             with progress_bar(f"{runs} in {count(processes, 'process', 'processes')}") as progress:
                 logs = compare(prepared.scenario, prepared.robot, chosen, cycles, processes, progress)
         result = _write(human, stage, prepared, logs)
-        output.write(result)
+        output.write(with_timing(result, timing(logs)))
     _conclude(human, result, out)
 
 
@@ -174,6 +177,7 @@ def run_command(
     robot: RobotOption = None,
     feedforward: FeedforwardOption = None,
     camera: CameraOption = None,
+    laps: LapsOption = None,
     station: StationOption = None,
     with_cell: WithCellOption = False,
     yes: YesOption = False,
@@ -188,7 +192,7 @@ def run_command(
     console = Console()
     with refusing(ValueError, OSError):
         positive("--realtime", realtime)
-        changes = _settings(settings, law, feedforward, camera)
+        changes = _settings(settings, law, feedforward, camera, laps)
         name, changes = on_station(scenario, changes, station, with_cell)
         prepared = prepare(name, changes, robot)
         law = prepared.scenario.law
@@ -272,14 +276,23 @@ def robots_command() -> None:
 
 
 def _settings(
-    settings: list[str] | None, law: str | None, feedforward: str | None, camera: str | None = None
+    settings: list[str] | None,
+    law: str | None,
+    feedforward: str | None,
+    camera: str | None = None,
+    laps: int | None = None,
 ) -> list[str]:
     """The changes of a scenario that options of their own make, behind those of --set."""
-    own = {"law": law, "servo.feedforward.kind": feedforward, "station.camera.kind": camera}
+    own = {
+        "law": law,
+        "servo.feedforward.kind": feedforward,
+        "station.camera.kind": camera,
+        "reference.laps": laps,
+    }
     # An empty name is a name that does not exist, and not what YAML makes of nothing.
     return [
         *(settings or []),
-        *(f"{key}={value or repr('')}" for key, value in own.items() if value is not None),
+        *(f"{key}={repr('') if value == '' else value}" for key, value in own.items() if value is not None),
     ]
 
 

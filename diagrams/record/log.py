@@ -1,6 +1,7 @@
 """What one run leaves behind: arrays at the sampling rate, the guard's events and the marks of the path."""
 
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 
@@ -40,4 +41,7 @@ class RunLog:
     dwell_start: float  # s
     path_end: float  # s
     lap_starts: tuple[float, ...] = ()  # s, of the laps if the path is run several times, else empty
+    learnt: dict[str, Any] | None = None  # what the law says that it has learnt; None of others
+    # s, wall time of each update of the law
+    tick_seconds: np.ndarray = field(default_factory=lambda: np.empty(0), compare=False)
     wall_time: float = field(default=0.0, compare=False)  # s, of the simulation alone

@@ -260,6 +260,7 @@ class RealTimeRun:
             path_start=self.path.path_start,
             dwell_start=self.path.dwell_start,
             path_end=self.path.duration,
+            lap_starts=tuple(self.path.lap_starts.tolist()) if len(self.path.lap_starts) > 1 else (),
             wall_time=float(times[-1]) if n else 0.0,
         )
         report = camera.report() if camera else None

@@ -12,8 +12,9 @@ from diagrams.integration import Integration
 from diagrams.record.log import GuardEvent, RunLog
 from diagrams.record.packed_log import PackedLog
 from diagrams.scenario.scenario import Scenario, ScenarioError
-from diagrams.servo import Servo, law_name
+from diagrams.servo import Servo, law_name, learnt
 from diagrams.station import SimulatedStation
+from diagrams.tick_clock import tick_seconds
 from robots.description.model import RobotModel, load_robot
 from robots.dynamics.newton_inverse import inverse_kinematics
 from systems.cell.events.station_events import check_events
@@ -150,6 +151,8 @@ class Experiment:
             dwell_start=self.path.dwell_start,
             path_end=self.path.duration,
             lap_starts=tuple(self.path.lap_starts.tolist()) if len(self.path.lap_starts) > 1 else (),
+            learnt=learnt(self.servo, self.context),
+            tick_seconds=tick_seconds(self.servo.law),
             wall_time=self._wall_time,
         )
 

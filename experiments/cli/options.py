@@ -72,6 +72,15 @@ CameraOption = Annotated[
         show_default="the scenario's",
     ),
 ]
+LapsOption = Annotated[
+    int | None,
+    typer.Option(
+        "--laps",
+        metavar="N",
+        help="How often the path is run within a run; a law keeps what it has learnt.",
+        show_default="the scenario's",
+    ),
+]
 JobsOption = Annotated[
     int | None,
     typer.Option("--jobs", metavar="N", help="Processes at a time.", show_default="one per core"),

@@ -20,6 +20,8 @@ def print_summary(console: Console, result: Mapping[str, Any]) -> None:
     console.print(f"[bold]Scenario {escape(result['scenario'])}[/bold]")
     for source in SOURCES:
         console.print(error_table(result, source))
+    if any("laps" in run for run in result["runs"].values()):
+        console.print(lap_table(result))
     if any(count for run in result["runs"].values() for count in run["guard"].values()):
         console.print(guard_table(result))
     else:
@@ -48,6 +50,25 @@ def error_table(result: Mapping[str, Any], source: str) -> Table:
             table.add_row(
                 kind_title if number == 0 else "", name, *cells, end_section=number == len(rows) - 1
             )
+    return table
+
+
+def lap_table(result: Mapping[str, Any]) -> Table:
+    """The largest distance and angle of each lap."""
+    runs = result["runs"]
+    table = Table(
+        box=box.SIMPLE_HEAD, title="Laps, largest error", title_justify="left", title_style="italic"
+    )
+    table.add_column("law", no_wrap=True)
+    for number in range(max(len(run.get("laps", [])) for run in runs.values())):
+        table.add_column(f"{number + 1}: mm", justify="right", no_wrap=True)
+        table.add_column("°", justify="right", no_wrap=True)
+    colors = law_colors(runs)
+    for law, run in runs.items():
+        cells = [
+            format_cell(lap[name]) for lap in run.get("laps", []) for name in ("max_norm_mm", "max_angle_deg")
+        ]
+        table.add_row(f"[{colors[law]}]{escape(law_title(law))}[/]", *cells)
     return table
 
 

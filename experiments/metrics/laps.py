@@ -6,17 +6,21 @@ from typing import Any
 import numpy as np
 
 from diagrams.record.log import RunLog
-from experiments.metrics.run_metrics import pose_errors
 
 
-def lap_metrics(log: RunLog, source: str) -> list[dict[str, float]]:
+def lap_metrics(log: RunLog, e: np.ndarray) -> list[dict[str, float]]:
     """Largest and root mean square errors of each lap, from its start to that of the next one.
 
-    The last lap ends where the dwell begins. A run without laps has one. ``source`` is "true" or "measured";
-    a number without a single sample is NaN.
+    The last lap ends where the dwell begins; a run without laps has one.
+
+    Args:
+        log: of the run, n samples.
+        e: its errors, rotation first, in rad and m, (n, 6); NaN where there is none.
+
+    Returns:
+        Per lap ``max_norm_mm``, ``max_angle_deg`` and ``rms_mm``; NaN without a single sample.
     """
     starts = log.lap_starts or (log.path_start,)
-    e = pose_errors(log, source)
     valid = np.isfinite(e).all(axis=1)
     laps = []
     for start, end in zip(starts, (*starts[1:], log.dwell_start), strict=True):

@@ -15,6 +15,7 @@ import numpy as np
 
 from diagrams.record.log import RunLog
 from experiments.metrics.iso9283 import iso_9283
+from experiments.metrics.laps import lap_metrics
 from robots.pose import pose_error
 
 STATIC_WINDOW = 0.5  # s, the end of the dwell over which the static error is the mean
@@ -23,6 +24,7 @@ SETTLING_HOLD = 0.25  # s, that long the error must stay in the band: an oscilla
 SMALLEST_STEP = 1e-3  # m, an initial distance below this is not a transient worth the name
 SMALLEST_TURN = math.radians(0.1)  # rad, the same for one axis of the orientation
 SIGNIFICANT_DIGITS = 9
+FIRST_TICKS = 10  # of a law, in which it fills its caches
 
 Comparison = Mapping[str, Sequence[RunLog]]
 
@@ -155,18 +157,43 @@ def summary(scenario_name: str, logs: Comparison) -> dict[str, Any]:
             for source in ("true", "measured")
         }
         runs[law]["guard"] = {kind: int(first.guard_counts[kind]) for kind in sorted(first.guard_counts)}
+        if first.lap_starts:
+            runs[law]["laps"] = lap_metrics(first, pose_errors(first, judged_source(first)))
+        if first.learnt is not None:
+            runs[law]["learnt"] = first.learnt
     return _rounded({"scenario": scenario_name, "runs": runs})
 
 
 def timing(logs: Comparison) -> dict[str, Any]:
-    """Wall and simulated time per law, added over its cycles, the content of ``timing.json``."""
+    """Wall and simulated time per law, added over its cycles, the content of ``timing.json``.
+
+    ``tick_us``: wall time of the law's own updates in microseconds, the first `FIRST_TICKS` left out.
+    """
     runs = {}
     for law, cycles in logs.items():
         wall = sum(log.wall_time for log in cycles)
         simulated = float(sum(log.time[-1] - log.time[0] for log in cycles))
         factor = simulated / wall if wall > 0.0 else None
         runs[law] = {"wall_s": wall, "simulated_s": simulated, "real_time_factor": factor}
+        ticks = np.concatenate([log.tick_seconds[FIRST_TICKS:] for log in cycles])
+        if len(ticks):
+            median, p99, largest = 1e6 * np.quantile(ticks, [0.5, 0.99, 1.0])
+            runs[law]["tick_us"] = {"median": median, "p99": p99, "max": largest}
     return _rounded({"runs": runs})
+
+
+def with_timing(result: dict[str, Any], times: Mapping[str, Any]) -> dict[str, Any]:
+    """A `summary` with the ``tick_us`` of `timing` beside what each learning law has learnt.
+
+    They are left out of ``summary.json``, which a simulation with the same seed repeats byte for byte.
+    """
+    runs = {
+        law: run | {"tick_us": times["runs"][law]["tick_us"]}
+        if "learnt" in run and "tick_us" in times["runs"][law]
+        else run
+        for law, run in result["runs"].items()
+    }
+    return {**result, "runs": runs}
 
 
 def best_law(result: Mapping[str, Any]) -> str:

@@ -12,6 +12,7 @@ from experiments.report.style import law_colors, law_title
 
 MAGNIFICATIONS = (1, 2, 5, 10, 20, 50, 100, 200, 500)
 MAGNIFIED_SHARE = 0.25  # of the path's extent that the largest deviation may fill when the page opens
+LAP_COLUMNS = {"max_norm_mm": "mm", "max_angle_deg": "°", "rms_mm": "rms mm"}
 LISTED_EVENTS = 100  # per law
 SOURCES = {
     "true": "True: what a perfect instrument would see",
@@ -65,6 +66,7 @@ def write_report(
         magnification=_magnification(data),
         guard=_guard(summary, logs),
         transient=_transient(summary),
+        laps=_laps(summary),
         iso={"head": list(ISO_COLUMNS.values()), "note": _iso_note(summary)},
         timing=_timing(timing),
         data=data,
@@ -165,6 +167,20 @@ def _transient(summary: Mapping[str, Any]) -> Rows:
             values = [numbers["settling_s"], *numbers["overshoot_mm"], *numbers["overshoot_deg"]]
             rows.append((law, _cells(values)))
     return rows
+
+
+def _laps(summary: Mapping[str, Any]) -> dict[str, Any] | None:
+    """Head and rows of the table of laps; None where paths are run once."""
+    laps = {law: run.get("laps", []) for law, run in summary["runs"].items()}
+    count = max(map(len, laps.values()))
+    if not count:
+        return None
+    return {
+        "head": [f"lap {number}, {what}" for number in range(1, count + 1) for what in LAP_COLUMNS.values()],
+        "rows": [
+            (law, _cells([lap[name] for lap in each for name in LAP_COLUMNS])) for law, each in laps.items()
+        ],
+    }
 
 
 def _iso(summary: Mapping[str, Any], source: str) -> Rows:

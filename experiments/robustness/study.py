@@ -11,7 +11,7 @@ from diagrams.scenario.scenario import load_scenario
 from experiments.cli.workers import Progress, in_processes
 from experiments.comparison.compare import simulating
 from experiments.metrics.laps import lap_metrics
-from experiments.metrics.run_metrics import error_metrics
+from experiments.metrics.run_metrics import error_metrics, pose_errors
 
 
 @dataclass(frozen=True)
@@ -95,7 +95,7 @@ def run_trial(trial: Trial, progress: Progress) -> dict[str, Any]:
         "max_angle_deg": errors["max_angle_deg"],
         "static_mm": float(np.linalg.norm(errors["static_mm"])),
         "static_deg": float(np.linalg.norm(errors["static_deg"])),
-        "laps": lap_metrics(log, "true"),
+        "laps": lap_metrics(log, pose_errors(log, "true")),
         "guard": {kind: count for kind, count in log.guard_counts.items() if count},
         "wall_s": log.wall_time,
     }

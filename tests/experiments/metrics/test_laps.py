@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from experiments.metrics.laps import lap_metrics
+from experiments.metrics.run_metrics import pose_errors
 from tests.experiments.synthetic import displaced, make_log, straight
 
 
@@ -17,7 +18,7 @@ def test_each_lap_has_its_own_largest_error_and_the_dwell_belongs_to_none():
     e[:, 3], e[:, 2] = 1e-3 * millimetres, np.deg2rad(0.1 * millimetres)
     log = make_log(time, wanted, displaced(wanted, e))
     log = replace(log, path_start=1.0, dwell_start=3.0, path_end=4.0, lap_starts=(1.0, 2.0))
-    laps = lap_metrics(log, "true")
+    laps = lap_metrics(log, pose_errors(log, "true"))
     assert [lap["max_norm_mm"] for lap in laps] == pytest.approx([2.0, 0.5])
     assert [lap["max_angle_deg"] for lap in laps] == pytest.approx([0.2, 0.05])
     assert [lap["rms_mm"] for lap in laps] == pytest.approx([2.0, 0.5])

@@ -15,6 +15,7 @@ from experiments.metrics.run_metrics import (
     summary,
     timing,
     transient_metrics,
+    with_timing,
 )
 from experiments.report.files import write_json
 from tests.experiments.synthetic import comparison, displaced, make_log, rectangle, straight
@@ -174,3 +175,27 @@ def test_real_time_factor_is_simulated_over_wall_time():
     X = straight(TIME)
     run = timing({"pbvs": [make_log(TIME, X, X)] * 2})["runs"]["pbvs"]
     assert run == {"wall_s": 5.0, "simulated_s": 12.0, "real_time_factor": 2.4}
+
+
+def test_laps_and_what_was_learnt_stand_in_a_summary_only_where_they_are():
+    time = np.arange(0.0, 10.0, 0.004)
+    wanted = rectangle(time)
+    log = make_log(time, wanted, wanted)
+    plain = summary("test", {"pbvs": [log]})["runs"]["pbvs"]
+    assert set(plain) == {"true", "measured", "guard"}
+    log = dataclasses.replace(log, lap_starts=(0.0, 4.0), learnt={"mass_kg": 7.0})
+    run = summary("test", {"pbvs": [log]})["runs"]["pbvs"]
+    assert {key: run[key] for key in plain} == plain
+    assert [lap["max_norm_mm"] for lap in run["laps"]] == [0.0, 0.0]
+    assert run["learnt"] == {"mass_kg": 7.0}
+
+
+def test_the_cost_of_a_tick_is_told_beside_what_was_learnt_and_leaves_the_summary_alone():
+    time = np.arange(0.0, 10.0, 0.004)
+    wanted = rectangle(time)
+    seconds = np.concatenate([np.full(10, 1.0), np.full(99, 1e-4), [1e-3]])
+    log = dataclasses.replace(make_log(time, wanted, wanted), tick_seconds=seconds, learnt={"mass_kg": 7.0})
+    result, times = summary("test", {"pbvs": [log]}), timing({"pbvs": [log]})
+    ticks = with_timing(result, times)["runs"]["pbvs"]["tick_us"]
+    assert (ticks["median"], ticks["max"]) == pytest.approx((100.0, 1000.0))
+    assert "tick_us" not in result["runs"]["pbvs"]
