@@ -23,6 +23,7 @@ from robots.dynamics.plant import PlantRobot, add_robot
 from systems.cell.drive import Drive
 from systems.cell.drive_train import CoulombFriction, ElasticDriveTrain
 from systems.cell.motors import controlled_motors, motor_controllers
+from systems.cell.parts_drive_train import PartsDriveTrain
 
 _STATE = 2 * NUM_JOINTS  # positions, then velocities
 
@@ -50,7 +51,7 @@ class DrivenRobot:
     plant: MultibodyPlant
     links: PlantRobot
     drive: Drive
-    drive_train: ElasticDriveTrain | None  # None for a rigid robot
+    drive_train: ElasticDriveTrain | PartsDriveTrain | None  # None for a rigid robot
     motor_torque: OutputPort  # vector 6 in N m, joint side
     signals: DriveSignals
 
@@ -150,11 +151,13 @@ def add_driven_robot(
         link_state = selector.get_output_port()
     if encoders:
         builder.AddNamedSystem("encoders", encoders)
-    train = None if is_rigid else ElasticDriveTrain(robot)
+    train = None
+    if not is_rigid:
+        train = PartsDriveTrain(robot) if robot.drive_trains else ElasticDriveTrain(robot)
     torque = builder.AddNamedSystem("motor_torque", Adder(3 if train and encoders else 2, NUM_JOINTS))
     builder.Connect(drive.GetOutputPort("added_torque"), torque.get_input_port(1))
     if train:
-        signals = _add_motors(builder, robot, drive, train, link_state, encoders)
+        signals = _add_motors(builder, robot, drive, train, link_state, torque.get_output_port(), encoders)
         builder.Connect(signals.joint_torque, plant.get_actuation_input_port())
         if encoders:
             gains = drive.gains
@@ -175,8 +178,9 @@ def _add_motors(
     builder: DiagramBuilder,
     robot: RobotModel,
     drive: Drive,
-    train: ElasticDriveTrain,
+    train: ElasticDriveTrain | PartsDriveTrain,
     link_state: OutputPort,
+    motor_torque: OutputPort,
     encoders: LeafSystem | None,
 ) -> DriveSignals:
     """Motors with their controllers on gears that yield."""
@@ -185,7 +189,7 @@ def _add_motors(
     parts = builder.AddNamedSystem("motor_signals", Demultiplexer([_STATE, NUM_JOINTS, NUM_JOINTS, _STATE]))
     builder.Connect(motors.get_output_port(), parts.get_input_port())
     motor_state, relative_speed, controller_torque, setpoint = (parts.get_output_port(i) for i in range(4))
-    torques = train.add(builder, motor_state, relative_speed, link_state)
+    torques = train.add(builder, motor_state, relative_speed, link_state, motor_torque)
     sources = [
         drive.GetOutputPort("acceleration"),
         drive.GetOutputPort("added_torque"),

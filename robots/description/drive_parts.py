@@ -163,6 +163,7 @@ class Backlash:
     """Play between teeth, Reiner (2010) eq. (2.12), corrected; spring and damper are those of the gear."""
 
     arc_minutes: float = 0.0  # the whole play
+    lubricant: float = 0.0  # N m s / rad, what damps within it
 
 
 @dataclass

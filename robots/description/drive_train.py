@@ -71,8 +71,13 @@ class DriveTrain:
         Raises:
             ValueError: if a part refuses its numbers.
         """
-        gap = self.backlash.arc_minutes * ARC_MINUTE if isinstance(self.backlash, Backlash) else 0.0
-        for label, value in (("motor_lag", self.motor_lag), ("backlash: arc_minutes", gap)):
+        play = self.backlash if isinstance(self.backlash, Backlash) else Backlash()
+        not_negative = {
+            "motor_lag": self.motor_lag,
+            "backlash: arc_minutes": play.arc_minutes,
+            "backlash: lubricant": play.lubricant,
+        }
+        for label, value in not_negative.items():
             if value < 0.0:
                 raise ValueError(f"{label} must not be negative, got {value}")
         frictions = [self.friction.part()] if self.friction else []
@@ -87,7 +92,8 @@ class DriveTrain:
             frictions=tuple(frictions),
             ratio=self.ratio_error.part(self.ratio) if self.ratio_error else None,
             efficiency=self.efficiency.part() if self.efficiency else None,
-            gap=gap,
+            gap=play.arc_minutes * ARC_MINUTE,
+            lubricant=play.lubricant,
             soft=self.backlash.part() if isinstance(self.backlash, ViscoElastic) else None,
             hysteresis=self.hysteresis.part(self.stiffness) if self.hysteresis else None,
         )

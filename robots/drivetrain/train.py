@@ -47,6 +47,7 @@ class JointTrain:
     ratio: FourierRatio | None = None
     efficiency: DirectionalEfficiency | None = None
     gap: float = 0.0  # rad, the whole play
+    lubricant: float = 0.0  # N m s / rad, beside spring and damper, in the gap too
     soft: SoftBranch | None = None
     hysteresis: DahlHysteresis | None = None
 
@@ -85,6 +86,7 @@ class DriveTrains:
         self._lags, self._has_lag = lag > 0.0, bool(lag.any())
         self._lag_time = np.where(self._lags, lag, 1.0)
         self._half_gap = 0.5 * np.array([train.gap for train in trains])
+        self._lubricant = np.array([train.lubricant for train in trains])
         self._has_gap = bool(self._half_gap.any())
         self._gaps = None if self._half_gap.all() else self._half_gap > 0.0  # which, if not all
         self._frictions = _friction_groups([train.frictions for train in trains])
@@ -133,6 +135,7 @@ class DriveTrains:
         if self._has_gap:
             touching = contact(beyond, torque)
             torque = touching if self._gaps is None else np.where(self._gaps, touching, torque)
+            torque = torque + self._lubricant * rate
         if self._soft is not None:
             stretch = self._soft.soft * (x - state[of_soft])
             torque = torque + stretch

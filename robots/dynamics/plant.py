@@ -157,7 +157,7 @@ class PlantRobot:
         self,
         context: Context,
         theta: np.ndarray,
-        wind_up: Callable[[np.ndarray], np.ndarray] | None = None,
+        wind_up: Callable[[np.ndarray, np.ndarray], np.ndarray] | None = None,
     ) -> None:
         """Puts the motors at theta, still, with gears and structure sagging under load.
 
@@ -165,7 +165,7 @@ class PlantRobot:
             context: of the plant.
             theta: motor positions in rad, shape (6,).
             wind_up: where the gears are not in the plant, how far they yield in rad to torques in N m on
-                their links, shape (6,) each; None for gears that do not.
+                their links with the motors at a position in rad, shape (6,) each; None for gears that do not.
         """
         positions = np.zeros(self.plant.num_positions())
         driven = [joint.position_start() for joint in self.motors]
@@ -178,7 +178,7 @@ class PlantRobot:
             load = self.load(context)
             positions[rows] = self.static_deflection(load[rows])
             if wind_up:
-                positions[driven] = theta + wind_up(load[driven])
+                positions[driven] = theta + wind_up(load[driven], theta)
             self.plant.SetPositions(context, positions)
 
 

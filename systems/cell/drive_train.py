@@ -57,6 +57,7 @@ class ElasticDriveTrain:
         motor_state: OutputPort,
         relative_speed: OutputPort,
         link_state: OutputPort,
+        motor_torque: OutputPort,
     ) -> DriveTrainTorques:
         """Adds the systems to a diagram.
 
@@ -65,6 +66,7 @@ class ElasticDriveTrain:
             motor_state: vector 12, positions of the motors (rad), then velocities (rad/s).
             relative_speed: vector 6, their velocities over the width of Coulomb friction.
             link_state: vector 12, positions of the links behind the gears (rad), then velocities (rad/s).
+            motor_torque: vector 6 in N m, what the motors are told to give, for those that do not just do so.
         """
         states = builder.AddNamedSystem("motor_and_link_state", Multiplexer([_STATE, _STATE]))
         gears = builder.AddNamedSystem("gears", _linear_gears(self._robot))
@@ -86,8 +88,8 @@ class ElasticDriveTrain:
     def set_at_rest(self, root_context: Context, theta: np.ndarray, load: np.ndarray) -> None:
         """Springs remember nothing; theta (rad) and load on the links (N m) are of shape (6,)."""
 
-    def wind_up(self, load: np.ndarray) -> np.ndarray:
-        """How far the links yield at rest, in rad, to torques on them in N m, shape (6,) each."""
+    def wind_up(self, load: np.ndarray, theta: np.ndarray) -> np.ndarray:
+        """How far the links yield at rest, in rad, to torques on them in N m, motors at theta; (6,) each."""
         springs = self._robot.stiffening_gears
         return load / self._robot.joint_stiffness if springs is None else springs.deflection(load)
 

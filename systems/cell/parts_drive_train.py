@@ -1,95 +1,135 @@
-"""Motors and gears made of the parts that a robot file names: lag, friction, play, hysteresis and so on."""
+"""Gears and friction made of the parts that a robot file names: lag, friction, play, hysteresis and so on."""
 
 import numpy as np
-from pydrake.systems.framework import BasicVector, Context, Diagram, DiagramBuilder, LeafSystem
-from pydrake.systems.primitives import Demultiplexer, Integrator, LinearSystem
+from pydrake.systems.framework import (
+    BasicVector,
+    Context,
+    Diagram,
+    DiagramBuilder,
+    LeafSystem,
+    OutputPort,
+)
+from pydrake.systems.primitives import ConstantVectorSource, Demultiplexer, Integrator
 
+from robots.description.model import RobotModel
 from robots.drivetrain.train import DriveTrains
+from systems.cell.drive_train import DriveTrainTorques, LinearGears
 
 
-class PartsDriveTrain(Diagram):
-    """Drive trains of n joints, each with its parts, beside a plant of the links alone.
+class PartsDriveTrain:
+    """Six gears and the friction of their motors with parts, with the members of `ElasticDriveTrain`."""
+
+    def __init__(self, robot: RobotModel) -> None:
+        """Takes the drive trains of a robot that has them.
+
+        Raises:
+            ValueError: if a part refuses its numbers.
+        """
+        trains = robot.drive_trains
+        assert trains is not None
+        self._trains, self._damping = trains, robot.joint_damping
+        self._parts = DriveTrainParts(trains, robot.joint_viscous_friction)
+        self.friction_unit = np.zeros(trains.size)  # all friction is in the reaction
+
+    def add(
+        self,
+        builder: DiagramBuilder,
+        motor_state: OutputPort,
+        relative_speed: OutputPort,
+        link_state: OutputPort,
+        motor_torque: OutputPort,
+    ) -> DriveTrainTorques:
+        """See `ElasticDriveTrain.add`."""
+        parts = builder.AddNamedSystem("drive_train_parts", self._parts)
+        none = builder.AddNamedSystem("friction", ConstantVectorSource(self.friction_unit))
+        for name, port in (
+            ("motor_torque", motor_torque),
+            ("motor_state", motor_state),
+            ("link_state", link_state),
+        ):
+            builder.Connect(port, parts.GetInputPort(name))
+        return DriveTrainTorques(
+            parts.GetOutputPort("gear_torque"), parts.GetOutputPort("reaction"), none.get_output_port()
+        )
+
+    def set_at_rest(self, root_context: Context, theta: np.ndarray, load: np.ndarray) -> None:
+        """Relaxed, with motors that give what they have to already; arguments of shape (6,)."""
+        self._parts.set_at_rest(root_context, theta, load)
+
+    def wind_up(self, load: np.ndarray, theta: np.ndarray) -> np.ndarray:
+        """See `ElasticDriveTrain.wind_up`."""
+        return self._trains.at_rest(load, theta)[0]
+
+    def linearised(self, load: np.ndarray) -> LinearGears:
+        """See `ElasticDriveTrain.linearised`."""
+        x = self._trains.at_rest(load, np.zeros_like(load))[0]
+        stiffness, friction = self._trains.tangents(x)
+        return LinearGears(friction, stiffness, self._damping)
+
+
+class DriveTrainParts(Diagram):
+    """What stands between n motors and their links.
 
     Ports:
         in  ``motor_torque``  vector n in N m, joint side: what the motors are told to give
+        in  ``motor_state``   vector 2 n, positions of the motors (rad), then velocities (rad/s)
         in  ``link_state``    vector 2 n, link positions behind the gears (rad), then velocities (rad/s)
-        out ``motor_state``   vector 2 n, positions of the motors (rad), then velocities (rad/s)
+        out ``reaction``      vector n in N m, what is taken from the torques that the motors are told to give
         out ``gear_torque``   vector n in N m, what the gears give the links
 
     The equations are those of `DriveTrains`. They are evaluated by one call of Python for each derivative;
-    the states, of the motors and of the parts, stand in systems of Drake's.
+    the states of the parts stand in a system of Drake's.
     """
 
-    def __init__(self, trains: DriveTrains) -> None:
-        """Takes the trains in the order of the joints."""
+    def __init__(self, trains: DriveTrains, viscous: np.ndarray | None = None) -> None:
+        """Wires the parts.
+
+        Args:
+            trains: in the order of the joints.
+            viscous: what of the friction is not to be in the reaction because the motors have it already, in
+                N m s / rad, shape (n,).
+        """
         super().__init__()
         self.trains = trains
         builder, n, states = DiagramBuilder(), trains.size, trains.num_states
-        self._motors = builder.AddNamedSystem("motors", _motors(trains.inertia))
-        parts = builder.AddNamedSystem("parts", _Parts(trains))
+        parts = builder.AddNamedSystem("parts", _Parts(trains, np.zeros(n) if viscous is None else viscous))
         split = builder.AddNamedSystem("split", Demultiplexer([n, n, states] if states else [n, n]))
         builder.Connect(parts.get_output_port(), split.get_input_port())
-        builder.Connect(split.get_output_port(0), self._motors.get_input_port())
-        builder.Connect(self._motors.get_output_port(), parts.GetInputPort("motor_state"))
         self._memory = None
         if states:
             self._memory = builder.AddNamedSystem("memory", Integrator(states))
             builder.Connect(split.get_output_port(2), self._memory.get_input_port())
             builder.Connect(self._memory.get_output_port(), parts.GetInputPort("memory"))
-        for name in ("motor_torque", "link_state"):
+        for name in ("motor_torque", "motor_state", "link_state"):
             builder.ExportInput(parts.GetInputPort(name), name)
-        builder.ExportOutput(self._motors.get_output_port(), "motor_state")
+        builder.ExportOutput(split.get_output_port(0), "reaction")
         builder.ExportOutput(split.get_output_port(1), "gear_torque")
         builder.BuildInto(self)
 
-    def set_at_rest(self, root_context: Context, theta: np.ndarray, load: np.ndarray | None = None) -> None:
-        """Puts the motors at theta, still.
-
-        Args:
-            root_context: of the diagram that this is part of.
-            theta: rad, shape (n,).
-            load: what pulls at the links in N m, shape (n,), which the gears are to be wound up for.
-        """
-        still = np.concatenate([theta, np.zeros_like(theta)])
-        self._motors.GetMyMutableContextFromRoot(root_context).SetContinuousState(still)
+    def set_at_rest(self, root_context: Context, theta: np.ndarray, load: np.ndarray) -> None:
+        """Puts the parts at rest with motors at theta (rad) under loads of the links (N m), (n,) each."""
         if self._memory is not None:
-            state = self.trains.at_rest(np.zeros_like(theta) if load is None else load, theta)[1]
-            self._memory.set_integral_value(self._memory.GetMyMutableContextFromRoot(root_context), state)
+            context = self._memory.GetMyMutableContextFromRoot(root_context)
+            self._memory.set_integral_value(context, self.trains.at_rest(load, theta)[1])
 
-    def wind_up(self, torque: np.ndarray, theta: np.ndarray) -> np.ndarray:
-        """How far the gears yield at rest, in rad, to torques on their links in N m; shape (n,) each."""
-        return self.trains.at_rest(torque, theta)[0]
-
-    def energy(self, root_context: Context, link_position: np.ndarray) -> float:
-        """What motors and gears have stored in J with the links at a position in rad, shape (n,)."""
-        n = self.trains.size
-        motors = self._motors.GetMyContextFromRoot(root_context).get_continuous_state_vector().CopyToVector()
-        memory = np.zeros(0)
-        if self._memory is not None:
-            context = self._memory.GetMyContextFromRoot(root_context)
-            memory = context.get_continuous_state_vector().CopyToVector()
-        theta, speed = motors[:n], motors[n:]
-        moving = 0.5 * float(self.trains.inertia @ speed**2)
-        return moving + self.trains.energy(memory, theta, link_position - theta)
-
-
-def _motors(inertia: np.ndarray) -> LinearSystem:
-    """Positions and velocities of rotors under torques."""
-    n = len(inertia)
-    A, B = np.eye(2 * n, k=n), np.vstack([np.zeros((n, n)), np.diag(1.0 / inertia)])
-    return LinearSystem(A, B, np.eye(2 * n), np.zeros((2 * n, n)))
+    def memory(self, root_context: Context) -> np.ndarray:
+        """The states of the parts, shape (num_states,), see `DriveTrains`."""
+        if self._memory is None:
+            return np.zeros(0)
+        context = self._memory.GetMyContextFromRoot(root_context)
+        return context.get_continuous_state_vector().CopyToVector()
 
 
 class _Parts(LeafSystem):
-    """Torques on motors and links and the rates of the states, as one vector."""
+    """Reaction, torques on links and the rates of the states, as one vector."""
 
-    def __init__(self, trains: DriveTrains) -> None:
+    def __init__(self, trains: DriveTrains, viscous: np.ndarray) -> None:
         super().__init__()
-        self._trains, n = trains, trains.size
+        self._trains, self._viscous, n = trains, viscous, trains.size
+        self._command = self.DeclareVectorInputPort("motor_torque", n)
         self._motor = self.DeclareVectorInputPort("motor_state", 2 * n)
         self._link = self.DeclareVectorInputPort("link_state", 2 * n)
-        self._command = self.DeclareVectorInputPort("motor_torque", n)
-        ports = [self._motor, self._link, self._command]
+        ports = [self._command, self._motor, self._link]
         self._memory = None
         if trains.num_states:
             self._memory = self.DeclareVectorInputPort("memory", trains.num_states)
@@ -98,10 +138,9 @@ class _Parts(LeafSystem):
         self.DeclareVectorOutputPort("torques", size, self._calc, {port.ticket() for port in ports})
 
     def _calc(self, context: Context, output: BasicVector) -> None:
-        n, motor = self._trains.size, self._motor.Eval(context)
+        n, motor, command = self._trains.size, self._motor.Eval(context), self._command.Eval(context)
         memory = motor[:0] if self._memory is None else self._memory.Eval(context)
-        deflection = self._link.Eval(context) - motor
-        found = self._trains.torques(
-            memory, (motor[:n], motor[n:]), (deflection[:n], deflection[n:]), self._command.Eval(context)
-        )
-        output.SetFromVector(np.concatenate([found.motor, found.link, found.state_rate]))
+        x, speed = self._link.Eval(context) - motor, motor[n:]
+        found = self._trains.torques(memory, (motor[:n], speed), (x[:n], x[n:]), command)
+        reaction = command - self._viscous * speed - found.motor
+        output.SetFromVector(np.concatenate([reaction, found.link, found.state_rate]))

@@ -7,6 +7,7 @@ from pydrake.systems.framework import Diagram, DiagramBuilder
 from pydrake.systems.primitives import (
     Adder,
     ConstantVectorSource,
+    Gain,
     LinearSystem,
     LogVectorOutput,
     Multiplexer,
@@ -29,9 +30,9 @@ from robots.description.drive_parts import (
 )
 from robots.description.drive_train import DriveTrain
 from robots.drivetrain.train import DriveTrains
-from systems.cell.parts_drive_train import PartsDriveTrain
+from systems.cell.parts_drive_train import DriveTrainParts
 
-LINK = 2.0  # kg m^2
+ROTOR, LINK = 0.3, 2.0  # kg m^2
 PARTS = {
     "sigmoid": {"friction": Sigmoid(5.0, 2.0, 200.0)},
     "tanh": {"friction": Tanh(5.0, 2.0, 0.01)},
@@ -55,27 +56,38 @@ def train(**parts) -> DriveTrain:
     return DriveTrain(ratio=100.0, rotor_inertia=3e-5, stiffness=4.5e4, **parts)
 
 
+def turning(inertia: float) -> LinearSystem:
+    """Angle and speed of a body under a torque."""
+    A, B = np.array([[0.0, 1.0], [0.0, 0.0]]), np.array([[0.0], [1.0 / inertia]])
+    return LinearSystem(A, B, np.eye(2), np.zeros((2, 1)))
+
+
 class Rig:
     """A motor under a torque, its train, and a link; the link alone is the plant."""
 
     def __init__(self, parts: DriveTrain, torque: np.ndarray | float = 0.0, load: float = 0.0) -> None:
         """A torque of the motor in N m, held for 10 ms each if there are many; a load of the link in N m."""
         builder = DiagramBuilder()
-        self.train = builder.AddSystem(PartsDriveTrain(DriveTrains([parts.parts()])))
-        A, B = np.array([[0.0, 1.0], [0.0, 0.0]]), np.array([[0.0], [1.0 / LINK]])
-        self.link = builder.AddSystem(LinearSystem(A, B, np.eye(2), np.zeros((2, 1))))
+        self.train = builder.AddSystem(DriveTrainParts(DriveTrains([parts.parts()])))
+        self.motor, self.link = (builder.AddSystem(turning(inertia)) for inertia in (ROTOR, LINK))
         samples = np.append(torque, 0.0)[None]
         held = PiecewisePolynomial.ZeroOrderHold([*np.arange(samples.size - 1) * 0.01, 1e3], samples)
         source = builder.AddSystem(TrajectorySource(held))
         loads, total = builder.AddSystem(ConstantVectorSource([load])), builder.AddSystem(Adder(2, 1))
+        rest = builder.AddSystem(Adder(2, 1)), builder.AddSystem(Gain(-1.0, 1))
+        builder.Connect(self.train.GetOutputPort("reaction"), rest[1].get_input_port())
+        builder.Connect(source.get_output_port(), rest[0].get_input_port(0))
+        builder.Connect(rest[1].get_output_port(), rest[0].get_input_port(1))
+        builder.Connect(rest[0].get_output_port(), self.motor.get_input_port())
         builder.Connect(source.get_output_port(), self.train.GetInputPort("motor_torque"))
+        builder.Connect(self.motor.get_output_port(), self.train.GetInputPort("motor_state"))
         builder.Connect(self.link.get_output_port(), self.train.GetInputPort("link_state"))
         builder.Connect(self.train.GetOutputPort("gear_torque"), total.get_input_port(0))
         builder.Connect(loads.get_output_port(), total.get_input_port(1))
         builder.Connect(total.get_output_port(), self.link.get_input_port())
         # Both states, and the power of the motor.
         both = builder.AddSystem(Multiplexer([2, 2]))
-        builder.Connect(self.train.GetOutputPort("motor_state"), both.get_input_port(0))
+        builder.Connect(self.motor.get_output_port(), both.get_input_port(0))
         builder.Connect(self.link.get_output_port(), both.get_input_port(1))
         self.log = LogVectorOutput(both.get_output_port(), builder, 1e-3)
         self.diagram: Diagram = builder.Build()
@@ -86,9 +98,8 @@ class Rig:
     def start(self, motor: float = 0.0, link: float = 0.0, deflection: float = 0.0, **config) -> "Rig":
         """At rest under the load, then with speeds in rad/s and the link turned by so much in rad."""
         self.train.set_at_rest(self.root, np.zeros(1), np.full(1, self.load))
-        motors = self.train.GetSubsystemByName("motors").GetMyMutableContextFromRoot(self.root)
-        motors.SetContinuousState([0.0, motor])
-        q = self.train.wind_up(np.full(1, self.load), np.zeros(1))[0] + deflection
+        self.motor.GetMyMutableContextFromRoot(self.root).SetContinuousState([0.0, motor])
+        q = self.train.trains.at_rest(np.full(1, self.load), np.zeros(1))[0][0] + deflection
         self.link.GetMyMutableContextFromRoot(self.root).SetContinuousState([q, link])
         options = {"integration_scheme": "runge_kutta3", "accuracy": 1e-4, "max_step_size": 1e-3} | config
         ApplySimulatorConfig(SimulatorConfig(**options), self.simulator)
@@ -96,8 +107,11 @@ class Rig:
         return self
 
     def energy(self) -> float:
-        q, v = self.link.GetMyContextFromRoot(self.root).get_continuous_state_vector().CopyToVector()
-        return self.train.energy(self.root, np.array([q])) + 0.5 * LINK * v**2 - self.load * q
+        states = (system.GetMyContextFromRoot(self.root) for system in (self.motor, self.link))
+        (theta, w), (q, v) = (context.get_continuous_state_vector().CopyToVector() for context in states)
+        memory, trains = self.train.memory(self.root), self.train.trains
+        stored = trains.energy(memory, np.array([theta]), np.array([q - theta]))
+        return stored + 0.5 * ROTOR * w**2 + 0.5 * LINK * v**2 - self.load * q
 
     def states(self) -> tuple[np.ndarray, np.ndarray]:
         """Times (n,) and theta, omega, q, v, shape (4, n), every millisecond."""
