@@ -122,6 +122,7 @@ def add_driven_robot(
     config: StationConfig,
     kind: str,
     encoders: LeafSystem | None = None,
+    takes_torque: bool = False,
 ) -> DrivenRobot:
     """Adds plant, drive trains, motors and drives to a diagram.
 
@@ -134,12 +135,14 @@ def add_driven_robot(
         config: the station part of a scenario.
         kind: of the drives, ``"position"``, ``"velocity"`` or ``"cascade"``.
         encoders: what makes of the true motor state the one that the drives see; None for nothing.
+        takes_torque: whether the drives take a torque feedforward.
 
     Raises:
         ValueError: if a part refuses its configuration.
     """
     told = config.payload if config.drive.payload is None else config.drive.payload
-    drive = builder.AddNamedSystem("drive", Drive(nominal, kind, config.drive, config.period, told))
+    drive = Drive(nominal, kind, config.drive, config.period, told, takes_torque)
+    builder.AddNamedSystem("drive", drive)
     plant = builder.AddNamedSystem("plant", MultibodyPlant(0.0))
     is_rigid = config.elasticity == "rigid"
     links = add_robot(plant, robot, config.elasticity, config.payload, config.errors, drive_trains=is_rigid)

@@ -7,8 +7,6 @@ from pydrake.common import RandomDistribution, RandomGenerator
 from pydrake.multibody.plant import MultibodyPlant
 from pydrake.systems.framework import Context, Diagram, DiagramBuilder, OutputPort
 from pydrake.systems.primitives import (
-    ConstantVectorSource,
-    DiscreteTimeDelay,
     RandomSource,
 )
 
@@ -113,11 +111,10 @@ class SimulatedStation(Diagram):
         self._encoders = Encoders(robot, config.encoder)
         discs = eccentric_discs(self._encoders) if self._encoders.is_eccentric else None
         config = replace(config, drive=drive_config)
-        self._driven = add_driven_robot(builder, robot, self._true_robot, config, drive, discs)
+        self._driven = add_driven_robot(builder, robot, self._true_robot, config, drive, discs, takes_torque)
         self.robot, self.drive = self._driven.links, self._driven.drive
         self._geometry = TrueGeometry(self.robot, config.events, config.link_growth_ppm_per_hour)
         self._connect_commands(builder)
-        self._connect_torque_feedforward(builder, config, takes_torque)
         self._add_joint_sensor(builder, _RUNAWAY * float(robot.speed.max()))
         self._noise = self._add_camera(builder, _camera(robot, config), config)
         builder.ExportOutput(self.plant.get_state_output_port(), "truth.state")
@@ -137,8 +134,10 @@ class SimulatedStation(Diagram):
         return self._driven.setpoint
 
     def _connect_commands(self, builder: DiagramBuilder) -> None:
-        """Commands to the drive, through the controller if there is one."""
-        for name in ("position_command", "velocity_command"):
+        """Commands to the drive, through the controller if there is one, which takes no torque."""
+        for name in ("position_command", "velocity_command", "torque_feedforward"):
+            if not (self._motion or self.drive).HasInputPort(name):
+                continue
             if self._motion:
                 builder.Connect(self._motion.GetOutputPort(name), self.drive.GetInputPort(name))
             port = (self._motion or self.drive).GetInputPort(name)
@@ -146,24 +145,6 @@ class SimulatedStation(Diagram):
                 builder.Connect(self._delay.GetOutputPort(name), port)
                 port = self._delay.GetInputPort(name)
             builder.ExportInput(port, name)
-
-    def _connect_torque_feedforward(
-        self, builder: DiagramBuilder, config: StationConfig, takes_torque: bool
-    ) -> None:
-        ahead = self.drive.GetInputPort("torque_feedforward")
-        if takes_torque:
-            # As late as the positions that it belongs to. The delay takes one period to read its input.
-            delay = round((config.drive.command_delay + config.drive.dead_time) / config.period) - 1
-            late = builder.AddNamedSystem("torque_delay", DiscreteTimeDelay(config.period, delay, NUM_JOINTS))
-            port = late.get_input_port()
-            if self._delay:
-                builder.Connect(self._delay.GetOutputPort("torque_feedforward"), port)
-                port = self._delay.GetInputPort("torque_feedforward")
-            builder.ExportInput(port, "torque_feedforward")
-            builder.Connect(late.get_output_port(), ahead)
-        else:
-            no_torque = builder.AddNamedSystem("no_feedforward", ConstantVectorSource(np.zeros(NUM_JOINTS)))
-            builder.Connect(no_torque.get_output_port(), ahead)
 
     def _add_joint_sensor(self, builder: DiagramBuilder, runaway: float) -> None:
         motor_state = self._driven.measured_state

@@ -3,11 +3,7 @@
 import numpy as np
 from pydrake.systems.analysis import Simulator
 from pydrake.systems.framework import Diagram, DiagramBuilder
-from pydrake.systems.primitives import (
-    ConstantVectorSource,
-    Demultiplexer,
-    TrajectorySource,
-)
+from pydrake.systems.primitives import Demultiplexer, TrajectorySource
 from pydrake.trajectories import PiecewisePolynomial
 
 from diagrams.driven_robot import add_driven_robot
@@ -37,13 +33,11 @@ class BarePlant:
         kind = experiment.scenario.servo.laws[experiment.law].drive
         self._driven = add_driven_robot(builder, robot, true_robot(robot, config), config, kind)
         drive = self._driven.drive
-        no_torque = builder.AddNamedSystem("no_feedforward", ConstantVectorSource(np.zeros(NUM_JOINTS)))
         commands = builder.AddNamedSystem("commands", TrajectorySource(_held(log, config.period)))
         split = builder.AddNamedSystem("split", Demultiplexer([NUM_JOINTS, NUM_JOINTS]))
         builder.Connect(commands.get_output_port(), split.get_input_port())
         builder.Connect(split.get_output_port(0), drive.GetInputPort("position_command"))
         builder.Connect(split.get_output_port(1), drive.GetInputPort("velocity_command"))
-        builder.Connect(no_torque.get_output_port(), drive.GetInputPort("torque_feedforward"))
         self._diagram: Diagram = builder.Build()
         self._simulator = Simulator(self._diagram)
         self._context = self._simulator.get_mutable_context()

@@ -52,22 +52,24 @@ class CommandInterpolator(Diagram):
         base = max(0, int(np.ceil((delay - 2.0 * period) / period - 1e-9)))
         lead = 2.0 * period - delay + base * period
         builder = DiagramBuilder()
-        commands = builder.AddNamedSystem("commands", Multiplexer([NUM_JOINTS, NUM_JOINTS]))
-        inputs = builder.AddNamedSystem("inputs", Multiplexer([_WIDTH, _WIDTH]))
         steering = _steering(period, lead, base > 0, tracks_position)
         self._steering = builder.AddNamedSystem("steering", steering)
         self._transit = None
-        newest = commands.get_output_port()
         if base > 1:
             # The delay takes one period to read its input.
             self._transit = builder.AddNamedSystem("transit", DiscreteTimeDelay(period, base - 2, _WIDTH))
-            builder.Connect(newest, self._transit.get_input_port())
-            newest = self._transit.get_output_port()
-        builder.Connect(newest, inputs.get_input_port(0))
+            commands = builder.AddNamedSystem("commands", Multiplexer([NUM_JOINTS, NUM_JOINTS]))
+            inputs = builder.AddNamedSystem("inputs", Multiplexer([_WIDTH, _WIDTH]))
+            builder.Connect(commands.get_output_port(), self._transit.get_input_port())
+            builder.Connect(self._transit.get_output_port(), inputs.get_input_port(0))
+        else:
+            commands = inputs = builder.AddNamedSystem(
+                "inputs", Multiplexer([NUM_JOINTS, NUM_JOINTS, _WIDTH])
+            )
         builder.Connect(inputs.get_output_port(), self._steering.get_input_port())
         for index, name in enumerate(("position_command", "velocity_command")):
             builder.ExportInput(commands.get_input_port(index), name)
-        builder.ExportInput(inputs.get_input_port(1), "setpoint")
+        builder.ExportInput(inputs.get_input_port(inputs.num_input_ports() - 1), "setpoint")
         builder.ExportOutput(self._steering.get_output_port(), "acceleration")
         builder.BuildInto(self)
 

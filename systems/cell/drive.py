@@ -21,6 +21,7 @@ from robots.description.model import NUM_JOINTS, RobotModel
 from robots.dynamics.plant import add_robot
 from systems.cell.command_interpolator import CommandInterpolator
 from systems.cell.motors import PidGains
+from systems.cell.torque_delay import TorqueDelay
 
 KINDS = ("position", "velocity", "cascade")
 
@@ -66,7 +67,7 @@ class Drive(Diagram):
     Ports:
         in  ``position_command``    vector 6 in rad
         in  ``velocity_command``    vector 6 in rad/s
-        in  ``torque_feedforward``  vector 6 in N m, joint side
+        in  ``torque_feedforward``  vector 6 in N m, joint side; only if it is taken
         in  ``motor_state``         vector 12, motor positions (rad), then velocities (rad/s)
         in  ``setpoint``            vector 12, positions and velocities of the set-points
         out ``acceleration``        vector 6 in rad/s^2, of the set-points until the next tick
@@ -80,7 +81,13 @@ class Drive(Diagram):
     """
 
     def __init__(
-        self, robot: RobotModel, kind: str, config: DriveConfig, period: float, payload: float = 0.0
+        self,
+        robot: RobotModel,
+        kind: str,
+        config: DriveConfig,
+        period: float,
+        payload: float = 0.0,
+        takes_torque: bool = False,
     ) -> None:
         """Wires the drive.
 
@@ -90,36 +97,39 @@ class Drive(Diagram):
             config: gains and delays.
             period: time between commands in s.
             payload: mass at the flange in kg that the gravity compensation knows of.
+            takes_torque: whether it takes a torque feedforward, which is as late as the positions are.
 
         Raises:
             ValueError: if the kind is unknown or the delay is shorter than one period.
         """
         super().__init__()
         builder = DiagramBuilder()
-        self._interpolator = builder.AddNamedSystem(
-            "interpolator",
-            CommandInterpolator(
-                period, config.command_delay + config.dead_time, tracks_position=kind != "velocity"
-            ),
-        )
+        delay = config.command_delay + config.dead_time
+        interpolator = CommandInterpolator(period, delay, tracks_position=kind != "velocity")
+        self._interpolator = builder.AddNamedSystem("interpolator", interpolator)
         # Kept as a member: the system that computes the load only refers to it.
         self._rigid_plant = MultibodyPlant(0.0)
         self._rigid = add_robot(self._rigid_plant, robot, "rigid", payload)
         self._rigid_plant.Finalize()
         self.gains = _pid_gains(robot, kind, config, self._rigid_plant)
         ahead = builder.AddNamedSystem("ahead", MatrixGain(_half_a_tick_ahead(period)))
-        load = _add_load_compensation(builder, self._rigid_plant)
+        load = _add_load_compensation(builder, self._rigid_plant, robot.counterbalance is not None)
         self._held_load = builder.AddNamedSystem("held_load", ZeroOrderHold(period, NUM_JOINTS))
-        added = builder.AddNamedSystem("added_torque", Adder(2, NUM_JOINTS))
+        added_torque = self._held_load.get_output_port()
         builder.Connect(ahead.get_output_port(), load.get_input_port_estimated_state())
         builder.Connect(load.get_output_port_generalized_force(), self._held_load.get_input_port())
-        builder.Connect(self._held_load.get_output_port(), added.get_input_port(0))
+        if takes_torque:
+            late = builder.AddNamedSystem("torque_delay", TorqueDelay(period, delay))
+            added = builder.AddNamedSystem("added_torque", Adder(2, NUM_JOINTS))
+            builder.Connect(added_torque, added.get_input_port(0))
+            builder.Connect(late.get_output_port(), added.get_input_port(1))
+            builder.ExportInput(late.get_input_port(), "torque_feedforward")
+            added_torque = added.get_output_port()
         for name in ("position_command", "velocity_command", "setpoint"):
             builder.ExportInput(self._interpolator.GetInputPort(name), name)
         builder.ExportInput(ahead.get_input_port(), "motor_state")
-        builder.ExportInput(added.get_input_port(1), "torque_feedforward")
         builder.ExportOutput(self._interpolator.GetOutputPort("acceleration"), "acceleration")
-        builder.ExportOutput(added.get_output_port(), "added_torque")
+        builder.ExportOutput(added_torque, "added_torque")
         builder.BuildInto(self)
 
     def set_at_rest(self, root_context: Context, theta: np.ndarray) -> None:
@@ -156,12 +166,14 @@ def _half_a_tick_ahead(period: float) -> np.ndarray:
     return np.block([[one, 0.5 * period * one], [o, o]])
 
 
-def _add_load_compensation(builder: DiagramBuilder, plant: MultibodyPlant) -> InverseDynamics:
-    """Adds a system from a state at rest to the torque that holds the rigid robot there.
-
-    Inverse dynamics without motion: the mode for gravity would leave the spring of a counterbalance out.
-    """
+def _add_load_compensation(
+    builder: DiagramBuilder, plant: MultibodyPlant, has_counterbalance: bool
+) -> InverseDynamics:
+    """Adds a system from a state at rest to the torque that holds the rigid robot there."""
     modes = InverseDynamics.InverseDynamicsMode
+    if not has_counterbalance:
+        return builder.AddNamedSystem("load", InverseDynamics(plant, modes.kGravityCompensation))
+    # The mode for gravity leaves springs between bodies out; without motion the other one has just the two.
     load = builder.AddNamedSystem("load", InverseDynamics(plant, modes.kInverseDynamics))
     at_rest = builder.AddNamedSystem("at_rest", ConstantVectorSource(np.zeros(NUM_JOINTS)))
     builder.Connect(at_rest.get_output_port(), load.get_input_port_desired_acceleration())

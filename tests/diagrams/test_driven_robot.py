@@ -40,7 +40,7 @@ def build(
     config = StationConfig(elasticity=elasticity, payload=7.0, drive=drive or DriveConfig())
     driven = add_driven_robot(builder, robot, robot, config, kind)
     still = builder.AddSystem(ConstantVectorSource(np.zeros(6)))
-    for name in ("position_command", "velocity_command", "torque_feedforward"):
+    for name in ("position_command", "velocity_command"):
         builder.Connect(still.get_output_port(), driven.drive.GetInputPort(name))
     return driven, builder.Build()
 

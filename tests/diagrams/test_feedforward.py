@@ -115,9 +115,12 @@ def test_torque_has_a_port_on_both_sides_only_where_it_is_fed_forward():
             assert getattr(diagram, has)("torque_feedforward") == (kind != "none")
 
 
-@pytest.mark.parametrize("dead_time", [0.0, 0.02])
+@pytest.mark.parametrize("dead_time", [0.0, 0.002, 0.02])
 def test_torque_arrives_as_late_as_the_positions_that_it_belongs_to(dead_time: float):
-    """With the whole delay previewed, a model that is exact leaves as little as without a delay."""
+    """With the whole delay previewed, a model that is exact leaves as little as without a delay.
+
+    Also with a delay of one period and a half.
+    """
     settings = [f"station.drive.dead_time={dead_time}", f"reference.preview={0.004 + dead_time}"]
     scenario = load_scenario(
         "nominal",

@@ -50,9 +50,15 @@ class Controllers:
     """Drives and their loops on motors whose state comes from a port."""
 
     def __init__(
-        self, builder: DiagramBuilder, kind: str, config: DriveConfig, payload: float, motor_state: OutputPort
+        self,
+        builder: DiagramBuilder,
+        kind: str,
+        config: DriveConfig,
+        payload: float,
+        motor_state: OutputPort,
+        takes_torque=False,
     ) -> None:
-        self.drive = builder.AddSystem(Drive(ROBOT, kind, config, PERIOD, payload))
+        self.drive = builder.AddSystem(Drive(ROBOT, kind, config, PERIOD, payload, takes_torque))
         self.loops = builder.AddSystem(motor_controllers(self.drive.gains))
         inputs = builder.AddSystem(Multiplexer([6, 6, 12]))
         parts = builder.AddSystem(Demultiplexer([6, 6, 12]))
@@ -79,7 +85,6 @@ def torques(kind: str, state: Callable, command: Callable, times, payload: float
     signals = {
         "position_command": lambda t: command(t)[0],
         "velocity_command": lambda t: command(t)[1],
-        "torque_feedforward": lambda t: np.zeros(6),
     }
     for name, signal in signals.items():
         source = builder.AddSystem(VectorSignal(signal))
@@ -105,7 +110,9 @@ def motion(kind: str, command: Callable, duration: float, config=CONFIG, load=0.
     """Motor positions and velocities (n, 6) at the ticks of a rigid robot that starts at the command."""
     builder = DiagramBuilder()
     plant = builder.AddSystem(rigid_plant(load))
-    controllers = Controllers(builder, kind, config, known_load, plant.get_state_output_port())
+    controllers = Controllers(
+        builder, kind, config, known_load, plant.get_state_output_port(), takes_torque=extra != 0.0
+    )
     drive, friction = controllers.drive, builder.AddSystem(CoulombFriction(ROBOT))
     joint_torque = builder.AddSystem(Adder(2, 6))
     builder.Connect(plant.get_state_output_port(), friction.get_input_port())
@@ -119,8 +126,9 @@ def motion(kind: str, command: Callable, duration: float, config=CONFIG, load=0.
         holds.append(hold)
         builder.Connect(signal.get_output_port(), hold.get_input_port())
         builder.Connect(hold.get_output_port(), drive.GetInputPort(name))
-    feedforward = builder.AddSystem(ConstantVectorSource(np.full(6, extra)))
-    builder.Connect(feedforward.get_output_port(), drive.GetInputPort("torque_feedforward"))
+    if extra:
+        feedforward = builder.AddSystem(ConstantVectorSource(np.full(6, extra)))
+        builder.Connect(feedforward.get_output_port(), drive.GetInputPort("torque_feedforward"))
     log = LogVectorOutput(plant.get_state_output_port(), builder, PERIOD)
     simulator = Simulator(builder.Build())
     # Velocity control of the light wrist is stiff: 100 N m s / rad times the gear on 0.2 kg m^2.
