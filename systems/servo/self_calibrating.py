@@ -1,6 +1,7 @@
 """A law that puts the tip on the path by knowing the robot: it calibrates robot, load and delays at work."""
 
 from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 from pydrake.common.value import Value
@@ -8,7 +9,8 @@ from pydrake.systems.framework import Context, DiscreteValues, LeafSystem
 
 from robots.description.model import NUM_JOINTS
 from systems.controller_model import ControllerModel
-from systems.estimation.drive_model import DriveModel
+from systems.estimation.drive_model import DEAD_TIME, DriveModel
+from systems.estimation.findings import findings
 from systems.estimation.memory import History, Layout
 from systems.estimation.parameter_lead import ParameterLead
 from systems.estimation.preview_planner import PreviewPlanner, Wanted
@@ -132,6 +134,15 @@ class SelfCalibrating(LeafSystem):
     def memory(self, context: Context) -> SimpleNamespace:
         """All that the law remembers, as arrays that must not be written to."""
         return self._layout.view(context.get_discrete_state(self._memory).value())
+
+    def learnt(self, context: Context) -> dict[str, Any]:
+        """What it has found out until now: `findings`, and ``dead_time_s`` from a command to its motion."""
+        memory = self.memory(context)
+        late = float(memory.drives.beta[DEAD_TIME])
+        return {
+            "dead_time_s": self._model.command_delay + late,
+            **findings(self.estimator, memory.estimator),
+        }
 
     def _tick(self, context: Context, discrete_state: DiscreteValues) -> None:
         time = context.get_time()

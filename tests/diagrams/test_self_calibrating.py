@@ -21,7 +21,12 @@ def tip_errors(log) -> tuple[np.ndarray, np.ndarray]:
 
 
 def test_the_tip_comes_onto_the_path_before_it_begins():
-    settings = ["station.elasticity=structure", *WRONG, "reference.settle=3"]
+    late = [
+        "station.camera.clock_offset=-0.003",
+        "station.drive.dead_time=0.003",
+        "servo.model.command_delay=0.004",
+    ]
+    settings = ["station.elasticity=structure", *WRONG, *late, "reference.settle=3"]
     experiment = Experiment(load_scenario("misaligned", settings), "self_calibrating")
     experiment.advance(until=4.5)
     log = experiment.log()
@@ -29,6 +34,9 @@ def test_the_tip_comes_onto_the_path_before_it_begins():
     assert errors[0] > 10e-3
     assert errors[log.time >= 3.0].max() < 0.15e-3
     assert not any(log.guard_counts.values())
+    assert log.learnt is not None
+    assert log.learnt["clock_offset_s"] == pytest.approx(3e-3, abs=0.2e-3)
+    assert log.learnt["dead_time_s"] == pytest.approx(7e-3, abs=0.2e-3)
 
 
 def test_the_same_seed_gives_the_same_commands():
