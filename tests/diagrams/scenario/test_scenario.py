@@ -24,7 +24,14 @@ def written(folder: Path, text: str, name: str = "mine.yaml") -> str:
 
 
 def test_the_shipped_scenarios_load_by_name_and_say_what_they_are():
-    assert shipped_scenarios() == ["cell", "dead-time", "everything", "misaligned", "nominal"]
+    assert shipped_scenarios() == [
+        "cell",
+        "dead-time",
+        "everything",
+        "everything-realistic",
+        "misaligned",
+        "nominal",
+    ]
     for name in shipped_scenarios():
         assert len(load_scenario(name).description) > 40
 
@@ -194,7 +201,7 @@ def test_events_are_written_as_they_are_read():
 def test_a_missing_scenario_is_named_beside_those_that_exist(name: str):
     text = refusal(name)
     assert f"scenario '{name}': no file" in text
-    assert "dead-time, everything, misaligned, nominal" in text
+    assert "everything, everything-realistic, misaligned, nominal" in text
 
 
 def test_a_file_that_extends_itself_is_refused(tmp_path: Path):
