@@ -1,37 +1,64 @@
-"""The cases in which laws are tried: one thing after another made worse."""
+"""The cases in which laws are tried: the plain scenario, and one thing after another made worse."""
 
 from experiments.robustness.study import Case
 
-_DROPOUTS = "station.camera.dropouts=[[8, 8.5], [12, 12.5]]"
-_LOSS = "station.camera.dropout_probability=0.05"
+_LATE = ("station.drive.dead_time=0.139", "servo.model.command_delay=0.14")
+_AT = 6.0  # s, an event on the move, on every path
+_EGM = 0.004032  # s, the period of the controller of scenario 'cell'
+
+
+def _event(text: str) -> str:
+    return f"station.events=[{text}]"
+
 
 CASES = {
     case.name: case
     for case in (
         Case("plain"),
-        Case("140ms", ("station.drive.dead_time=0.139", "servo.model.command_delay=0.14")),
+        Case("140ms", _LATE),
         Case(
-            "slow-camera",
+            "egm",
             (
-                "station.drive.dead_time=0.139",
-                "servo.model.command_delay=0.14",
-                "station.camera.period=0.012",
-                "station.camera.delay=0.02",
+                "station.interface=egm",
+                f"station.period={_EGM}",
+                f"station.drive.command_delay={_EGM}",
+                f"servo.model.command_delay={_EGM}",
+                f"reference.preview={_EGM}",
             ),
         ),
-        Case("drop-outs", (_DROPOUTS, _LOSS)),
-        Case("tool-displaced", ("station.events=[!ToolShift {at: 9, shift_mm: [0.29, 0.29, 0.29]}]",)),
+        Case("slow-camera", (*_LATE, "station.camera.period=0.01", "station.camera.delay=0.02")),
+        Case(
+            "drop-outs",
+            (
+                "station.camera.dropouts=[[5, 5.5], [8, 8.5]]",
+                "station.camera.dropout_probability=0.05",
+            ),
+        ),
+        Case(
+            "tool-displaced",
+            (_event(f"!ToolShift {{at: {_AT}, shift_mm: [0.29, 0.29, 0.29]}}"),),
+            recovered_at=_AT + 0.5,
+        ),
         Case(
             "load-picked-up",
             (
                 "station.payload=0",
                 "servo.model.payload=0",
-                "station.events=[!PayloadChange {at: 9, payload: 7}]",
+                _event(f"!PayloadChange {{at: {_AT}, payload: 7}}"),
             ),
+            recovered_at=_AT + 1.5,
         ),
-        Case("camera-moved", ("station.events=[!CameraShift {at: 9, shift_mm: [0.3, 0, 0]}]",)),
-        Case("dead-time-step", ("station.events=[!DeadTimeChange {at: 9, dead_time: 0.033}]",)),
+        Case(
+            "camera-moved",
+            (_event(f"!CameraShift {{at: {_AT}, shift_mm: [0.3, 0, 0]}}"),),
+            recovered_at=_AT + 1.5,
+        ),
+        Case(
+            "dead-time-step",
+            (_event(f"!DeadTimeChange {{at: {_AT}, dead_time: 0.033}}"),),
+            recovered_at=_AT + 1.5,
+        ),
         Case("reflections", ("station.camera.outlier_probability=0.2",)),
-        Case("egm", ("station.interface=egm",)),
+        Case("clock-drift", ("station.camera.clock_drift_ppm=500",)),
     )
 }

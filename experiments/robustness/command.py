@@ -79,8 +79,8 @@ def _print(console: Console, scenario: str, results: list[dict[str, Any]]) -> No
         title_justify="left",
         title_style="italic",
     )
-    for name in ("case", "law", "lap", "mm", "°", "at rest mm", "worst", "guard"):
-        table.add_column(name, justify="right" if name in ("lap", "mm", "°", "at rest mm") else "left")
+    for name in ("case", "law", "lap", "mm", "°", "at rest mm", "recovered mm", "worst", "guard"):
+        table.add_column(name, justify="left" if name in ("case", "law", "worst") else "right", no_wrap=True)
     for result in results:
         label = escape(result["case"]), escape(law_title(result["law"]))
         laps = result.get("laps", [])
@@ -92,11 +92,12 @@ def _print(console: Console, scenario: str, results: list[dict[str, Any]]) -> No
                 _pair(lap["max_norm_mm"], 3),
                 _pair(lap["max_angle_deg"], 4),
                 _pair(result["static_mm"], 4) if is_last else "",
+                _pair(result["recovered_mm"], 3) if is_last and "recovered_mm" in result else "",
                 f"seed {result['worst_seed']}, {result['worst_path']}" if is_last else "",
                 str(result["guard"]) if is_last else "",
             )
         for failure in result["failures"]:
-            table.add_row(*label, "", "", "", "", f"[red]{escape(failure)}[/red]", "")
+            table.add_row(*label, "", "", "", "", "", f"[red]{escape(failure)}[/red]", "")
     console.print(table)
 
 

@@ -20,6 +20,7 @@ class Case:
 
     name: str
     settings: tuple[str, ...] = ()  # of the scenario, as ``--set`` takes them
+    recovered_at: float | None = None  # s, from when on what has happened must be made up for
 
 
 @dataclass(frozen=True)
@@ -90,6 +91,9 @@ def run_trial(trial: Trial, progress: Progress) -> dict[str, Any]:
     except RuntimeError as error:  # a SimulationError; the others shall go on
         return row | {"failure": str(error)}
     errors = error_metrics(log, "true")
+    if trial.case.recovered_at is not None:
+        e = pose_errors(log, "true")[log.time >= trial.case.recovered_at]
+        row["recovered_mm"] = 1e3 * float(np.linalg.norm(e[:, 3:], axis=1).max())
     return row | {
         "max_norm_mm": errors["max_norm_mm"],
         "max_angle_deg": errors["max_angle_deg"],
@@ -106,6 +110,7 @@ def judged(rows: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
 
     Returns:
         ``laps``: per lap ``max_norm_mm`` and ``max_angle_deg``, then ``static_mm``, as (worst, median) each;
+        ``recovered_mm``: largest distance after what happens, where something does, likewise;
         ``worst_seed`` and ``worst_path`` of the largest distance; ``guard``: interventions of all runs;
         ``failures``: runs that broke off.
     """
@@ -126,6 +131,8 @@ def judged(rows: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
         }
         for lap in range(len(done[0]["laps"]))
     ]
+    if "recovered_mm" in done[0]:
+        result["recovered_mm"] = _worst_and_median([row["recovered_mm"] for row in done])
     return result | {
         "laps": laps,
         "static_mm": _worst_and_median([row["static_mm"] for row in done]),
