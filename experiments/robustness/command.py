@@ -8,14 +8,17 @@ from rich.console import Console
 from rich.markup import escape
 from rich.table import Table
 
+from diagrams.scenario.scenario import load_scenario
 from experiments.cli.console import count, progress_bar, refusing
 from experiments.cli.json_output import human_console, json_output
 from experiments.cli.option_limits import at_least
 from experiments.cli.options import JobsOption, JsonOption, SetOption
 from experiments.cli.workers import usable_cores
+from experiments.comparison.compare import named_laws
 from experiments.report.style import law_title
 from experiments.robustness.cases import CASES
 from experiments.robustness.study import Case, judged, run_trials, trials
+from systems.reference.paths import make_path
 
 PATHS = ("rectangle", "circle", "figure_eight")
 
@@ -44,9 +47,12 @@ def robustness_command(
         for name, value in (("--seeds", seeds), ("--laps", laps), ("--jobs", jobs)):
             at_least(name, 1, value)
         chosen = [_case(name, settings or []) for name in (CASES if cases == "all" else cases.split(","))]
-        todo = trials(
-            scenario, chosen, laws.split(","), range(first_seed, first_seed + seeds), paths.split(","), laps
-        )
+        named = named_laws(laws)
+        drawn = range(first_seed, first_seed + seeds)
+        todo = trials(scenario, chosen, named, drawn, paths.split(","), laps)
+        for trial in todo:
+            if trial.seed == first_seed:  # what cannot run is refused before anything does
+                make_path(load_scenario(scenario, trial.settings).reference)
         processes = min(jobs or usable_cores(), len(todo))
         with (
             json_output(json_file) as output,
@@ -59,7 +65,7 @@ def robustness_command(
             results = [
                 {"case": case.name, "law": law, **judged(matching)}
                 for case in chosen
-                for law in laws.split(",")
+                for law in named
                 if (matching := [row for row in rows if (row["case"], row["law"]) == (case.name, law)])
             ]
             output.write({"scenario": scenario, "results": results, "runs": rows})

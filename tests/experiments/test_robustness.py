@@ -1,0 +1,80 @@
+"""Laws on many random robots: what is drawn, how it is judged, and what is refused."""
+
+import json
+from pathlib import Path
+
+import pytest
+
+from diagrams.scenario.scenario import load_scenario
+from experiments.robustness.cases import CASES
+from experiments.robustness.study import Case, judged, trials
+from tests.experiments.commands import refusal, truetip
+
+QUICK = ["reference.settle=0", "reference.dwell=0.5", "reference.acceleration=8", "station.elasticity=rigid"]
+
+
+def test_every_case_is_a_scenario_and_only_the_seed_draws_the_robot():
+    for trial in trials("everything", list(CASES.values()), ["open_loop"], [3], ["circle"], laps=2):
+        scenario = load_scenario(trial.scenario, trial.settings)
+        station = scenario.station
+        assert (scenario.seed, station.errors.random.seed, station.variation.seed) == (3, 3, 3)
+        assert (scenario.reference.path, scenario.reference.laps) == ("circle", 2)
+        assert bool(station.events) == (trial.case.recovered_at is not None)
+
+
+def row(seed: int, laps: list[float], failure: str | None = None) -> dict:
+    if failure:
+        return {"seed": seed, "path": "circle", "failure": failure}
+    return {
+        "seed": seed,
+        "path": "circle",
+        "failure": None,
+        "max_norm_mm": max(laps),
+        "static_mm": 0.1 * seed,
+        "static_deg": 0.01 * seed,
+        "laps": [{"max_norm_mm": lap, "max_angle_deg": 0.1 * lap, "rms_mm": lap} for lap in laps],
+        "guard": {"velocity_limit": seed},
+    }
+
+
+def test_worst_and_median_are_taken_over_the_runs_that_came_to_their_end():
+    result = judged([row(1, [3.0, 1.0]), row(2, [5.0, 2.0]), row(3, [4.0, 3.0]), row(4, [], "ran away")])
+    assert [lap["max_norm_mm"] for lap in result["laps"]] == [(5.0, 4.0), (3.0, 2.0)]
+    assert result["static_mm"] == pytest.approx((0.3, 0.2))
+    assert (result["worst_seed"], result["guard"]) == (2, 6)
+    assert result["failures"] == ["seed 4, circle: ran away"]
+
+
+def test_without_a_single_run_there_are_only_failures():
+    assert judged([row(1, [], "ran away")]) == {"runs": 1, "failures": ["seed 1, circle: ran away"]}
+
+
+def test_a_case_is_a_name_and_settings():
+    trial = trials("misaligned", [Case("loaded", ("station.payload=3",))], ["pbvs"], [7], ["rectangle"])[0]
+    assert load_scenario(trial.scenario, trial.settings).station.payload == 3.0
+
+
+def test_the_command_prints_a_row_of_each_law_and_writes_the_numbers(tmp_path: Path):
+    file = tmp_path / "numbers.json"
+    settings = [part for setting in QUICK for part in ("--set", setting)]
+    options = ["--scenario", "everything", "--paths", "circle", "--seeds", 2, "--jobs", 1, "--json", file]
+    result = truetip("robustness", "--laws", "open_loop", *options, *settings)
+    assert result.exit_code == 0, result.output
+    numbers = json.loads(file.read_text())
+    assert [run["seed"] for run in numbers["runs"]] == [1000, 1001]
+    worst, median = numbers["results"][0]["laps"][0]["max_norm_mm"]
+    assert worst > median > 5.0  # millimetres, of robots that are off by some
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (["--cases", "earthquake"], "--cases: must be of plain, 140ms"),
+        (["--laws", "nothing"], "nothing"),
+        (["--seeds", 0], "--seeds"),
+        (["--paths", "spiral"], "spiral"),
+        (["--scenario", "nowhere"], "scenario 'nowhere': no file"),
+    ],
+)
+def test_refuses_what_cannot_be_run_before_anything_runs(arguments: list, message: str):
+    assert message in refusal(truetip("robustness", *arguments))
