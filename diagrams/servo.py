@@ -63,8 +63,9 @@ class Servo(Diagram):
         check_ports(self.law)
         builder = DiagramBuilder()
         self.reference = builder.AddNamedSystem("reference", Reference(scenario.reference, self.model.period))
-        if hasattr(self.law, "check_path"):
-            self.law.check_path(self.reference.path)
+        check_path = getattr(self.law, "check_path", None)  # of laws that cannot follow every path
+        if check_path is not None:
+            check_path(self.reference.path)
         builder.AddNamedSystem("law", self.law)
         feedforward = scenario.servo.feedforward
         self.has_torque = feedforward.kind != "none" or self.law.HasOutputPort("torque_feedforward")

@@ -250,7 +250,7 @@ class NewtonInverse:
         found = least_squares(
             residuals,
             q,
-            derivative,
+            jac=derivative,  # pyright: ignore[reportArgumentType]  # scipy's stubs know only its names
             method="lm",
             ftol=1e-15,
             xtol=1e-15,

@@ -71,7 +71,8 @@ def test_the_commanded_angular_velocity_is_that_of_the_commanded_orientation(for
     turn, rate = np.array([0.1, -0.2, 0.15]), np.array([0.5, 0.2, -0.4])
 
     def commanded(t: float) -> np.ndarray:
-        R_WD = rotation_about(w_WD / np.linalg.norm(w_WD), np.linalg.norm(w_WD) * t) @ R_0
+        speed = float(np.linalg.norm(w_WD))
+        R_WD = rotation_about(w_WD / speed, speed * t) @ R_0
         return correction.command(correction.moved(turn, t * rate), rate, R_WD, w_WD)[0]
 
     _, w_WC, _ = correction.command(turn, rate, R_0, w_WD)
