@@ -220,7 +220,7 @@ def start_position(model: ControllerModel, scenario: Scenario, path: CartesianPa
         return inverse.nearest(X_WE, q_path[0])
     except ValueError as error:
         raise ScenarioError(
-            f"{model.robot.name} cannot follow the path '{scenario.reference.path}': {error}"
+            f"{model.robot.name} cannot follow the path '{scenario.reference.path.kind}': {error}"
         ) from error
 
 

@@ -3,6 +3,7 @@
 from importlib.resources import files
 from pathlib import Path
 
+from diagrams.scenario.former_names import renamed
 from robots.configuration.extended import FileKind, read_extended
 from robots.configuration.nodes import ConfigurationError, Node, parse
 from robots.configuration.typed import merged
@@ -29,9 +30,9 @@ def read_scenario_nodes(name: str, settings: list[str], schema: type) -> Node:
     Raises:
         ConfigurationError: if a file or a setting cannot be read.
     """
-    node = read_extended(name, FileKind(schema, _find))
+    node = read_extended(name, FileKind(schema, _find, renamed=renamed))
     for setting in settings:
-        node = merged(node, _setting(setting), schema)
+        node = merged(node, renamed(_setting(setting)), schema)
     return node
 
 

@@ -14,7 +14,8 @@ from robots.kinematics.forward import Kinematics
 from robots.pose import zyx_from_rotation
 from systems.feedforward import FeedforwardConfig
 from systems.feedforward.arm_correction import reach
-from systems.reference.paths import ReferenceConfig, Waypoint
+from systems.reference.paths import ReferenceConfig
+from systems.reference.shapes import Rectangle, Waypoint
 
 LAW = "open_loop"  # no camera: the feedforward has to do it alone
 PACE = 8.0  # 1/s^2, k_a: an edge takes a second
@@ -76,12 +77,11 @@ def rectangle_scenario(trial: RectangleTrial) -> Scenario:
     home = working_position(trial.robot)
     drive = scenario.station.drive
     reference = ReferenceConfig(
-        "rectangle",
+        Rectangle(rectangle(trial.robot, home)),
         acceleration=PACE,
         settle=SETTLE,
         dwell=DWELL,
         preview=drive.command_delay + drive.dead_time,
-        waypoints=rectangle(trial.robot, home),
     )
     servo = replace(scenario.servo, feedforward=trial.config)
     return replace(scenario, home_deg=np.rad2deg(home), reference=reference, servo=servo)

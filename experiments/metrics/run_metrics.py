@@ -65,7 +65,9 @@ def path_window(log: RunLog) -> np.ndarray:
 
 
 def static_window(log: RunLog) -> np.ndarray:
-    """Which samples lie in the last half second of the dwell; shape (n,)."""
+    """Which samples lie in the last half second of the dwell, none if there is no dwell; shape (n,)."""
+    if log.path_end <= log.dwell_start:
+        return np.zeros(len(log.time), dtype=bool)
     return window(log, max(log.dwell_start, log.path_end - STATIC_WINDOW), log.path_end)
 
 

@@ -20,11 +20,13 @@ class FileKind:
         find: gives path and label of a file by the name that stands after ``extends`` and the folder of the
             file that says so.
         merges_lists: whether lists of groups of the same length are merged entry by entry, else replaced.
+        renamed: puts what a file says under former names in its present place.
     """
 
     schema: Any
     find: Callable[[str, Path], tuple[Path, str]]
     merges_lists: bool = False
+    renamed: Callable[[Node], Node] = lambda node: node
 
 
 def read_extended(name: str, kind: FileKind, beside: Path | None = None, depth: int = 0) -> Node:
@@ -40,6 +42,7 @@ def read_extended(name: str, kind: FileKind, beside: Path | None = None, depth: 
     if not isinstance(node.value, dict):
         raise ConfigurationError(f"{label}: must be a mapping of keys to values")
     own = Node({key: entry for key, entry in node.value.items() if key != "extends"}, node.place)
+    own = kind.renamed(own)
     base = node.value.get("extends")
     if base is None or not base.value:
         return own

@@ -6,7 +6,7 @@ import pytest
 from diagrams.runs.simulation import Experiment
 from tests.diagrams.rigs import QUIET, scenario, true_errors
 
-CIRCLE = ["reference.path=circle", "reference.circle.radius_mm=60", "reference.circle.zyx_deg=[0, 90, 0]"]
+CIRCLE = ["reference.path=circle", "reference.path.radius_mm=60", "reference.path.zyx_deg=[0, 90, 0]"]
 TIMES = ["reference.settle=1", "reference.acceleration=8", "reference.dwell=1.5"]
 
 

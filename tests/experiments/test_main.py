@@ -36,7 +36,7 @@ REFUSED = {
     "no robot": (["compare", "--robot=nope"], "robot 'nope'"),
     "no robot file": (["run", "--robot=nope.yaml"], "no file nope.yaml"),
     "out of reach": (
-        ["compare", "--set=reference.path=circle", "--set=reference.circle.radius_mm=900"],
+        ["compare", "--set=reference.path=circle", "--set=reference.path.radius_mm=900"],
         "cannot follow the path 'circle'",
     ),
     "no such law": (["run", "--law=magic"], "law must be one of open_loop, numerical_ik"),

@@ -8,6 +8,7 @@ import pytest
 from diagrams.runs.simulation import Experiment
 from diagrams.scenario.scenario import ScenarioError, load_scenario, scenario_text, shipped_scenarios
 from systems.cell.events.station_events import PayloadChange, ToolShift
+from systems.reference.shapes import Circle, FigureEight, Points, Shape
 
 
 def refusal(name: str, *settings: str) -> str:
@@ -140,10 +141,13 @@ def test_a_scenario_of_nothing_is_the_default(tmp_path: Path):
         ("servo.laws.numerical_ik.translation=0", ["translation", "got 0"]),
         ("station.drive.command_delay=0.001", ["command", "0.001"]),
         ("servo.guard.hold_after=0.9", ["hold_after", "0.9"]),
-        ("reference.path=square", ["path", "square"]),
+        (
+            "reference.path=square",
+            ["reference.path must be one of rectangle, circle, figure_eight, points"],
+        ),
         (
             "reference.waypoints=[{translation_mm: [1, 2]}, {}]",
-            ["reference.waypoints[0].translation_mm", "3 numbers", "[1"],
+            ["reference.path.waypoints[0].translation_mm", "3 numbers", "[1"],
         ),
         ("description=5", ["description", "5"]),
         ("seed=true", ["seed must be a whole number, got true"]),
@@ -195,6 +199,50 @@ def test_events_are_written_as_they_are_read():
     assert isinstance(tool, ToolShift)
     np.testing.assert_array_equal(tool.shift_mm, [0.5, 0.0, 0.0])
     assert "!ToolShift" in scenario_text(scenario)  # the first of the kinds needs no tag
+
+
+def path_of(*settings: str) -> Shape:
+    return load_scenario("nominal", list(settings)).reference.path
+
+
+def test_a_member_of_a_union_is_chosen_by_its_tag_or_its_short_name(tmp_path: Path):
+    tagged = written(tmp_path, "extends: nominal\nreference:\n  path: !Circle {radius_mm: 60}\n")
+    assert isinstance(path_of("reference.path=points"), Points)
+    assert isinstance(path_of("reference.path=!FigureEight {turns: 2}"), FigureEight)
+    circle = load_scenario(tagged).reference.path
+    assert isinstance(circle, Circle)
+    assert (circle.radius_mm, circle.turns) == (60.0, 1)
+    changed = load_scenario(tagged, ["reference.path.turns=3"]).reference.path
+    assert isinstance(changed, Circle)
+    assert (changed.radius_mm, changed.turns) == (60.0, 3)
+
+
+def test_another_member_keeps_what_both_have(tmp_path: Path):
+    tagged = written(tmp_path, "reference: {path: !Circle {radius_mm: 60, turns: 2}}\n")
+    eight = load_scenario(tagged, ["reference.path=figure_eight"]).reference.path
+    assert isinstance(eight, FigureEight)
+    assert eight.turns == 2
+
+
+@pytest.mark.parametrize(
+    "settings",
+    [
+        ["reference.path=circle", "reference.circle.radius_mm=60"],
+        ["reference.circle.radius_mm=60", "reference.path=circle"],
+        ["reference={path: circle, circle: {radius_mm: 60}, figure_eight: {turns: 2}}"],
+    ],
+)
+def test_names_of_older_files_mean_what_they_meant(settings: list[str]):
+    circle = path_of(*settings)
+    assert isinstance(circle, Circle)
+    assert (circle.radius_mm, circle.turns) == (60.0, 1)
+
+
+def test_a_field_of_another_member_is_refused_with_those_there_are():
+    message = "unknown key 'reference.path.radius_mm'; known here: waypoints"
+    assert (
+        refusal("nominal", "reference.path.radius_mm=60") == f"--set reference.path.radius_mm=60: {message}"
+    )
 
 
 @pytest.mark.parametrize("name", ["nothing", "folder/nothing.yaml"])

@@ -54,6 +54,15 @@ def test_static_is_the_mean_of_the_last_half_second_so_that_vibration_cancels():
     assert numbers["max_mm"][1] == pytest.approx(1.2, abs=0.01)
 
 
+def test_a_path_that_ends_without_a_dwell_has_no_static_error():
+    X = straight(TIME)
+    log = make_log(TIME, X, displaced(X, np.array([0, 0, 0, 1e-3, 0, 0])))
+    ending = dataclasses.replace(log, dwell_start=log.path_end)
+    run = summary("nominal", {"pbvs": [ending]})["runs"]["pbvs"]["true"]
+    assert run["static_mm"] == run["static_deg"] == [None, None, None]
+    assert None not in run["max_mm"]
+
+
 def test_missing_measurements_are_left_out():
     X = straight(TIME)
     measured = displaced(X, np.array([0, 0, 0, 1e-3, 0, 0]))

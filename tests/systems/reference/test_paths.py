@@ -11,24 +11,19 @@ from scipy.integrate import cumulative_simpson
 
 from robots.pose import pose_error, rotation_from_zyx
 from systems.reference.paths import (
-    CircleConfig,
-    FigureEightConfig,
     ReferenceConfig,
     SineSquaredProfile,
-    Waypoint,
-    line,
     make_path,
-    rectangle_waypoints,
 )
+from systems.reference.segment import line
+from systems.reference.shapes import Circle, FigureEight, Points, Rectangle, Waypoint, rectangle_waypoints
 
 TILTED = np.array([30.0, 40.0, 50.0])
 SHAPES = {
     "rectangle": ReferenceConfig(),
-    "points": ReferenceConfig(path="points", dwell=0.5),
-    "circle": ReferenceConfig(path="circle", circle=CircleConfig(plane_zyx_deg=TILTED, turns=2)),
-    "figure_eight": ReferenceConfig(
-        path="figure_eight", figure_eight=FigureEightConfig(plane_zyx_deg=TILTED)
-    ),
+    "points": ReferenceConfig(Points(), dwell=0.5),
+    "circle": ReferenceConfig(Circle(plane_zyx_deg=TILTED, turns=2)),
+    "figure_eight": ReferenceConfig(FigureEight(plane_zyx_deg=TILTED)),
 }
 every_shape = pytest.mark.parametrize("config", SHAPES.values(), ids=SHAPES.keys())
 fractions = st.floats(0.0, 1.0)
@@ -162,7 +157,7 @@ def test_the_circle_pulls_towards_its_center(fraction: float):
 
 @pytest.mark.parametrize("turns", [1, 3])
 def test_the_circle_runs_all_its_turns_in_one_motion(turns: int):
-    path = make_path(ReferenceConfig(path="circle", circle=CircleConfig(turns=turns)))
+    path = make_path(ReferenceConfig(Circle(turns=turns)))
     assert path.dwell_start == pytest.approx(2.0 * math.sqrt(2.0 * turns / 0.7))
     t = np.linspace(0.0, path.dwell_start, 4001)
     distance = cumulative_simpson(np.linalg.norm(path.sample(t)[1][:, 3:], axis=-1), x=t)[-1]
@@ -183,7 +178,7 @@ def test_the_figure_eight_closes_crosses_its_center_and_fills_its_box():
 
 
 def test_points_rests_at_every_one_of_them():
-    path = make_path(ReferenceConfig(path="points", dwell=0.5, settle=1.0))
+    path = make_path(ReferenceConfig(Points(), dwell=0.5, settle=1.0))
     move = 2.0 * math.sqrt(2.0 / 0.7)
     for i, (x, y) in enumerate([(0.35, 0.45), (0.55, 0.45), (0.55, -0.45), (0.35, -0.45), (0.35, 0.45)]):
         X, V, A = path.sample(1.0 + i * (0.5 + move) + np.array([0.01, 0.25, 0.49]))
@@ -191,6 +186,16 @@ def test_points_rests_at_every_one_of_them():
         assert not np.any(V)
         assert not np.any(A)
     assert path.duration == pytest.approx(1.0 + 5 * 0.5 + 4 * move)
+
+
+def test_a_path_of_one_point_holds_its_pose():
+    point = Waypoint(np.array([400.0, 0.0, 400.0]), np.array([90.0, 0.0, 90.0]))
+    path = make_path(ReferenceConfig(Rectangle([point]), dwell=3.0, settle=1.0))
+    X, V, A = path.sample(np.linspace(-0.1, path.duration + 0.1, 100))
+    np.testing.assert_allclose(X, np.tile(point.pose(), (100, 1, 1)), atol=1e-15)
+    assert not V.any()
+    assert not A.any()
+    assert path.duration == pytest.approx(1.0 + SineSquaredProfile(0.7).duration + 3.0)
 
 
 @every_shape
@@ -207,7 +212,7 @@ def test_settling_shifts_everything(config: ReferenceConfig):
 
 @pytest.mark.parametrize("name", ["rectangle", "circle", "figure_eight"])
 def test_every_lap_is_the_first_one_again_without_a_pause(name: str):
-    once, path = (make_path(ReferenceConfig(path=name, settle=1.0, laps=laps)) for laps in (1, 3))
+    once, path = (make_path(ReferenceConfig(SHAPES[name].path, settle=1.0, laps=laps)) for laps in (1, 3))
     length = once.dwell_start - once.path_start
     np.testing.assert_allclose(path.lap_starts, 1.0 + length * np.arange(3))
     assert path.dwell_start == pytest.approx(1.0 + 3.0 * length)
@@ -221,9 +226,10 @@ def test_a_new_path_is_a_few_lines_of_a_scenario():
     config = yaml_load_typed(
         schema=ReferenceConfig,
         data="""
-        waypoints:
-        - {translation_mm: [400, 100, 400], zyx_deg: [90, 0, 90]}
-        - {translation_mm: [400, -100, 400], zyx_deg: [90, 0, 90]}
+        path: !Rectangle
+          waypoints:
+          - {translation_mm: [400, 100, 400], zyx_deg: [90, 0, 90]}
+          - {translation_mm: [400, -100, 400], zyx_deg: [90, 0, 90]}
         """,
     )
     X, V, _ = make_path(config).sample(math.sqrt(2.0 / 0.7))
@@ -234,27 +240,26 @@ def test_a_new_path_is_a_few_lines_of_a_scenario():
 @pytest.mark.parametrize(
     ("config", "message"),
     [
-        (ReferenceConfig(path="spiral"), "one of rectangle, circle, figure_eight, points, got 'spiral'"),
-        (ReferenceConfig(waypoints=[Waypoint()]), "needs at least two waypoints, got 1"),
+        (ReferenceConfig(Rectangle([])), "path 'rectangle' needs at least one waypoint, got none"),
         (ReferenceConfig(acceleration=0.0), "acceleration must be finite and positive, got 0.0"),
         (ReferenceConfig(acceleration=math.nan), "acceleration must be finite and positive, got nan"),
         (ReferenceConfig(dwell=-1.0), "dwell must be finite and not negative, got -1.0 s"),
         (ReferenceConfig(settle=math.inf), "settle must be finite and not negative, got inf s"),
         (ReferenceConfig(laps=0), "laps must be a whole number from 1 on, got 0"),
         (
-            ReferenceConfig(waypoints=rectangle_waypoints()[:2], laps=2),
+            ReferenceConfig(Rectangle(rectangle_waypoints()[:2]), laps=2),
             "2 laps need a path that ends where it starts, but the ends of 'rectangle' are 200 mm and 90 deg",
         ),
         (ReferenceConfig(preview=-0.01), "preview must be finite and not negative, got -0.01 s"),
         (
-            ReferenceConfig(waypoints=[Waypoint(), Waypoint(np.array([0, math.nan, 0]))]),
+            ReferenceConfig(Rectangle([Waypoint(), Waypoint(np.array([0, math.nan, 0]))])),
             "waypoint 2 translation_mm",
         ),
-        (ReferenceConfig(waypoints=[Waypoint(zyx_deg=np.zeros(2)), Waypoint()]), "waypoint 1 zyx_deg"),
-        (ReferenceConfig(path="circle", circle=CircleConfig(radius_mm=0.0)), "circle radius_mm must be"),
-        (ReferenceConfig(path="circle", circle=CircleConfig(turns=0)), "circle turns must be a whole number"),
+        (ReferenceConfig(Rectangle([Waypoint(zyx_deg=np.zeros(2)), Waypoint()])), "waypoint 1 zyx_deg"),
+        (ReferenceConfig(Circle(radius_mm=0.0)), "circle radius_mm must be"),
+        (ReferenceConfig(Circle(turns=0)), "circle turns must be between 1 and 100000, got 0"),
         (
-            ReferenceConfig(path="figure_eight", figure_eight=FigureEightConfig(width_mm=-1.0)),
+            ReferenceConfig(FigureEight(width_mm=-1.0)),
             "width_mm must be",
         ),
     ],

@@ -9,6 +9,7 @@ from pydrake.systems.primitives import LogVectorOutput
 
 from systems.reference.paths import CartesianPath, ReferenceConfig
 from systems.reference.reference import Reference
+from systems.reference.shapes import Circle, Rectangle
 
 QUANTITIES = ("X_WE", "V_WE", "A_WE")
 
@@ -44,7 +45,7 @@ def test_the_ports_follow_the_path_and_the_preview_runs_ahead():
 
 def test_velocity_and_acceleration_add_up_in_a_simulation():
     builder = DiagramBuilder()
-    reference = builder.AddSystem(Reference(ReferenceConfig(path="circle")))
+    reference = builder.AddSystem(Reference(ReferenceConfig(Circle())))
     logs = [
         LogVectorOutput(reference.GetOutputPort(f"{name}_desired"), builder, 0.004) for name in QUANTITIES[1:]
     ]
@@ -83,5 +84,5 @@ def test_ticks_are_computed_beforehand_and_other_times_when_they_are_asked_for(m
 
 
 def test_refuses_a_path_that_does_not_exist():
-    with pytest.raises(ValueError, match=r"path must be one of rectangle, .* got 'square'"):
-        Reference(ReferenceConfig(path="square"))
+    with pytest.raises(ValueError, match=r"path 'rectangle' needs at least one waypoint"):
+        Reference(ReferenceConfig(Rectangle([])))

@@ -9,7 +9,8 @@ from robots.kinematics.forward import rotation_about
 from robots.pose import pose_error, rotation_from_zyx, rotation_vector
 from systems.controller_model import ControllerModel
 from systems.guard.guard import GuardConfig
-from systems.reference.paths import CircleConfig, ReferenceConfig, make_path
+from systems.reference.paths import ReferenceConfig, make_path
+from systems.reference.shapes import Circle
 from systems.servo import LawConfig
 from systems.servo.euler_correction import EulerCorrection
 from systems.servo.position_level import PositionLevel, RotationVectorCorrection
@@ -82,8 +83,8 @@ def test_the_commanded_angular_velocity_is_that_of_the_commanded_orientation(for
 
 def test_euler_angles_refuse_a_path_near_their_singular_orientation():
     def law(beta_deg: float, angles: str) -> None:
-        circle = CircleConfig(radius_mm=60.0, zyx_deg=np.array([0.0, beta_deg, 0.0]))
-        path = make_path(ReferenceConfig(path="circle", circle=circle))
+        circle = Circle(radius_mm=60.0, zyx_deg=np.array([0.0, beta_deg, 0.0]))
+        path = make_path(ReferenceConfig(circle))
         PositionLevel(ControllerModel(ROBOT), LawConfig(angles=angles), GuardConfig()).check_path(path)
 
     law(70.0, "euler")
