@@ -50,6 +50,13 @@ class History:
         memory.count[0] = count + 1
         return True
 
+    def ordered(self, memory: SimpleNamespace) -> tuple[np.ndarray, np.ndarray]:
+        """Times and rows from the oldest to the newest; copies."""
+        count = int(memory.count[0])
+        first = count % self.length if count > self.length else 0
+        order = (first + np.arange(min(count, self.length))) % self.length
+        return memory.times[order], memory.rows[order]
+
     def around(self, memory: SimpleNamespace, time: float) -> tuple[int, int, float] | None:
         """The places of the rows before and after a time, and the share of the way from one to the other.
 

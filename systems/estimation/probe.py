@@ -8,6 +8,7 @@ from robots.description.model import NUM_JOINTS, RobotModel
 
 _MARGIN = 0.8  # of the way to a limit
 _SPEED_SHARE = 0.3
+_KNOCK_SHARE, _KNOCK_BEGIN, _KNOCK_LENGTH = 0.2, 0.15, 0.4  # of the amplitude; s
 _PERIODS = np.array([1, 1, 2, 2, 3, 3])  # of the six axes in the window: none moves as another does
 _PHASES = np.array([0, 1, 0, 1, 0, 1]) * 0.5 * np.pi
 
@@ -24,7 +25,10 @@ class ProbeConfig:
 
 
 class Probe:
-    """Oscillations of all joints under a sin^2 window, at rest at both ends."""
+    """A short knock that shows the dead time, then oscillations of all joints under a sin^2 window.
+
+    Both begin and end at rest; times count from the start.
+    """
 
     def __init__(self, robot: RobotModel, config: ProbeConfig) -> None:
         """Checks the configuration.
@@ -69,6 +73,12 @@ class Probe:
     ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Displacement of the joints and its two derivatives at a time in s, (6,) each."""
         begin, length = self.window(path_start)
+        if 0.0 < time - _KNOCK_BEGIN < _KNOCK_LENGTH:
+            # sin^4: a step of the acceleration would be a step of the gears' deflection.
+            s, w = 2.0 * np.pi * (time - _KNOCK_BEGIN) / _KNOCK_LENGTH, 2.0 * np.pi / _KNOCK_LENGTH
+            u, du, ddu = 0.5 - 0.5 * np.cos(s), 0.5 * w * np.sin(s), 0.5 * w * w * np.cos(s)
+            size = _KNOCK_SHARE * amplitude
+            return size * u * u, 2.0 * size * u * du, 2.0 * size * (du * du + u * ddu)
         if not 0.0 < time - begin < length:
             return np.zeros(NUM_JOINTS), np.zeros(NUM_JOINTS), np.zeros(NUM_JOINTS)
         s, w = (time - begin) / length, 2.0 * np.pi / length

@@ -9,6 +9,7 @@ from pydrake.systems.framework import Context, DiscreteValues, LeafSystem
 
 from robots.description.model import NUM_JOINTS
 from systems.controller_model import ControllerModel
+from systems.estimation.command_delay import CommandDelay
 from systems.estimation.drive_model import DEAD_TIME, DriveModel
 from systems.estimation.findings import findings
 from systems.estimation.memory import History, Layout
@@ -22,12 +23,14 @@ from systems.reference.reference import PathAhead
 from systems.samples import JointSample, PoseSample
 from systems.servo.self_calibrating_config import SelfCalibratingConfig
 
-_REACH = 0.45  # s, how far back plans and encoders are remembered, beyond the delays that are believed
+_REACH = 0.1  # s, how far back plans and encoders are remembered, beyond the delays
 _FIRST_LEARNT = 0.4  # s after the start: before that the robot is led onto its plan
 _UPSET = 3e-4  # rad, a following error that no drive makes on its own: the load has changed
 _UPSET_PAUSE = 0.3  # s without learning after it, so that the drives come to rest
-_START_UNREST = 0.5  # m/s^2, while the robot is led from where it stands onto its plan
+_UNREST = 0.5  # m/s^2, while the robot is led onto its plan, or the plan is not where motors are
 _STARTING = 1.5  # s
+_LOOK_EVERY = 5  # ticks, between two searches for the dead time
+_GIVE_UP = 1.6  # s after the start: what is believed of the dead time has to do
 
 # A row of the plan: motors, loads, links, tip, unrest, columns and correction of the drive model.
 _PLAN = Layout(
@@ -87,7 +90,8 @@ class SelfCalibrating(LeafSystem):
         self._planner = PreviewPlanner(self.tip_model, model.period)
         self._drives = DriveModel(model, config.drives)
         self._probe = Probe(model.robot, config.probe)
-        reach = _REACH + model.command_delay + model.camera_delay
+        self._delay = CommandDelay(model.period, config.dead_time)
+        reach = _REACH + max(model.command_delay, config.dead_time.longest) + model.camera_delay
         length = int(np.ceil(reach / model.period))
         self._plan, self._encoders = History(_PLAN.size, length), History(2 * NUM_JOINTS, length)
         # Gears yield later than they are loaded, by what their damping holds back.
@@ -99,8 +103,10 @@ class SelfCalibrating(LeafSystem):
             drives=self._drives.layout,
             plan=self._plan.layout,
             encoders=self._encoders.layout,
+            delay=self._delay.layout,
             columns=(6, self.tip_model.size),
             start_time=(1,),
+            first=(1,),  # the first planned instant
             planned=(1,),  # the last instant of the plan
             compared=(1,),  # how many planned instants encoders have been compared at
             paused_until=(1,),
@@ -129,6 +135,7 @@ class SelfCalibrating(LeafSystem):
         self._drives.start(memory.drives)
         memory.lead.x[:] = self.tip_model.mean
         memory.paused_until[0] = -np.inf
+        self._delay.start(memory.delay, self._model.command_delay)
         return vector
 
     def memory(self, context: Context) -> SimpleNamespace:
@@ -154,6 +161,8 @@ class SelfCalibrating(LeafSystem):
         self._encoders.append(
             memory.encoders, joints.time, np.concatenate((joints.position, joints.velocity))
         )
+        self._delay.search.measure(memory.delay.search, joints.time, joints.position)
+        self._watch_delay(memory, time)
         self._compare_drives(memory, reference)
         if sample.valid and sample.time > measurement[2]:
             pair = self._pair(memory, sample)
@@ -177,18 +186,22 @@ class SelfCalibrating(LeafSystem):
         self, memory: SimpleNamespace, reference: PathAhead, time: float, position: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Plans for the instant when a command of now acts, and says what to command."""
-        instant = time + self._model.command_delay
+        instant = time + self._delay.step(memory.delay, float(memory.planned[0]))
         path_start = reference.path.path_start
         (X_WE,), (V_WE,), _ = reference.sample(np.array([instant]))
         if not memory.planner.started[0]:
             J = self._planner.start(memory.planner, memory.lead.x, position, X_WE)
             memory.start_time[0] = time
             memory.planned[0] = instant - self.period
-            memory.amplitude[:] = self._probe.amplitude(position, J, path_start)
+            memory.first[0] = instant
+            memory.amplitude[:] = self._probe.amplitude(position, J, path_start - instant)
+            if not memory.amplitude.any():
+                memory.delay.known[0] = 1.0  # nothing will show it
         lead, since_start = memory.lead, time - memory.start_time[0]
         columns = memory.columns[:, self.tip_model.G] if memory.columns.any() else None
         self._lead.step(lead, self.estimator.x(memory.estimator), columns, self.period)
-        aside = self._probe.at(instant, path_start, memory.amplitude)
+        first = memory.first[0]
+        aside = self._probe.at(instant - first, path_start - first, memory.amplitude)
         step = instant - memory.planned[0]
         wanted = Wanted(X_WE, V_WE, aside)
         plan = self._planner.step(memory.planner, (lead.x, lead.rate), wanted, since_start, step)
@@ -196,19 +209,21 @@ class SelfCalibrating(LeafSystem):
         motion = plan.theta, plan.velocity, plan.acceleration
         drives = memory.drives
         command = self._drives.command(drives, motion, plan.loads, self._model.payload)
-        starting = _START_UNREST if since_start < _STARTING and memory.planner.start_error.any() else 0.0
+        is_starting = since_start < _STARTING and np.abs(memory.planner.start_error).max() > 1e-3
+        unrest = 0.0 if self._delay.is_settled(memory.delay, instant) and not is_starting else _UNREST
         row = np.concatenate(
             (
                 *motion,
                 plan.loads.ravel(),
                 plan.motion,
                 plan.twist,
-                lead.unrest + starting,
+                lead.unrest + unrest,
                 command.columns,
                 drives.correction,
             )
         )
         self._plan.append(memory.plan, instant, row)
+        self._delay.search.plan(memory.delay.search, instant, plan.theta)
         memory.planned[0] = instant
         return command.position, command.velocity, command.torque
 
@@ -248,18 +263,31 @@ class SelfCalibrating(LeafSystem):
             - s * s * r * h * v1
         )
 
+    def _watch_delay(self, memory: SimpleNamespace, time: float) -> None:
+        """Searches for the dead time until it is known, and again while the motors do what no drive does."""
+        since_start = time - memory.start_time[0]
+        if not memory.planner.started[0]:
+            return
+        is_upset = time < memory.paused_until[0]
+        if memory.delay.known[0] and not is_upset:
+            return
+        if round(time / self.period) % _LOOK_EVERY == 0:
+            self._delay.look(memory.delay)
+        if since_start > _GIVE_UP:
+            memory.delay.known[0] = 1.0
+
     def _compare_drives(self, memory: SimpleNamespace, reference: PathAhead) -> None:
         """Learns from where the motors were at planned instants that have passed."""
         plan, count = memory.plan, int(memory.plan.count[0])
         newest = memory.encoders.times[(int(memory.encoders.count[0]) - 1) % self._encoders.length]
-        first = memory.start_time[0] + self._model.command_delay + _FIRST_LEARNT
+        first = memory.first[0] + _FIRST_LEARNT
         for k in range(max(int(memory.compared[0]), count - self._plan.length), count):
             instant = plan.times[k % self._plan.length]
             if instant > newest + 1e-9:
                 break
             memory.compared[0] = k + 1
             actual = self._encoders_at(memory, instant)
-            if actual is None or instant < first:
+            if actual is None or instant < first or not self._delay.is_settled(memory.delay, instant):
                 continue
             row = _PLAN.view(plan.rows[k % self._plan.length])
             y = row.theta - actual + row.correction

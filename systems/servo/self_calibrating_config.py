@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass, field
 
+from systems.estimation.dead_time import DeadTimeConfig
 from systems.estimation.drive_model import DriveModelConfig
 from systems.estimation.probe import ProbeConfig
 from systems.estimation.tip_estimator import TipEstimatorConfig
@@ -15,6 +16,7 @@ class SelfCalibratingConfig(LawConfig):
     drive: str = "cascade"
     estimator: TipEstimatorConfig = field(default_factory=TipEstimatorConfig)
     drives: DriveModelConfig = field(default_factory=DriveModelConfig)
+    dead_time: DeadTimeConfig = field(default_factory=DeadTimeConfig)
     probe: ProbeConfig = field(default_factory=ProbeConfig)
     lead_frequency: float = 30.0  # rad/s, at most, with which parameters follow their estimate
     lead_acceleration: float = 0.5  # m/s^2, at most, that this gives the tip

@@ -49,6 +49,16 @@ def test_the_same_seed_gives_the_same_commands():
     assert np.array_equal(*commands)
 
 
+def test_a_dead_time_that_nobody_told_is_found_before_the_path_begins():
+    settings = ["station.drive.dead_time=0.2", "servo.model.command_delay=0.004", "reference.settle=3"]
+    experiment = Experiment(load_scenario("misaligned", settings), "self_calibrating")
+    experiment.advance(until=1.2)
+    law = experiment.servo.law
+    memory = law.memory(law.GetMyContextFromRoot(experiment.context))
+    assert memory.delay.target[0] == pytest.approx(0.204, abs=2e-3)
+    assert not any(experiment.log().guard_counts.values())
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize(
     ("name", "settings", "moving"),
