@@ -147,7 +147,7 @@ class SelfCalibrating(LeafSystem):
         memory = self.memory(context)
         late = float(memory.drives.beta[DEAD_TIME])
         return {
-            "dead_time_s": self._model.command_delay + late,
+            "dead_time_s": float(memory.delay.delay[0]) + late,
             **findings(self.estimator, memory.estimator),
         }
 
