@@ -10,12 +10,14 @@ from diagrams.runs.measurement import MeasurementRecord, MeasurementRun
 from diagrams.scenario.scenario import Scenario
 from experiments.cli.workers import Progress, SimulationError, in_processes
 from experiments.comparison.compare import RunJob, run_job
-from robots.calibration.identifiability import identifiable_parameters
-from robots.calibration.identification import IdentificationConfig, Identified
-from robots.calibration.measurements import SOURCE_NOISE, MeasurementNoise, Measurements
+from robots.calibration.identification import IdentificationConfig
+from robots.calibration.identified import Identified
+from robots.calibration.measurements import MeasurementNoise, Measurements
+from robots.calibration.solver.problem import COMPLIANCE_NAMES
 from robots.calibration.validation import ErrorStatistics, prediction_errors, statistics
-from robots.description.error_parameters import NUM_PARAMETERS
 from robots.description.model import NUM_JOINTS, RobotModel
+from robots.kinematics.error_kinematics import ErrorKinematics
+from robots.kinematics.forward import Kinematics
 from robots.measurement_design.candidate_grid import SOURCE_RANGES
 from robots.measurement_design.constraints import AdmissibleConfigurations
 from robots.measurement_design.design import MeasurementDesign
@@ -23,7 +25,6 @@ from robots.measurement_design.visiting_order import visiting_order
 
 # The source's validation set has 125 configurations, Probst (2024) section 4.3.
 VALIDATION_COUNT = 125
-NOISES = {"none": MeasurementNoise(), "source": SOURCE_NOISE}
 _STRETCHES = 8  # into which a set is divided to be measured side by side; part of the result
 
 
@@ -46,11 +47,12 @@ class CalibrationStudy:
     design_seconds: float
     sets: MeasuredSets
     identified: Identified
-    truth: np.ndarray | None  # (48,) base parameters, where they are known
+    truth: np.ndarray | None  # (m,) the named values, where they are known
     before: ErrorStatistics | None
     after: ErrorStatistics | None
     geometry_only: ErrorStatistics | None  # what is left without the compliances, where these were identified
     after_noise_free: ErrorStatistics | None
+    validation_outliers: tuple[int, ...] = ()  # rows of the validation table with gross errors, left out
 
 
 @dataclass(frozen=True)
@@ -149,11 +151,18 @@ def validated(
     )
 
 
-def true_base_parameters(scenario: Scenario, robot: RobotModel, position_only: bool) -> np.ndarray:
-    """The station's errors in base parameters, to first order, (48,)."""
-    found = identifiable_parameters(robot, position_only)
+def true_values(scenario: Scenario, robot: RobotModel, identified: Identified) -> np.ndarray:
+    """What a simulated station has in place of the values that were identified, (m,) in SI units.
+
+    The geometry is that of the true robot, described by the same independent parameters, exactly.
+    """
     errors = scenario.station.errors
-    return found.reduce(errors.vector(robot) if errors else np.zeros(NUM_PARAMETERS))
+    true = ErrorKinematics(robot).robot_with_errors(errors.vector(robot)) if errors else robot
+    chosen = identified.reduction.independent
+    geometry = identified.reducible.describe(Kinematics(true).forward, chosen, identified.x)
+    is_elastic = scenario.station.elasticity != "rigid"
+    compliance = dict(zip(COMPLIANCE_NAMES, is_elastic / robot.joint_stiffness, strict=True))
+    return np.array([*geometry, *(compliance[name] for name in identified.names[len(chosen) :])])
 
 
 def path_runs(

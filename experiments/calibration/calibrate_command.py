@@ -11,17 +11,17 @@ import typer
 from diagrams.record.log import RunLog
 from diagrams.scenario.scenario import Scenario
 from experiments.calibration.calibrate import (
-    NOISES,
     VALIDATION_COUNT,
     CalibrationStudy,
     MeasuredSets,
     identification_config,
     measure_sets,
     path_runs,
-    true_base_parameters,
+    true_values,
     validated,
     validation_configurations,
 )
+from experiments.calibration.noise_option import ESTIMATE, noise_option
 from experiments.calibration.report import calibration_json, print_calibration, write_calibration_page
 from experiments.cli.console import print_files, progress_bar, refusing
 from experiments.cli.json_output import human_console, json_output
@@ -33,11 +33,14 @@ from experiments.metrics.run_metrics import summary
 from experiments.report.files import write_text
 from robots.calibration.identification import identify
 from robots.calibration.measurement_file import RowProblem, measurement_text, read_measurements
+from robots.calibration.validation import plausible_rows
 from robots.description.robot_file import robot_text
 from robots.description.urdf import urdf_text
 from robots.measurement_design.constraints import AdmissibleConfigurations
 from robots.measurement_design.criteria import NAMES
 from robots.measurement_design.design import MeasurementDesign, design_measurements
+
+_COUNT, _CRITERION = 75, "b3"  # of a simulated calibration
 
 
 def calibrate_command(
@@ -51,14 +54,21 @@ def calibrate_command(
     validation: Annotated[
         str | None, typer.Option(metavar="FILE.csv", help="Validate with this table; needs --measurements.")
     ] = None,
-    count: Annotated[int, typer.Option(metavar="N", help="Configurations to identify from.")] = 75,
+    count: Annotated[
+        int | None, typer.Option(metavar="N", help="Configurations to simulate.", show_default="75")
+    ] = None,
     criterion: Annotated[
-        str, typer.Option(metavar="NAME", help=f"Of their choice, one of {', '.join(NAMES)}.")
-    ] = "b3",
+        str | None,
+        typer.Option(metavar="NAME", help=f"Of their choice, one of {', '.join(NAMES)}.", show_default="b3"),
+    ] = None,
     noise: Annotated[
         str,
-        typer.Option(metavar="NAME", help="On every row: none, or source for that of Probst's table 6.1."),
-    ] = "none",
+        typer.Option(
+            metavar="FILE|source|estimate",
+            help="What is known of the noise: a YAML file with joint_deg, position_mm and rotation_deg, or "
+            "source for Probst's table 6.1; estimate for nothing. A simulation adds it to every row.",
+        ),
+    ] = ESTIMATE,
     position_only: Annotated[
         bool, typer.Option("--position-only", help="Use positions of the tool only, no orientations.")
     ] = False,
@@ -85,7 +95,8 @@ def calibrate_command(
     with json_output(json_file) as output, refusing(ValueError, OSError), ExitStack() as stack:
         wanted.check()
         prepared = prepare(scenario, settings or [], robot)
-        check(prepared, ["open_loop"])
+        if not measurements:  # of tables nothing but the kinematics is asked
+            check(prepared, ["open_loop"])
         stage = stack.enter_context(staged_folder(out))
         robot_file = stack.enter_context(staged_file(write, *YAML)) if write else None
         urdf_file = stack.enter_context(staged_file(urdf, ".urdf", ".xml")) if urdf else None
@@ -94,7 +105,7 @@ def calibrate_command(
         study = _study(prepared, wanted, measured)
         path = None if measurements else _path(prepared.scenario, study)
         output.write(calibration_json(study, path))
-        _write_tables(stage, study.sets)
+        _write_tables(stage, measured.sets)
         write_calibration_page(stage / "report.html", prepared.title, study, path, measured.problems)
         if robot_file:
             write_text(robot_file, robot_text(study.calibrated))
@@ -110,8 +121,8 @@ class _Wanted:
 
     measurements: str | None
     validation: str | None
-    count: int
-    criterion: str
+    count: int | None
+    criterion: str | None
     noise: str
     position_only: bool
     compliance: bool
@@ -121,9 +132,15 @@ class _Wanted:
         """Raises ValueError if something is unknown, too small or does not go together."""
         if self.validation and not self.measurements:
             raise ValueError("--validation needs --measurements; without it both sets are simulated")
-        if self.noise not in NOISES:
-            raise ValueError(f"--noise must be one of {', '.join(NOISES)}, got '{self.noise}'")
-        at_least("--count", 5, self.count)
+        if self.measurements:
+            for option, value in (("--count", self.count), ("--criterion", self.criterion)):
+                if value is not None:
+                    raise ValueError(
+                        f"{option} is for simulated measurements; with --measurements it has no effect"
+                    )
+        if self.count is not None:
+            at_least("--count", 5, self.count)
+        noise_option(self.noise)
 
 
 @dataclass(frozen=True)
@@ -149,13 +166,13 @@ def _read(wanted: _Wanted) -> _Measured:
 
 def _simulated(prepared: Prepared, wanted: _Wanted) -> _Measured:
     """Design and measurements of a simulated calibration."""
-    scenario, robot, count = prepared.scenario, prepared.robot, wanted.count
+    scenario, robot, count = prepared.scenario, prepared.robot, wanted.count or _COUNT
     started = time.perf_counter()
     with progress_bar(f"choosing {count} configurations") as progress:
         design = design_measurements(
             robot,
             count,
-            wanted.criterion,
+            wanted.criterion or _CRITERION,
             wanted.position_only,
             admissible=AdmissibleConfigurations(robot),
             seed=scenario.seed,
@@ -168,34 +185,42 @@ def _simulated(prepared: Prepared, wanted: _Wanted) -> _Measured:
         payloads.append(0.0 if payloads[0] > 0.0 else robot.payload.largest_mass)
     with progress_bar(f"measuring {len(payloads) * count + len(fresh)} poses") as progress:
         sets = measure_sets(
-            scenario, design.configurations, fresh, payloads, NOISES[wanted.noise], progress=progress
+            scenario, design.configurations, fresh, payloads, noise_option(wanted.noise), progress=progress
         )
     return _Measured(sets, design=design, design_seconds=seconds)
 
 
 def _study(prepared: Prepared, wanted: _Wanted, measured: _Measured) -> CalibrationStudy:
     """Identifies the robot and validates it."""
-    robot, sets, position_only = prepared.robot, measured.sets, wanted.position_only
-    table = sets.calibration.without_rotation() if position_only else sets.calibration
-    config = identification_config(wanted.compliance, wanted.fixed, NOISES[wanted.noise])
+    robot, sets = prepared.robot, measured.sets
+    table = sets.calibration.without_rotation() if wanted.position_only else sets.calibration
+    position_only = table.rotation is None
+    config = identification_config(wanted.compliance, wanted.fixed, noise_option(wanted.noise))
     identified = identify(robot, table, config)
     calibrated = identified.calibrated_robot(prepared.scenario.robot)
     rigid = None
     if wanted.compliance:
         rigid = identify(robot, table, replace(config, compliance=False)).calibrated_robot()
     is_simulated = measured.design is not None
+    validation, bad = sets.validation, ()
+    if validation is not None:
+        validation = validation.without_rotation() if position_only else validation
+        plausible = plausible_rows(identified, validation)
+        bad = tuple(map(int, validation.rows[~plausible]))
+        validation = validation.select(plausible)
     return CalibrationStudy(
-        nominal=robot,
+        nominal=identified.robot,
         calibrated=calibrated,
         design=measured.design,
         design_seconds=measured.design_seconds,
-        sets=sets,
+        sets=replace(sets, validation=validation),
         identified=identified,
-        truth=true_base_parameters(prepared.scenario, robot, position_only) if is_simulated else None,
-        before=validated(robot, sets.validation, position_only),
-        after=validated(calibrated, sets.validation, position_only),
-        geometry_only=validated(rigid, sets.validation, position_only) if rigid else None,
+        truth=true_values(prepared.scenario, robot, identified) if is_simulated else None,
+        before=validated(identified.robot, validation, position_only),
+        after=validated(calibrated, validation, position_only),
+        geometry_only=validated(rigid, validation, position_only) if rigid else None,
         after_noise_free=validated(calibrated, sets.validation_truth, position_only),
+        validation_outliers=bad,
     )
 
 

@@ -1,6 +1,7 @@
 """What a calibration tells: JSON, tables on the terminal, and a page."""
 
 from collections.abc import Mapping, Sequence
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
@@ -15,32 +16,55 @@ from experiments.calibration.calibrate import CalibrationStudy
 from experiments.metrics.run_metrics import path_window, pose_errors
 from experiments.report.plot_page import Section, html_table, write_plot_page
 from experiments.report.robot_plot import tips_figure
+from robots.calibration.identified import Identified
 from robots.calibration.measurement_file import RowProblem
+from robots.calibration.repeatability import repeatability
 from robots.calibration.validation import ErrorStatistics, prediction_errors
-from robots.description.error_parameters import parameter_names
+from robots.pose import zyx_from_rotation
 
 Problems = Sequence[tuple[str, RowProblem]]
 _AXES = ("Δx mm", "Δy mm", "Δz mm", "ρx °", "ρy °", "ρz °")
 _COLORS = {"before": "#9aa5b4", "after": "#0f7cc0"}
+_WEAK = 0.5  # share of the data in what is known of a parameter, below which it is said
+_NO_NOISE_MM = 1e-6
 _CONFIDENCE = 1.96  # standard deviations to either side hold 95 %
 
 
 def calibration_json(study: CalibrationStudy, path: Mapping[str, Any] | None) -> dict[str, Any]:
     """The numbers of a calibration; what was not done is None."""
     design = study.design
-    errors = None
+    errors, found = None, study.identified
     if study.truth is not None:
-        errors = {"max_abs_error": float(np.abs(study.identified.p - study.truth).max())}
+        errors = {"max_abs_error": float(np.abs(found.values - study.truth)[: found.rank].max())}
+    frame = None
+    if found.frame is not None:
+        zyx_deg = np.rad2deg(zyx_from_rotation(found.frame[:3, :3]))
+        frame = {"translation": found.frame[:3, 3].tolist(), "zyx_deg": zyx_deg.tolist()}
+    repeated = repeatability(found)
     return {
-        "identifiable": int(np.sum([name.startswith("p") for name in study.identified.names])),
+        "identifiable": found.rank,
         "design": design and {"b3": design.b3, "bound": design.bound, "seconds": study.design_seconds},
         "parameters": errors,
         "compliance_rad_per_Nm": study.identified.compliance.tolist(),
         "iterations": study.identified.iterations,
         "outliers": list(study.identified.outliers),
+        "validation_outliers": list(study.validation_outliers),
+        "converged": True,  # what has not converged is refused
+        "rank": found.rank,
+        "names": list(found.names),
+        "values": found.values.tolist(),
+        "sigmas": found.sigmas.tolist(),
+        "shares": found.shares.tolist(),
+        "truth": None if study.truth is None else study.truth.tolist(),
+        "correlation": found.correlation.tolist(),
+        "condition": found.condition,
+        "residuals": residual_rows(found),
+        "noise": noise_dict(found),
+        "frame": frame,
+        "repeatability": repeated and asdict(repeated),
         "validation": {
-            name: found and found.as_dict()
-            for name, found in (
+            name: errors_of and errors_of.as_dict()
+            for name, errors_of in (
                 ("before", study.before),
                 ("after", study.after),
                 ("after_geometry_only", study.geometry_only),
@@ -48,6 +72,28 @@ def calibration_json(study: CalibrationStudy, path: Mapping[str, Any] | None) ->
             )
         },
         "path": path and {name: path[name]["errors"] for name in ("before", "after")},
+    }
+
+
+def residual_rows(found: Identified) -> list[dict[str, Any]]:
+    """Measured less predicted, row by row, in mm and degrees along and about the axes of the world."""
+    rows = []
+    for number, e, is_kept in zip(found.measurements.rows, found.residuals, found.kept, strict=True):
+        row = {"row": int(number), "mm": (1e3 * e[-3:]).tolist(), "used": bool(is_kept)}
+        if len(e) == 6:
+            row["deg"] = np.rad2deg(e[:3]).tolist()
+        rows.append(row)
+    return rows
+
+
+def noise_dict(found: Identified) -> dict[str, Any]:
+    """Standard deviations of one row."""
+    noise = found.noise
+    return {
+        "estimated": not found.is_noise_known,
+        "joint_deg": float(np.rad2deg(noise.joint_sigma)),
+        "position_mm": 1e3 * noise.position_sigma,
+        "rotation_deg": float(np.rad2deg(noise.rotation_sigma)),
     }
 
 
@@ -62,6 +108,9 @@ def print_calibration(
     if study.identified.outliers:
         rows = ", ".join(map(str, study.identified.outliers))
         console.print(f"[yellow]Outliers, left out of the identification: rows {rows}[/yellow]")
+    if study.validation_outliers:
+        rows = ", ".join(map(str, study.validation_outliers))
+        console.print(f"[yellow]Outliers, left out of the validation: rows {rows}[/yellow]")
     _print(console, "Validation: errors on fresh configurations", _validation_rows(study))
     if path:
         _print(console, "Path without a camera: true errors", _path_rows(path))
@@ -74,6 +123,21 @@ def calibration_verdict(study: CalibrationStudy, path: Mapping[str, Any] | None)
     identified = study.identified
     text = f"{len(identified.names)} parameters from {len(identified.residuals)} measurements"
     text += f" in {identified.iterations} iterations."
+    text += noise_sentence(identified)
+    if identified.frame is not None:
+        far = float(np.linalg.norm(identified.frame[:3, 3]))
+        text += f" The instrument measures in a frame of its own, {far:.2f} m from the world of the robot."
+    weak = [
+        f"{name} ({100.0 * share:.0f} %)"
+        for name, share in zip(identified.names, identified.shares, strict=True)
+        if share < _WEAK
+    ]
+    if weak:
+        text += f" Mostly the prior, not the data, gives {', '.join(weak)}; in brackets what the data add."
+    repeated = repeatability(identified)
+    if repeated:
+        text += f" {repeated.rows} rows repeat {repeated.configurations} configurations, "
+        text += f"to {repeated.position_mm:.3g} mm."
     if study.before and study.after:
         before, after = (float(np.linalg.norm(each.mean_mm)) for each in (study.before, study.after))
         text += f" On fresh configurations the mean error falls from {before:.3f} to {after:.3f} mm"
@@ -88,6 +152,18 @@ def calibration_verdict(study: CalibrationStudy, path: Mapping[str, Any] | None)
             f"{after['max_norm_mm']:.2f} mm, at rest from {rest[0]:.3f} to {rest[1]:.3f} mm."
         )
     return text
+
+
+def noise_sentence(found: Identified) -> str:
+    """How noisy the rows are, and how one knows."""
+    noise = noise_dict(found)
+    if noise["estimated"] and noise["position_mm"] < _NO_NOISE_MM:
+        return " The rows are free of noise."
+    values = [f"{noise['joint_deg']:.2g} degrees of the joints" if noise["joint_deg"] else ""]
+    values += [f"{noise['position_mm']:.2g} mm"]
+    values += [f"{noise['rotation_deg']:.2g} degrees" if found.residuals.shape[1] == 6 else ""]
+    how = "Estimated" if noise["estimated"] else "Known"
+    return f" {how} noise: {', '.join(filter(None, values))}."
 
 
 def _print(console: Console, title: str, rows: Sequence[Sequence[str]]) -> None:
@@ -152,7 +228,11 @@ def write_calibration_page(
         note = "No camera: the path is planned with the nominal and with the calibrated robot. True errors."
         sections.append(Section("Path", note, html_table(head, _path_rows(path))))
         sections.append(Section("Distance from the path", "", _path_figure(path), 360))
-    note = "With 95 % confidence; a dependent parameter is zero, its effect is in the ones shown."
+    note = (
+        "With 95 % confidence. Placements are displaced along (x, y, z) and turned about (rx, ry, rz) the "
+        "axes of their frame; zero is the zero point of a joint. A dependent parameter is zero, its effect "
+        "is in the ones shown."
+    )
     sections.append(Section("Parameters", note, html_table(*_parameter_table(study))))
     q, rows = study.sets.calibration.q, study.sets.calibration.rows
     names = [f"row {row}" for row in rows]
@@ -194,15 +274,18 @@ def _path_figure(path: Mapping[str, Any]) -> go.Figure:
 def _parameter_table(study: CalibrationStudy) -> tuple[list[str], list[list[str]]]:
     """Each parameter in mm, degrees or rad per N m, with its confidence, and with the truth where known."""
     identified, truth = study.identified, study.truth
-    names = parameter_names(study.nominal)
     rows = []
     for number, name in enumerate(identified.names):
-        unit, factor = ("rad / N m", 1.0) if name.startswith("c_") else ("deg", 180.0 / np.pi)
-        if name.startswith("pl_"):
+        unit, factor = ("deg", 180.0 / np.pi)
+        if name.startswith("c_"):
+            unit, factor = "rad / N m", 1.0
+        elif name.endswith(("_x", "_y", "_z")):
             unit, factor = "mm", 1e3
         value, sigma = factor * identified.values[number], factor * identified.sigmas[number]
-        row = [name, unit, f"{value:.6g}", f"{_CONFIDENCE * sigma:.2g}"]
+        share = f"{100.0 * identified.shares[number]:.1f} %"
+        row = [name, unit, f"{value:.6g}", f"{_CONFIDENCE * sigma:.2g}", share]
         if truth is not None:
-            row.append(f"{factor * truth[names.index(name)]:.6g}" if name in names else "")
+            row.append(f"{factor * truth[number]:.6g}")
         rows.append(row)
-    return ["parameter", "unit", "value", "±", *(["truth"] if truth is not None else [])], rows
+    head = ["parameter", "unit", "value", "±", "from the data"]
+    return [*head, *(["truth"] if truth is not None else [])], rows

@@ -1,7 +1,8 @@
-"""Identifies geometric errors and joint compliances from measured poses.
+"""Identifies the geometry of a robot, and how its joints yield, from measured poses or positions.
 
-Probst (2024), section 4.1: scaled Gauss-Newton with a step size, eq. (4.8), on the exact nonlinear model;
-here with whitened residuals where the noise is known, with compliances, and with a search for outliers.
+All 54 parameters of the complete error model are estimated at once, with a prior in the sizes that errors
+of robots have; no rank is decided on the way. The noise is known or estimated from the residuals, and rows
+with gross errors are found before they can hide each other.
 """
 
 from dataclasses import dataclass, field, replace
@@ -9,25 +10,48 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from scipy.stats import chi2
 
-from robots.calibration.identifiability import identifiable_parameters, unseen_parameters
+from robots.calibration.error_model import ErrorModel
+from robots.calibration.identified import Identified
+from robots.calibration.instrument_frame import instrument_frame
+from robots.calibration.loads import Loads
 from robots.calibration.measurements import MeasurementNoise, Measurements
-from robots.description.error_parameters import NUM_PARAMETERS
-from robots.description.model import NUM_JOINTS, Calibration, RobotModel
-from robots.dynamics.compliant_kinematics import CompliantKinematics
-from robots.kinematics.error_kinematics import ErrorKinematics
-from robots.pose import pose_error
+from robots.calibration.prior import (
+    CENTRE_OF_MASS,
+    MASS,
+    compliance_sizes,
+    mass_sizes,
+    parameter_sizes,
+)
+from robots.calibration.reduction import ReducibleModel
+from robots.calibration.solver.levenberg_marquardt import Fit, minimise
+from robots.calibration.solver.noise_model import FLOOR, JOINT, POSITION, ROTATION, NoiseModel, row_shape
+from robots.calibration.solver.problem import Problem
+from robots.calibration.solver.robust import CleanRows, least_distances
+from robots.calibration.solver.variance_components import (
+    VarianceComponents,
+    components_to_estimate,
+    parameter_factor,
+    variance_components,
+)
+from robots.description.model import NUM_JOINTS, RobotModel
+from robots.metrology.least_squares import UndeterminedError
+from robots.pose import zyx_from_rotation
 
-_MOST_ITERATIONS = 30
-_CONVERGED = 1e-14  # of a step in scaled parameters, m or rad at the tool
-_SHORTEST_STEP = 1.0 / 64.0
-_INDISTINGUISHABLE = 1e-3  # share of a compliance's effect that geometric errors cannot imitate
-_OUTLIER_PROBABILITY = 1e-4  # of a good row to be taken for an outlier
-_BENEFIT_OF_DOUBT = 3.0  # times as far as noise may lead, where the noise is not known
-_OUTLIER_ROUNDS = 6
+_ELSEWHERE = (0.1, float(np.deg2rad(10.0)))  # m, rad: farther is no error of the base but another frame
+_PERFECT = 1e-9  # m or rad, rms of residuals that are rounding
+_NO_NOISE = 0.01  # share of the assumed sigma below which residuals are no noise
+_PRIOR_FADES = 0.01  # of the rms: then the prior weighs nothing
+_ROUNDS = 30
+_SETTLED = 0.02  # of its own standard deviation: change of a variance that ends the search
+_DAMPED_FROM = 6  # rounds after which scoring is damped, because it may go in circles
+_ROBUST_ROUNDS = 4
+_PLAUSIBLE = 0.03  # m: with half the rows farther off the table belongs to something else
+_RISK = 1e-4  # that a clean table of known noise is searched for gross errors
+_REDUNDANCY_OF_A_POSE = 30  # directions that a robot of six axes has
 
 
 class IdentificationError(ValueError):
-    """The measurements do not determine the parameters."""
+    """The measurements do not determine the parameters, or no parameters explain them."""
 
 
 @dataclass(frozen=True)
@@ -35,40 +59,12 @@ class IdentificationConfig:
     """What is identified, and how."""
 
     compliance: bool = False  # whether the joints' compliances are identified too
+    scales: bool = False  # whether the scales of the encoders are
     fixed: tuple[str, ...] = ()  # names of parameters that stay zero
-    noise: MeasurementNoise = field(default_factory=MeasurementNoise)  # whitens residuals if it is known
+    noise: MeasurementNoise = field(default_factory=MeasurementNoise)  # estimated if it is not known
     leave_out_outliers: bool = True  # they are reported in any case
-
-
-@dataclass(frozen=True)
-class Identified:
-    """The outcome of an identification, m parameters from n rows."""
-
-    robot: RobotModel  # the nominal one
-    p: np.ndarray  # (48,) m and rad; dependent and fixed parameters are zero
-    compliance: np.ndarray  # (6,) rad / (N m), zero where not identified
-    names: tuple[str, ...]  # (m,) of the identified parameters, compliances as c_1 ... c_6
-    values: np.ndarray  # (m,) m, rad, rad / (N m)
-    covariance: np.ndarray  # (m, m)
-    residuals: np.ndarray  # (n, 6 or 3) measured less predicted pose: rad, m; rotation first
-    outliers: tuple[int, ...]  # the numbers of their rows
-    iterations: int
-
-    @property
-    def sigmas(self) -> np.ndarray:
-        """Standard deviations of the values, (m,)."""
-        return np.sqrt(np.diagonal(self.covariance))
-
-    def calibrated_robot(self, of: str = "") -> RobotModel:
-        """The robot with its true geometry and its compliances, as far as they were found.
-
-        Args:
-            of: the robot that was calibrated, as `robots.description.model.load_robot` takes it.
-        """
-        robot = ErrorKinematics(self.robot).robot_with_errors(self.p)
-        source = f"identified from {len(self.residuals)} measurements, {len(self.names)} parameters"
-        calibration = Calibration(of, self.compliance.tolist(), source)
-        return replace(robot, name=f"{self.robot.name}, calibrated", calibration=calibration)
+    mass: float = MASS  # relative standard deviation of the masses in the robot file
+    centre_of_mass: float = CENTRE_OF_MASS  # m, of the centres of mass
 
 
 def identify(
@@ -78,193 +74,271 @@ def identify(
 
     Args:
         robot: the nominal robot, with the masses that bend it.
-        measurements: poses, or positions only; with one payload or several.
+        measurements: poses, or positions only; with one payload or several; in the world of the robot or in
+            a frame of the instrument's own.
         config: what to identify.
 
     Raises:
-        IdentificationError: if the measurements are too few or too alike; the message names the parameters
-            that cannot be seen.
-        ValueError: if a fixed parameter is unknown.
+        IdentificationError: if the measurements are too few or too alike (the message names what they do not
+            show), if the search does not converge, or if nothing explains them.
+        ValueError: if a fixed parameter is unknown, or the robot is a calibrated one.
     """
     config = config or IdentificationConfig()
-    problem = _Problem(robot, measurements, config)
-    kept = problem.first_kept()
-    for _ in range(_OUTLIER_ROUNDS):
-        solution = problem.solve(kept)
-        now_kept = problem.plausible(solution, kept)
-        if not config.leave_out_outliers or np.array_equal(now_kept, kept):
-            break
-        kept = now_kept
-    outliers = measurements.rows[~problem.plausible(solution, kept)]
-    return replace(solution, outliers=tuple(map(int, outliers)))
+    if robot.is_calibrated:
+        raise ValueError(
+            f"calibration of {robot.name}: it is calibrated already; start from the robot as drawn, "
+            f"{robot.calibration.of or 'the one that was calibrated'}"
+        )
+    robot, frame = _in_frame_of_instrument(robot, measurements)
+    problem, reducible = _problem(robot, measurements, config, frame is not None)
+    if len(measurements) * problem.width < problem.width + NUM_JOINTS:
+        raise IdentificationError(f"{len(measurements)} measurements are too few to identify anything")
+    return _Search(problem, config).result(robot, frame, reducible)
 
 
-class _Problem:
-    """The measurements with the parameters that are to explain them."""
+def _in_frame_of_instrument(
+    robot: RobotModel, measurements: Measurements
+) -> tuple[RobotModel, np.ndarray | None]:
+    """The robot with its base where the instrument sees it; the frame (4, 4), None if it is the world."""
+    model = ErrorModel(robot)
+    predicted = model.forward(measurements.q, np.zeros(len(model)))[:, :3, 3]
+    try:
+        X = instrument_frame(predicted, measurements.position, *_ELSEWHERE)
+    except UndeterminedError:  # too few points for a frame; what they are good for is said later
+        return robot, None
+    if X is None:
+        return robot, None
+    X_IB = X @ robot.base.pose().GetAsMatrix4()
+    base = replace(
+        robot.base,
+        translation=X_IB[:3, 3],
+        zyx_deg=np.rad2deg(zyx_from_rotation(X_IB[:3, :3])),
+        source=f"in the frame of the instrument; {robot.base.source}",
+    )
+    return replace(robot, base=base), X
 
-    def __init__(self, robot: RobotModel, measurements: Measurements, config: IdentificationConfig) -> None:
-        self._robot, self._measurements, self._config = robot, measurements, config
-        self._model = ErrorKinematics(robot)
-        self._is_position_only = measurements.rotation is None
-        self._rows = slice(3, 6) if self._is_position_only else slice(0, 6)
-        found = identifiable_parameters(robot, self._is_position_only)
-        unknown = [name for name in config.fixed if name not in found.names]
-        if unknown:
-            raise ValueError(f"identification: no parameter is called {unknown[0]}")
-        self._indices = np.array([i for i in found.independent if found.names[i] not in config.fixed])
-        self._names = [found.names[i] for i in self._indices]
-        self._joints = self._visible_compliances() if config.compliance else np.empty(0, dtype=int)
-        self._all_names = (*self._names, *(f"c_{joint + 1}" for joint in self._joints))
-        self._X_measured = measurements.X_WE
 
-    def solve(self, kept: np.ndarray) -> Identified:
-        """Gauss-Newton from zero on some of the rows."""
-        x = np.zeros(len(self._all_names))
-        residuals, Theta, weights = self._evaluate(x)
-        self._refuse_if_unseen(Theta[kept])
-        cost = _cost(residuals, weights, kept)
-        iterations = 0
-        while iterations < _MOST_ITERATIONS:
-            iterations += 1
-            A = (weights[kept] @ Theta[kept]).reshape(-1, len(x))
-            b = np.einsum("nij,nj->ni", weights[kept], residuals[kept]).ravel()
-            scale = np.abs(A).max(axis=0)
-            step = np.linalg.lstsq(A / scale, b, rcond=None)[0]
-            size = 1.0
-            while True:
-                candidate = x + size * step / scale
-                found = self._evaluate(candidate)
-                candidate_cost = _cost(found[0], found[2], kept)
-                # Near the minimum the cost is all rounding, and a full step is right.
-                if candidate_cost <= cost * (1.0 + 1e-9) + 1e-28 or size <= _SHORTEST_STEP:
-                    break
-                size *= 0.5
-            x, (residuals, Theta, weights), cost = candidate, found, candidate_cost
-            if np.abs(step).max() < _CONVERGED * max(1.0, np.abs(weights).max()):
-                break
-        return self._identified(x, residuals, Theta, weights, kept, iterations)
+def _problem(
+    robot: RobotModel, measurements: Measurements, config: IdentificationConfig, is_own_frame: bool
+) -> tuple[Problem, ReducibleModel]:
+    model = ErrorModel(robot, config.scales)
+    reducible = ReducibleModel(model, measurements.rotation is None)
+    sizes, loads, free = parameter_sizes(model.names, is_own_frame), None, np.arange(len(model))
+    unknown = [name for name in config.fixed if name not in model.names]
+    if unknown:
+        raise ValueError(
+            f"identification: no parameter is called {unknown[0]}; there are {', '.join(model.names)}"
+        )
+    if config.fixed:
+        # In redundant parameters another would take its place: only independent ones are free then.
+        fixed = np.array([model.names.index(name) for name in config.fixed])
+        free = np.setdiff1d(reducible.independent_with(fixed), fixed)
+    if config.compliance:
+        loads = Loads(robot, measurements.payload)
+        geometry = len(model)
+        sizes = np.concatenate(
+            [sizes, compliance_sizes(robot), mass_sizes(config.mass, config.centre_of_mass)]
+        )
+        free = np.concatenate([free, np.arange(geometry, len(sizes))])
+    return Problem(model, measurements, sizes, free, loads), reducible
 
-    def first_kept(self) -> np.ndarray:
-        """The rows that are not far beyond the others in their distance from the nominal robot, (n,) bool."""
-        residuals, _, weights = self._evaluate(np.zeros(len(self._all_names)))
-        distance = np.linalg.norm(np.einsum("nij,nj->ni", weights, residuals), axis=1)
-        return distance <= 6.0 * max(float(np.median(distance)), 1e-9)
 
-    def plausible(self, solution: Identified, kept: np.ndarray) -> np.ndarray:
-        """The rows whose residuals a normal noise of the found spread explains, (n,) bool."""
-        _, _, weights = self._evaluate(solution.values)
-        whitened = np.einsum("nij,nj->ni", weights, solution.residuals)
-        squared = np.sum(whitened**2, axis=1)
-        width = whitened.shape[1]
-        # The median is not moved by the outliers that are looked for.
-        spread = np.median(squared[kept]) / chi2.median(width)
-        largest = chi2.isf(_OUTLIER_PROBABILITY, width)
-        if self._config.noise.is_known:
-            return squared <= largest * max(spread, 1.0)
-        # What the model lacks is not normal: without knowledge of the noise only the absurd is an outlier.
-        rounding = (1e-9 * np.abs(weights).max()) ** 2
-        return squared <= _BENEFIT_OF_DOUBT**2 * largest * max(spread, rounding)
+class _Search:
+    """From a problem to its solution: outliers, noise, parameters."""
 
-    def _refuse_if_unseen(self, Theta: np.ndarray) -> None:
-        rows = Theta.reshape(-1, Theta.shape[-1])
-        unseen = unseen_parameters(rows, list(self._all_names))
-        if unseen:
+    def __init__(self, problem: Problem, config: IdentificationConfig) -> None:
+        self._problem, self._config = problem, config
+        self._shape, named = row_shape(problem.measurements)
+        given = config.noise
+        self._known = named | given.is_known
+        self._theta = np.array([given.joint_sigma, given.position_sigma, given.rotation_sigma]) ** 2
+        if not given.is_known:
+            self._theta = np.where(named, 1.0, [0.0, 1e-7, 1e-7])
+        else:
+            self._theta[[POSITION, ROTATION]] = np.maximum(self._theta[[POSITION, ROTATION]], FLOOR**2)
+            self._theta = np.where(named, 1.0, self._theta)
+        self._has_rotation = problem.width == 6
+        needed = [POSITION, ROTATION] if self._has_rotation else [POSITION]
+        self._is_known = bool(self._known[needed].all())
+        self._iterations = 0
+
+    def result(self, robot: RobotModel, frame: np.ndarray | None, reducible: ReducibleModel) -> Identified:
+        """Searches. Raises IdentificationError."""
+        problem = self._problem
+        n = len(problem)
+        clean, start, theta = self._clean_rows()
+        kept = clean if self._config.leave_out_outliers else np.ones(n, dtype=bool)
+        fit, noise, found = self._solve(kept, start, theta)
+        if not fit.is_converged:
+            rms = 1e3 * float(np.sqrt(np.mean(fit.at.residuals[kept, -3:] ** 2)))
             raise IdentificationError(
-                f"{len(Theta)} measurements do not determine {', '.join(unseen)}; "
+                f"the identification has not converged after {self._iterations} iterations and leaves "
+                f"{rms:.3g} mm"
+            )
+        self._refuse_the_implausible(fit, kept)
+        factor = self._factor(fit, noise, kept, found)
+        self._refuse_what_is_hidden(fit, kept, reducible)
+        return Identified(
+            robot=robot,
+            model=problem.model,
+            measurements=problem.measurements,
+            free=problem.columns,
+            parameters=problem.parameters(fit.u),
+            prior_sizes=problem.sizes,
+            free_factor=problem.sizes[problem.columns, None] * factor,
+            residuals=fit.at.residuals,
+            noise=noise.as_noise(),
+            is_noise_known=self._is_known,
+            design=self._design(fit, noise, kept),
+            outliers=tuple(map(int, problem.measurements.rows[~clean])),
+            kept=kept,
+            iterations=self._iterations,
+            frame=frame,
+            reducible=reducible,
+        )
+
+    def _minimise(
+        self, start: np.ndarray, noise: NoiseModel, kept: np.ndarray, is_rough: bool = False
+    ) -> Fit:
+        fit = minimise(self._problem, start, noise, kept.astype(float), is_rough=is_rough)
+        self._iterations += fit.iterations
+        return fit
+
+    def _clean_rows(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """The rows without gross errors, (n,) bool, and parameters and variances to begin with."""
+        problem = self._problem
+        everything = np.ones(len(problem), dtype=bool)
+        noise = NoiseModel(self._theta, self._shape)
+        fit = self._minimise(np.zeros(len(problem.columns)), noise, everything, is_rough=True)
+        if fit.is_converged:
+            if self._is_as_expected(fit, noise):
+                return everything, fit.u, self._theta
+            perfect = self._perfect(fit)
+            if perfect is not None:
+                return everything, *perfect
+        u, theta = least_distances(problem)
+        theta = self._theta if self._is_known else np.where(self._known, self._theta, theta)
+        kept = everything
+        for turn in range(_ROBUST_ROUNDS):
+            noise = NoiseModel(theta, self._shape)
+            at = problem.linearise(u)
+            clean = CleanRows(at, u, noise).find(np.random.default_rng(turn))
+            if turn and np.array_equal(clean, kept):
+                break
+            kept = clean
+            u = self._minimise(u, noise, kept).u
+            for _ in range(0 if self._is_known else 3):
+                at = _selected(problem.linearise(u), kept)
+                theta = variance_components(at, noise.select(kept), self._estimated(kept)).theta
+                noise = NoiseModel(theta, self._shape)
+        return kept, u, theta
+
+    def _is_as_expected(self, fit: Fit, noise: NoiseModel) -> bool:
+        """Whether residuals are what known noise makes them: then no row needs to be tested."""
+        e = fit.at.residuals
+        if not self._is_known:
+            return False
+        squares = np.sum(np.einsum("nij,nj->ni", noise.whitening(fit.at.J), e) ** 2, axis=1)
+        n, k = e.shape
+        total = squares.sum() <= chi2.isf(0.05, max(n * k - _REDUNDANCY_OF_A_POSE, k))
+        return bool(total and squares.max() <= chi2.isf(_RISK / n, k))
+
+    def _perfect(self, fit: Fit) -> tuple[np.ndarray, np.ndarray] | None:
+        """Parameters and variances where all rows fit to rounding: there are no noise and no gross errors."""
+        everything = np.ones(len(self._problem), dtype=bool)
+        theta = self._theta
+        for _ in range(4):
+            rms = float(np.sqrt(np.mean(fit.at.residuals**2)))
+            if rms < _PERFECT:
+                return fit.u, theta
+            if self._is_known or rms > _NO_NOISE * np.sqrt(theta[POSITION]):
+                return None
+            noise = self._without_noise(rms)
+            theta = noise.theta
+            fit = self._minimise(fit.u, noise, everything)
+        return None
+
+    def _without_noise(self, rms: float) -> NoiseModel:
+        """Noise so small that the prior weighs nothing."""
+        theta = np.array([0.0, 1.0, 1.0]) * max(_PRIOR_FADES * rms, FLOOR) ** 2
+        return NoiseModel(theta, np.ones_like(self._shape))
+
+    def _estimated(self, kept: np.ndarray) -> list[int]:
+        redundancy = int(kept.sum()) * self._problem.width - _REDUNDANCY_OF_A_POSE
+        return components_to_estimate(self._known, self._has_rotation, redundancy)
+
+    def _solve(
+        self, kept: np.ndarray, start: np.ndarray, theta: np.ndarray
+    ) -> tuple[Fit, NoiseModel, VarianceComponents | None]:
+        """Parameters and noise, in turns until both stand still."""
+        noise, found = NoiseModel(theta, self._shape), None
+        fit = self._minimise(start, noise, kept, is_rough=not self._is_known)
+        if self._is_known:
+            return fit, noise, None
+        estimated, before = self._estimated(kept), np.inf
+        for turn in range(_ROUNDS):
+            theta = noise.theta.copy()
+            if theta[POSITION] * self._shape[:, POSITION].max() <= 1.01 * FLOOR**2:
+                break  # down to rounding
+            rms = float(np.sqrt(np.mean(fit.at.residuals[kept] ** 2)))
+            is_settled = False
+            if rms < _PERFECT and noise.theta[JOINT] == 0.0 and rms > 0.5 * before:
+                break  # the prior weighs nothing any more, and what is left is rounding
+            before = rms
+            if rms < _PERFECT or rms < _NO_NOISE * np.sqrt(theta[POSITION]):
+                theta = np.array([0.0, 1.0, 1.0]) * max(_PRIOR_FADES * rms, FLOOR) ** 2
+            else:
+                if theta[JOINT] == 0.0 and JOINT in estimated:
+                    theta[JOINT] = 0.01 * theta[POSITION]
+                at = _selected(fit.at, kept)
+                found = variance_components(at, NoiseModel(theta, self._shape[kept]), estimated)
+                change = np.abs(found.theta - theta)[estimated]
+                is_settled = bool(np.all(change < _SETTLED * np.sqrt(np.diag(found.covariance))))
+                is_damped = turn >= _DAMPED_FROM and not is_settled
+                theta = np.sqrt(found.theta * theta) if is_damped else found.theta
+            noise = noise.with_variances(theta)
+            fit = self._minimise(fit.u, noise, kept, is_rough=not is_settled)
+            if is_settled:
+                break
+        else:
+            fit = replace(fit, is_converged=False)
+        return fit, noise, found
+
+    def _factor(
+        self, fit: Fit, noise: NoiseModel, kept: np.ndarray, found: VarianceComponents | None
+    ) -> np.ndarray:
+        """Of the covariance of the free parameters in units of the prior."""
+        at, rows = _selected(fit.at, kept), noise.select(kept)
+        return parameter_factor(at, rows, self._estimated(kept), found)
+
+    def _design(self, fit: Fit, noise: NoiseModel, kept: np.ndarray) -> np.ndarray:
+        """The triangle of the whitened derivatives by the free parameters in units of the prior."""
+        at, rows = _selected(fit.at, kept), noise.select(kept)
+        A = (rows.whitening(at.J) @ at.A).reshape(-1, at.A.shape[2])
+        return np.asarray(np.linalg.qr(A, mode="r"))
+
+    def _refuse_the_implausible(self, fit: Fit, kept: np.ndarray) -> None:
+        distance = float(np.median(np.linalg.norm(fit.at.residuals[kept, -3:], axis=1)))
+        if distance > _PLAUSIBLE:
+            raise IdentificationError(
+                f"no geometry near that of {self._problem.model.robot.name} explains the measurements: half "
+                f"of the positions stay more than {1e3 * distance:.0f} mm off (is it another robot, another "
+                f"direction of a joint, another unit?)"
+            )
+
+    def _refuse_what_is_hidden(self, fit: Fit, kept: np.ndarray, reducible: ReducibleModel) -> None:
+        """Names what the robot's ranges would show and these rows do not."""
+        geometry = self._problem.columns < len(self._problem.model)
+        x = self._problem.parameters(fit.u)[: len(self._problem.model)]
+        columns = self._problem.columns[geometry]
+        A = fit.at.A[kept][:, :, geometry].reshape(-1, len(columns)) / self._problem.sizes[columns]
+        hidden = reducible.hidden(A, columns, x)
+        if hidden:
+            raise IdentificationError(
+                f"{int(kept.sum())} measurements do not determine {', '.join(hidden)}; "
                 f"measure at more, and at more different configurations, or fix these parameters"
             )
 
-    def _visible_compliances(self) -> np.ndarray:
-        """The joints whose compliance geometric errors cannot imitate at these configurations."""
-        zero = np.zeros(NUM_PARAMETERS)
-        Theta = self._model.regressor(self._measurements.q, zero)[:, self._rows]
-        geometric = Theta[..., self._indices].reshape(-1, len(self._indices))
-        columns = self._compliance_columns(Theta[..., :NUM_JOINTS], self._measurements.q, zero)
-        columns = columns.reshape(-1, NUM_JOINTS)
-        basis = np.linalg.qr(geometric / np.abs(geometric).max(axis=0))[0]
-        found = []
-        for joint, column in enumerate(columns.T):
-            rest = column - basis @ (basis.T @ column)
-            rest -= basis @ (basis.T @ rest)
-            size = float(np.linalg.norm(column))
-            if size > 1e-9 and np.linalg.norm(rest) > _INDISTINGUISHABLE * size:
-                found.append(joint)
-                basis = np.column_stack([basis, rest / np.linalg.norm(rest)])
-        return np.array(found, dtype=int)
 
-    def _compliance_columns(self, J: np.ndarray, q: np.ndarray, p: np.ndarray) -> np.ndarray:
-        torque = np.empty_like(q)
-        wrong = self._model.robot_with_errors(p)
-        for payload in np.unique(self._measurements.payload):
-            rows = self._measurements.payload == payload
-            torque[rows] = CompliantKinematics(wrong, float(payload)).gravity_torque(q[rows])
-        return J * torque[:, None, :]
-
-    def _evaluate(self, x: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Residuals (n, k), regressors (n, k, m) and whitening matrices (n, k, k) at x."""
-        geometry = len(self._indices)
-        p, compliance = np.zeros(NUM_PARAMETERS), np.zeros(NUM_JOINTS)
-        p[self._indices], compliance[self._joints] = x[:geometry], x[geometry:]
-        q = self._measurements.q
-        if len(self._joints):
-            wrong = replace(
-                self._model.robot_with_errors(p), calibration=Calibration("", compliance.tolist())
-            )
-            q = q.copy()
-            for payload in np.unique(self._measurements.payload):
-                rows = self._measurements.payload == payload
-                q[rows] = CompliantKinematics(wrong, float(payload)).link_positions(q[rows])
-        X, Theta = self._model.forward_and_regressor(q, p)
-        if self._is_position_only:
-            residuals = self._X_measured[:, :3, 3] - X[:, :3, 3]
-        else:
-            residuals = pose_error(self._X_measured, X)
-        Theta = Theta[:, self._rows]
-        columns = [Theta[..., self._indices]]
-        if len(self._joints):
-            by_compliance = self._compliance_columns(Theta[..., :NUM_JOINTS], q, p)
-            columns.append(by_compliance[..., self._joints])
-        return residuals, np.concatenate(columns, axis=-1), self._whitening(Theta[..., :NUM_JOINTS])
-
-    def _whitening(self, J: np.ndarray) -> np.ndarray:
-        """Matrices that make the noise of every row white; joint noise reaches the tool through J."""
-        noise, width = self._config.noise, J.shape[1]
-        if not noise.is_known:
-            return np.broadcast_to(np.eye(width), (len(J), width, width))
-        sigmas = np.repeat([noise.rotation_sigma, noise.position_sigma], 3)[self._rows]
-        covariance = noise.joint_sigma**2 * J @ np.swapaxes(J, -1, -2) + np.diag(sigmas**2)
-        return np.linalg.inv(np.linalg.cholesky(covariance))
-
-    def _identified(
-        self,
-        x: np.ndarray,
-        residuals: np.ndarray,
-        Theta: np.ndarray,
-        weights: np.ndarray,
-        kept: np.ndarray,
-        iterations: int,
-    ) -> Identified:
-        A = (weights[kept] @ Theta[kept]).reshape(-1, len(x))
-        scale = np.abs(A).max(axis=0)
-        scaled = np.linalg.inv((A / scale).T @ (A / scale))
-        freedom = max(1, A.shape[0] - len(x))
-        variance = 1.0 if self._config.noise.is_known else 2.0 * _cost(residuals, weights, kept) / freedom
-        geometry = len(self._indices)
-        p, compliance = np.zeros(NUM_PARAMETERS), np.zeros(NUM_JOINTS)
-        p[self._indices], compliance[self._joints] = x[:geometry], x[geometry:]
-        return Identified(
-            robot=self._robot,
-            p=p,
-            compliance=compliance,
-            names=self._all_names,
-            values=x,
-            covariance=variance * scaled / np.outer(scale, scale),
-            residuals=residuals,
-            outliers=(),
-            iterations=iterations,
-        )
-
-
-def _cost(residuals: np.ndarray, weights: np.ndarray, kept: np.ndarray) -> float:
-    whitened = np.einsum("nij,nj->ni", weights[kept], residuals[kept])
-    return 0.5 * float(np.sum(whitened**2))
+def _selected(at, rows: np.ndarray):
+    return replace(at, residuals=at.residuals[rows], A=at.A[rows], J=at.J[rows])

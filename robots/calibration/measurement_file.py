@@ -3,7 +3,9 @@
 One row a measurement, separated by commas or semicolons, lines that begin with # are comments. Columns:
 ``q1_rad`` ... ``q6_rad`` or ``q1_deg`` ...; ``x_m``, ``y_m``, ``z_m`` or ``x_mm`` ...; for the orientation
 ``qw``, ``qx``, ``qy``, ``qz``, or the ZYX Euler angles ``alpha_deg``, ``beta_deg``, ``gamma_deg`` (also in
-``_rad``), or none of them; ``payload_kg`` if there is one. Other columns are left alone.
+``_rad``), or none of them; ``payload_kg`` if there is one; standard deviations of the row as
+``sigma_joint_deg``, ``sigma_position_mm``, ``sigma_rotation_deg`` (or ``_rad``, ``_m``) as far as they are
+known. Other columns are left alone. A configuration may be there more than once.
 """
 
 import csv
@@ -25,7 +27,7 @@ _UNITS = {"rad": 1.0, "deg": math.pi / 180.0, "m": 1.0, "mm": 1e-3}
 _LARGEST = {"rad": 8.0, "deg": 800.0, "m": 20.0, "mm": 20000.0}  # beyond it the unit must be wrong
 _MEANT = {"rad": "degrees", "m": "millimetres", "deg": "something else", "mm": "something else"}
 _QUATERNION_TOLERANCE = 1e-3  # of the length; it is normalised
-_SAME = 1e-9  # rad, of two configurations
+_SIGMAS = {"sigma_joint": ("rad", "deg"), "sigma_position": ("m", "mm"), "sigma_rotation": ("rad", "deg")}
 
 
 class MeasurementFileError(ValueError):
@@ -118,6 +120,11 @@ class _Columns:
         self._has_payload = "payload_kg" in header
         if self._has_payload:
             self._take(header, "payload_kg", ("",))
+        self._sigmas = [
+            name for name, units in _SIGMAS.items() if any(f"{name}_{unit}" in header for unit in units)
+        ]
+        for name in self._sigmas:
+            self._take(header, name, _SIGMAS[name])
 
     def _take(self, header: list[str], name: str, units: tuple[str, ...]) -> None:
         for unit in units:
@@ -141,6 +148,10 @@ class _Columns:
                 raise ValueError(f"{name} is not a number: '{text}'") from None
             if not math.isfinite(value):
                 raise ValueError(f"{name} is not finite: {text}")
+            if value < 0.0 and name == "payload_kg":
+                raise ValueError(f"payload_kg must not be negative, got {text}")
+            if value <= 0.0 and name.startswith("sigma_"):
+                raise ValueError(f"{name} must be positive, got {text}")
             values.append(value)
         return values
 
@@ -171,17 +182,15 @@ class _Columns:
             rotation = Rotation.from_quat(unit, scalar_first=True).as_matrix()
         elif self._orientation == "euler":
             rotation = rotation_from_zyx(rest[:, :3])
-        payload = rest[:, -1] if self._has_payload else np.zeros(len(q))
-        seen: dict[tuple[int, ...], int] = {}
-        for k in np.flatnonzero(good):
-            key = (*np.round(q[k] / _SAME).astype(np.int64).tolist(), round(payload[k] / _SAME))
-            if key in seen:
-                good[k] = False
-                problems.append(RowProblem(int(lines[k]), f"the configuration of line {seen[key]} once more"))
-            seen.setdefault(key, int(lines[k]))
+        behind = rest[:, {"quaternion": 4, "euler": 3, "": 0}[self._orientation] :]
+        payload = behind[:, 0] if self._has_payload else np.zeros(len(q))
+        sigmas = np.full((len(q), len(_SIGMAS)), np.nan)
+        for column, name in enumerate(self._sigmas, int(self._has_payload)):
+            sigmas[:, list(_SIGMAS).index(name)] = behind[:, column]
         if not good.any():
             raise MeasurementFileError(f"no usable row; {problems[0].what}")
-        return Measurements(q, position, rotation, payload, lines).select(good), problems
+        sigmas = sigmas if self._sigmas else np.zeros((0, len(_SIGMAS)))
+        return Measurements(q, position, rotation, payload, lines, sigmas).select(good), problems
 
 
 def measurement_text(measurements: Measurements) -> str:
@@ -192,6 +201,11 @@ def measurement_text(measurements: Measurements) -> str:
         header += _QUATERNION
         columns.append(Rotation.from_matrix(measurements.rotation).as_quat(canonical=True, scalar_first=True))
     header.append("payload_kg")
-    table = np.column_stack([*columns, measurements.payload])
+    columns.append(measurements.payload[:, None])
+    for name, sigma in zip(_SIGMAS, measurements.sigmas.T, strict=True):
+        if np.isfinite(sigma).all() and len(sigma):
+            header.append(f"{name}_{_SIGMAS[name][0]}")
+            columns.append(sigma[:, None])
+    table = np.column_stack(columns)
     lines = [",".join(header), *(",".join(map(repr, row)) for row in table.tolist())]
     return "\n".join(lines) + "\n"

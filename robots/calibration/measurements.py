@@ -38,6 +38,9 @@ class Measurements:
     rows: np.ndarray = field(
         default_factory=lambda: np.zeros(0, dtype=int)
     )  # (n,) where they stand in a file
+    # (n, 3) standard deviations of joints, position and rotation of every row in rad, m, rad; a column of NaN
+    # where they are not known; empty if none is
+    sigmas: np.ndarray = field(default_factory=lambda: np.zeros((0, 3)))
 
     def __post_init__(self) -> None:
         """Checks the shapes and fills in what was left out. Raises ValueError if they do not fit."""
@@ -49,6 +52,8 @@ class Measurements:
         shapes = [self.q.shape, self.position.shape, self.payload.shape, self.rows.shape]
         if self.rotation is not None:
             shapes.append(self.rotation.shape)
+        if len(self.sigmas) and self.sigmas.shape != (n, 3):
+            shapes.append(self.sigmas.shape)
         if shapes[:4] != [(n, NUM_JOINTS), (n, 3), (n,), (n,)] or shapes[4:] not in ([], [(n, 3, 3)]):
             raise ValueError(f"measurements: shapes do not fit each other: {shapes}")
 
@@ -68,8 +73,9 @@ class Measurements:
     def select(self, which: np.ndarray) -> "Measurements":
         """Some of the rows, by a mask or by indices."""
         rotation = None if self.rotation is None else self.rotation[which]
+        sigmas = self.sigmas[which] if len(self.sigmas) else self.sigmas
         return Measurements(
-            self.q[which], self.position[which], rotation, self.payload[which], self.rows[which]
+            self.q[which], self.position[which], rotation, self.payload[which], self.rows[which], sigmas
         )
 
     def without_rotation(self) -> "Measurements":

@@ -3,11 +3,18 @@
 from dataclasses import asdict, dataclass
 
 import numpy as np
+from scipy.stats import chi2
 
+from robots.calibration.error_model import ZEROS
+from robots.calibration.identified import Identified
 from robots.calibration.measurements import Measurements
 from robots.description.model import RobotModel
 from robots.dynamics.compliant_kinematics import controller_kinematics
 from robots.pose import pose_error
+
+_RISK = 1e-3  # that a clean table loses a row
+_BENEFIT_OF_DOUBT = 2.0  # times as far as the spread of the other rows explains: a model is never perfect
+_ROUNDING = 1e-6  # m or rad, below which nothing is a gross error
 
 
 @dataclass(frozen=True)
@@ -49,3 +56,21 @@ def statistics(errors: np.ndarray) -> ErrorStatistics:
         for summary in (unit.mean(axis=0), unit.max(axis=0), np.percentile(unit, 90.0, axis=0))
     ]
     return ErrorStatistics(*numbers)
+
+
+def plausible_rows(identified: Identified, measurements: Measurements) -> np.ndarray:
+    """The rows of a fresh table that a calibration predicts as well as it predicts the others, (n,) bool.
+
+    What is predicted is compared with what was measured in units of the noise that the calibration knows or
+    has found, and of the median over the table, which gross errors do not move.
+    """
+    errors = prediction_errors(identified.calibrated_robot(), measurements)
+    _, Theta = identified.model.forward_and_regressor(measurements.q, identified.x)
+    width, noise = errors.shape[1], identified.noise
+    J = Theta[:, 6 - width :, ZEROS]
+    variances = np.repeat([noise.rotation_sigma**2, noise.position_sigma**2], 3)[6 - width :]
+    V = noise.joint_sigma**2 * J @ np.swapaxes(J, 1, 2) + np.diag(np.maximum(variances, _ROUNDING**2))
+    squared = np.sum(errors * np.linalg.solve(V, errors[..., None])[..., 0], axis=1)
+    spread = max(float(np.median(squared)) / chi2.median(width), 1.0)
+    largest = chi2.isf(_RISK / max(len(squared), 1), width)
+    return squared <= _BENEFIT_OF_DOUBT**2 * spread * largest

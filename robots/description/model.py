@@ -23,6 +23,7 @@ from robots.configuration.nodes import ConfigurationError
 from robots.configuration.quantity import numbers, positive, quantity
 from robots.configuration.typed import typed
 from robots.description.beam import Beam, beam_surrogate
+from robots.description.calibration import Calibration
 from robots.description.counterbalance_spring import CounterbalanceSpring
 from robots.description.drive_train import DriveTrain, drive_trains
 from robots.drivetrain.counterbalance import Counterbalance
@@ -111,15 +112,6 @@ class PayloadLimits:
     source: str = ""
     center_of_mass: np.ndarray = field(default_factory=lambda: np.zeros(3))  # m, in the flange frame
     center_of_mass_source: str = ""
-
-
-@dataclass
-class Calibration:
-    """What has been measured on one robot, in a file that a calibration wrote; empty for a robot as drawn."""
-
-    of: str = ""  # the robot that was calibrated: what stood in its scenario
-    compliance: list[float] = numbers([0.0] * NUM_JOINTS, (NUM_JOINTS,), unit="rad / (N m)")  # of gravity
-    source: str = ""
 
 
 @dataclass
@@ -287,6 +279,7 @@ def _problem(robot: RobotModel) -> tuple[_Keys, str]:
         problems.append(((*keys, "beam"), _beam_problem(label, link)))
     if not any(problem for _, problem in problems):
         problems.append((("counterbalance",), _refusal(lambda: robot.counterbalance_at_axis_2)))
+    problems.append((("calibration",), robot.calibration.problem()))
     if robot.payload.largest_mass > 0.0:
         problems.append((("payload", "inertia"), _inertia_problem("payload", robot.payload.inertia)))
     return next((each for each in problems if each[1]), ((), ""))

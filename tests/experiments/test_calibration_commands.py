@@ -44,7 +44,12 @@ def test_a_design_is_written_with_its_bound_and_its_picture(tmp_path: Path):
 def test_a_calibration_tells_what_it_is_worth(calibrated: Path):
     result = json.loads((calibrated / "result.json").read_text())
     assert result["identifiable"] == 30
-    assert result["parameters"]["max_abs_error"] < 1e-5  # the true robot has dependent errors too
+    assert result["parameters"]["max_abs_error"] < 1e-5  # what still oscillates when it counts as rest
+    assert (result["rank"], result["converged"]) == (30, True)
+    assert len(result["names"]) == len(result["values"]) == len(result["sigmas"]) == 30
+    assert np.shape(result["correlation"]) == (30, 30)
+    assert result["condition"] > 1.0
+    assert len(result["residuals"]) == 20
     validation = result["validation"]
     assert max(validation["before"]["mean_mm"]) > 10.0
     assert max(validation["after"]["max_mm"]) < 5e-3  # twice what still oscillates when it counts as rest
@@ -104,7 +109,8 @@ def test_bad_rows_are_named_and_do_no_harm(calibrated: Path, tmp_path: Path):
         (["design", "--criterion", "x"], "criterion must be one of b3, d, i, got 'x'"),
         (["design", "--robot", "none"], "robot 'none': no file"),
         (["design", "--camera", "here"], "--camera must be three numbers in m such as 1.5,0,1.2, got 'here'"),
-        (["calibrate", "--noise", "loud"], "--noise must be one of none, source, got 'loud'"),
+        (["calibrate", "--noise", "loud"], "--noise must be estimate, source or the path of a YAML file"),
+        (["calibrate", "--measurements", "x.csv", "--count", "30"], "--count is for simulated measurements"),
         (["calibrate", "--validation", "x.csv"], "--validation needs --measurements"),
         (["calibrate", "--measurements", "none.csv"], "measurements none.csv: cannot be read"),
         (["calibrate", "--count", "2"], "--count must be at least 5, got 2"),

@@ -1,5 +1,6 @@
 """Tables of measurements: what was written is read, and what is wrong is said with its line."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -78,18 +79,32 @@ def test_bad_rows_are_named_and_the_others_used():
     cells = lines[4].split(",")
     cells[9] = "2.0"  # line 5: no unit quaternion
     lines[4] = ",".join(cells)
-    lines.append(lines[1])  # line 8: the first measurement once more
+    lines.append(lines[1].rsplit(",", 1)[0] + ",-1")  # line 8: a load below nothing
     read, problems = parse_measurements("\n".join(lines))
     assert [problem.row for problem in problems] == [3, 4, 5, 8]
     assert [
         next(
-            word
-            for word in ("not finite", "not a number", "quaternion", "of line 2 once more")
-            if word in p.what
+            word for word in ("not finite", "not a number", "quaternion", "not be negative") if word in p.what
         )
         for p in problems
-    ] == ["not finite", "not a number", "quaternion", "of line 2 once more"]
+    ] == ["not finite", "not a number", "quaternion", "not be negative"]
     np.testing.assert_array_equal(read.rows, [2, 6, 7])
+
+
+def test_a_configuration_may_be_measured_again():
+    lines = measurement_text(table(6)).splitlines()
+    read, problems = parse_measurements("\n".join([*lines, lines[1]]))
+    assert problems == []
+    np.testing.assert_array_equal(read.q[-1], read.q[0])
+
+
+def test_standard_deviations_of_rows_come_back_in_any_unit():
+    told = replace(table(4), sigmas=np.outer([1.0, 2.0, 3.0, 4.0], [1e-4, 1e-5, np.nan]))
+    text = measurement_text(told)
+    assert text.splitlines()[0].endswith("payload_kg,sigma_joint_rad,sigma_position_m")
+    np.testing.assert_array_equal(parse_measurements(text)[0].sigmas, told.sigmas)
+    text = text.replace("sigma_position_m", "sigma_position_mm")
+    np.testing.assert_allclose(parse_measurements(text)[0].sigmas[:, 1], 1e-3 * told.sigmas[:, 1])
 
 
 def test_a_missing_file_is_named(tmp_path: Path):

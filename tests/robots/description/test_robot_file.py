@@ -1,5 +1,6 @@
 """A robot written and read again is the same robot, as YAML to the last digit and as URDF in its motions."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -15,6 +16,7 @@ from robots.description.urdf import urdf_text
 from robots.kinematics.error_kinematics import ErrorKinematics
 from robots.kinematics.forward import Kinematics
 
+COMPLIANCE = [0.0, 1.0 / 45000.0, 1.0 / 3.0e4, 0.0, 0.0, 0.0]
 NOMINAL = load_robot("irb1200")
 
 
@@ -24,8 +26,7 @@ def calibrated() -> RobotModel:
     q = configurations(60)
     X_WE = ErrorKinematics(NOMINAL).forward(q, p)
     robot = identify(NOMINAL, Measurements(q, X_WE[:, :3, 3], X_WE[:, :3, :3])).calibrated_robot("irb1200")
-    robot.calibration.compliance = [0.0, 1.0 / 45000.0, 1.0 / 3.0e4, 0.0, 0.0, 0.0]
-    return robot
+    return replace(robot, calibration=replace(robot.calibration, compliance=COMPLIANCE))
 
 
 def configurations(count: int) -> np.ndarray:
@@ -39,6 +40,7 @@ def test_a_calibrated_robot_file_gives_the_same_kinematics(tmp_path: Path):
     q = configurations(100)
     np.testing.assert_array_equal(Kinematics(read).forward(q), Kinematics(robot).forward(q))
     assert read.calibration == robot.calibration
+    assert len(read.calibration.names) == 54
     assert robot_text(read) == robot_text(robot)
 
 

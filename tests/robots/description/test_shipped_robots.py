@@ -17,9 +17,12 @@ from robots.pose import wrap_angle
 # Reach of the centre of the wrist from axis 1, distance from there to the flange, mass.
 DATA_SHEETS = {
     "irb1200": (0.703, 0.082, 52.0),
+    "irb140": (0.810, 0.065, 98.0),
     "kr16": (1.611, 0.158, 235.0),
     "kr210": (2.696, 0.215, 1068.0),
 }
+
+NO_SPHERICAL_WRIST = ("puma560", "ur10")  # or an offset shoulder: the analytic inverse does not know them
 
 
 @pytest.mark.parametrize(("name", "numbers"), DATA_SHEETS.items(), ids=DATA_SHEETS)
@@ -32,7 +35,7 @@ def test_reach_and_mass_are_those_of_the_data_sheet(name: str, numbers: tuple[fl
     assert robot.base_link.mass + sum(link.mass for link in robot.links) == pytest.approx(mass, rel=1e-3)
 
 
-@pytest.mark.parametrize("name", shipped_robots())
+@pytest.mark.parametrize("name", [name for name in shipped_robots() if name not in NO_SPHERICAL_WRIST])
 def test_inverse_kinematics_finds_the_way_back(name: str):
     robot = load_robot(name)
     kinematics, inverse = Kinematics(robot), InverseKinematics(robot)

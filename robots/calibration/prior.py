@@ -1,0 +1,50 @@
+"""How large errors of robots are: what is believed of the parameters before anything is measured.
+
+Every parameter has its own unit here, so that a radian is not weighed as a metre, and a direction that the
+measurements do not show stays where a robot most probably is: near its drawing.
+"""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from robots.calibration.loads import CENTRE_NAMES, MASS_NAMES
+from robots.description.model import RobotModel
+
+TRANSLATION = 10e-3  # m, standard deviation of each coordinate of a placement
+ROTATION = float(np.deg2rad(2.0))  # rad, of each rotation of a placement and of the zero of a joint
+SCALE = 1e-3  # of an encoder: share of the angle that it tells
+OWN_FRAME = 1.0  # m and rad, of the base in a frame that has nothing to do with the robot
+COMPLIANCES = 3.0  # times what the stiffness in the robot file says
+MASS = 0.05  # of the masses in a robot file and of a payload, relative
+CENTRE_OF_MASS = 10e-3  # m, of each coordinate
+
+
+def parameter_sizes(names: Sequence[str], is_own_frame: bool = False) -> np.ndarray:
+    """Standard deviations of geometric parameters before the measurement, in m and rad.
+
+    Args:
+        names: as `robots.calibration.error_model` has them.
+        is_own_frame: whether the instrument measures in a frame of its own, so that the base of the robot
+            may be anywhere in it.
+    """
+    sizes = []
+    for name in names:
+        part, _, kind = name.partition("_")
+        if part == "scale":
+            sizes.append(SCALE)
+        elif part == "base" and is_own_frame:
+            sizes.append(OWN_FRAME)
+        else:
+            sizes.append(TRANSLATION if kind in ("x", "y", "z") else ROTATION)
+    return np.array(sizes)
+
+
+def compliance_sizes(robot: RobotModel) -> np.ndarray:
+    """Standard deviations of the joints' compliances before the measurement in rad / (N m), (6,)."""
+    return COMPLIANCES / robot.joint_stiffness
+
+
+def mass_sizes(mass: float = MASS, centre_of_mass: float = CENTRE_OF_MASS) -> np.ndarray:
+    """Standard deviations of the masses, relative, and of the centres of mass in m, (28,)."""
+    return np.concatenate([np.full(len(MASS_NAMES), mass), np.full(len(CENTRE_NAMES), centre_of_mass)])

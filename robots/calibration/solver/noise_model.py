@@ -1,0 +1,60 @@
+"""How the noise of an instrument reaches the rows of a table.
+
+V_n = theta_q s_q^2 J_n J_n^T + theta_p s_p^2 I_p + theta_r s_r^2 I_r: noise of the joint sensors reaches the
+tool through the Jacobian, that of the instrument adds to position and rotation. The s are one, or what the
+table says of each row; the theta are variances, known or to be found.
+"""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from robots.calibration.measurements import MeasurementNoise, Measurements
+
+JOINT, POSITION, ROTATION = 0, 1, 2  # the components
+FLOOR = 1e-13  # m or rad: below it there is rounding only
+
+
+@dataclass(frozen=True)
+class NoiseModel:
+    """Variances of a table's rows, with n rows of k numbers."""
+
+    theta: np.ndarray  # (3,) variances of joint, position and rotation: rad^2, m^2, rad^2
+    shape: np.ndarray  # (n, 3) what they are multiplied by, row for row
+
+    def with_variances(self, theta: np.ndarray) -> "NoiseModel":
+        """The same rows with other variances."""
+        return replace(self, theta=theta)
+
+    def select(self, rows: np.ndarray) -> "NoiseModel":
+        """Some of the rows."""
+        return replace(self, shape=self.shape[rows])
+
+    def whitening(self, J: np.ndarray) -> np.ndarray:
+        """Matrices (n, k, k) that make rows white, for Jacobians of the joints (n, k, 6)."""
+        variance = self.theta * self.shape
+        width = J.shape[1]
+        V = variance[:, JOINT, None, None] * (J @ np.swapaxes(J, 1, 2))
+        diagonal = np.repeat(variance[:, [ROTATION, POSITION]], 3, axis=1)[:, 6 - width :]
+        V[:, np.arange(width), np.arange(width)] += diagonal
+        return np.linalg.inv(np.linalg.cholesky(V))
+
+    def halves(self, W: np.ndarray, J: np.ndarray) -> list[np.ndarray]:
+        """Factors H_i with W Q_i W^T = H_i H_i^T, Q_i the share of component i in V."""
+        root = np.sqrt(self.shape)[:, :, None, None]
+        position = W[:, :, -3:]
+        rotation = W[:, :, :-3]
+        return [root[:, JOINT] * (W @ J), root[:, POSITION] * position, root[:, ROTATION] * rotation]
+
+    def as_noise(self) -> MeasurementNoise:
+        """Standard deviations."""
+        return MeasurementNoise(*np.sqrt(self.theta).tolist())
+
+
+def row_shape(measurements: Measurements) -> tuple[np.ndarray, np.ndarray]:
+    """What a table says of its rows: variances (n, 3), one where it says nothing; which it names, (3,)."""
+    sigmas = measurements.sigmas
+    if not len(sigmas):
+        return np.ones((len(measurements), 3)), np.zeros(3, dtype=bool)
+    named = np.asarray(np.all(np.isfinite(sigmas), axis=0))
+    return np.where(named, np.maximum(np.nan_to_num(sigmas), FLOOR) ** 2, 1.0), named
