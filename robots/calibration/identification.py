@@ -175,7 +175,8 @@ class _Search:
                 f"the identification has not converged after {self._iterations} iterations and leaves "
                 f"{rms:.3g} mm"
             )
-        self._refuse_the_implausible(fit, kept)
+        if clean.all() or self._config.leave_out_outliers:
+            self._refuse_the_implausible(fit, kept)
         factor = self._factor(fit, noise, kept, found)
         self._refuse_what_is_hidden(fit, kept, reducible)
         return Identified(

@@ -9,7 +9,8 @@ from robots.calibration.error_model import ErrorModel
 from robots.calibration.measurements import MeasurementNoise, Measurements
 from robots.calibration.reduction import ReducibleModel, Reduction
 from robots.calibration.solver.problem import COMPLIANCE_NAMES
-from robots.description.model import NUM_JOINTS, Calibration, RobotModel
+from robots.description.calibration import Calibration
+from robots.description.model import NUM_JOINTS, RobotModel
 from robots.pose import zyx_from_rotation
 
 _SHOWN = 0.5  # share of what is known that has to come from the data, for a compliance to be named

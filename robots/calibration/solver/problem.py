@@ -77,11 +77,14 @@ class Problem:
         """Residuals with their derivatives."""
         x, q, torque, by_masses = self._joints(u)
         chain, Theta = self.model.chain_and_regressor(q, x[: len(self.model)])
-        Theta = Theta[:, self.rows]
+        whole, Theta = Theta, Theta[:, self.rows]
         J = Theta[:, :, ZEROS]
         columns = [Theta]
         if torque is not None and by_masses is not None:
-            compliance = x[len(self.model) :][:NUM_JOINTS]
+            assert self._loads is not None
+            compliance, masses = np.split(x[len(self.model) :], [NUM_JOINTS])
+            by_geometry = self._loads.by_geometry(chain, whole, masses)
+            columns = [Theta + J @ (compliance[:, None] * by_geometry)]
             columns += [J * torque[:, None, :], J @ (compliance[:, None] * by_masses)]
         A = np.concatenate(columns, axis=-1) if len(columns) > 1 else Theta
         A = A[:, :, self.columns] * self.sizes[self.columns]

@@ -4,8 +4,9 @@ import numpy as np
 import pytest
 
 from robots.calibration.identifiability import identifiable_parameters, unseen_parameters
+from robots.description.calibration import Calibration
 from robots.description.error_parameters import NUM_PARAMETERS, error_parameters, parameter_names
-from robots.description.model import Calibration, Placement, RobotModel, load_robot
+from robots.description.model import Placement, RobotModel, load_robot
 from robots.kinematics.error_kinematics import ErrorKinematics
 from robots.pose import pose_error
 

@@ -1,0 +1,122 @@
+"""Rows with gross errors: found even where they hide each other, and good rows left in peace."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from robots.calibration.identification import IdentificationConfig, identify
+from robots.calibration.identified import Identified
+from robots.calibration.measurements import SOURCE_NOISE, Measurements
+from robots.calibration.repeatability import repeatability
+from robots.calibration.validation import plausible_rows
+from robots.description.model import load_robot
+from robots.kinematics.forward import Kinematics
+from tests.robots.calibration.matrix_robot import MatrixRobot
+
+NOMINAL, DRAWN = load_robot("irb1200"), MatrixRobot("irb1200")
+
+
+def noisy_table(count: int, rng: np.random.Generator) -> tuple[Measurements, MatrixRobot]:
+    true = DRAWN.displaced(rng)
+    q = DRAWN.configurations(count, rng)
+    X_WE = true.forward(q)
+    return Measurements(q, X_WE[:, :3, 3], X_WE[:, :3, :3]).noisy(SOURCE_NOISE, rng), true
+
+
+def spoilt(table: Measurements, rows: np.ndarray, distance: float, rng: np.random.Generator) -> Measurements:
+    """Some positions off by a distance in m, anywhere around."""
+    way = rng.normal(size=(len(rows), 3))
+    position = table.position.copy()
+    position[rows] += distance * way / np.linalg.norm(way, axis=1, keepdims=True)
+    return replace(table, position=position)
+
+
+def error(result: Identified, true: MatrixRobot) -> float:
+    q = DRAWN.configurations(100, np.random.default_rng(7))
+    X_WE = Kinematics(result.calibrated_robot()).forward(q)
+    return float(np.mean(np.linalg.norm((X_WE - true.forward(q))[:, :3, 3], axis=1)))
+
+
+def masked(count: int, bad: int, seeds: range) -> None:
+    """All bad rows of 20 mm are found, and the result is that of the good rows alone, give or take."""
+    with_bad, clean = [], []
+    for seed in seeds:
+        rng = np.random.default_rng(seed)
+        table, true = noisy_table(count, rng)
+        rows = rng.choice(count, bad, replace=False)
+        result = identify(NOMINAL, spoilt(table, rows, 0.02, rng))
+        assert set(rows + 1) <= set(result.outliers)
+        with_bad.append(error(result, true))
+        clean.append(error(identify(NOMINAL, table.select(np.setdiff1d(np.arange(count), rows))), true))
+    assert np.mean(with_bad) <= 1.5 * np.mean(clean)
+
+
+def test_three_of_twenty_rows_that_hide_each_other_are_found():
+    masked(20, 3, range(3))
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("count", "bad"), [(20, 3), (30, 5), (75, 10)])
+def test_rows_that_hide_each_other_are_found_in_many_tables(count: int, bad: int):
+    masked(count, bad, range(24))
+
+
+def called_outliers(seed: int) -> int:
+    """How many rows of a clean table of 75 are said to be wrong."""
+    return len(identify(NOMINAL, noisy_table(75, np.random.default_rng(seed))[0]).outliers)
+
+
+def test_good_rows_are_left_in_peace():
+    called = sum(
+        len(identify(NOMINAL, noisy_table(75, np.random.default_rng(s))[0]).outliers) for s in range(4)
+    )
+    assert called <= 1
+
+
+@pytest.mark.slow
+def test_good_rows_of_150_tables_are_left_in_peace():
+    called = [
+        len(identify(NOMINAL, noisy_table(75, np.random.default_rng(s))[0]).outliers) for s in range(150)
+    ]
+    assert sum(called) <= 4
+
+
+def test_a_row_a_metre_off_is_named_whether_it_is_used_or_not():
+    rng = np.random.default_rng(1)
+    table, true = noisy_table(75, rng)
+    bad = spoilt(table, np.array([11]), 1.0, rng)
+    for noise in (IdentificationConfig(), IdentificationConfig(noise=SOURCE_NOISE)):
+        assert 12 in identify(NOMINAL, bad, noise).outliers
+        kept = identify(NOMINAL, bad, replace(noise, leave_out_outliers=False))
+        assert 12 in kept.outliers
+        assert kept.kept.all()
+    assert error(identify(NOMINAL, bad), true) < 2.0 * error(identify(NOMINAL, table), true)
+
+
+def test_gross_errors_in_a_validation_table_are_named():
+    rng = np.random.default_rng(2)
+    table, true = noisy_table(75, rng)
+    result = identify(NOMINAL, table)
+    q = DRAWN.configurations(60, rng)
+    X_WE = true.forward(q)
+    fresh = Measurements(q, X_WE[:, :3, 3], X_WE[:, :3, :3]).noisy(SOURCE_NOISE, rng)
+    assert plausible_rows(result, fresh).all()
+    rows = np.array([3, 30, 31, 32])
+    assert np.flatnonzero(~plausible_rows(result, spoilt(fresh, rows, 0.02, rng))).tolist() == rows.tolist()
+
+
+def test_repeated_rows_are_used_and_tell_how_well_the_robot_repeats():
+    """Ten configurations four times each: 90 differences from their means tell a sigma to a tenth."""
+    rng = np.random.default_rng(3)
+    true = DRAWN.displaced(rng)
+    q = np.vstack([np.repeat(DRAWN.configurations(10, rng), 4, axis=0), DRAWN.configurations(30, rng)])
+    X_WE = true.forward(q)
+    still = replace(SOURCE_NOISE, joint_sigma=0.0)
+    table = Measurements(q, X_WE[:, :3, 3], X_WE[:, :3, :3]).noisy(still, rng)
+    found = repeatability(identify(NOMINAL, table))
+    assert found is not None
+    assert (found.configurations, found.rows) == (10, 40)
+    assert found.position_mm == pytest.approx(1e3 * SOURCE_NOISE.position_sigma, rel=0.25)
+    assert found.rotation_deg == pytest.approx(np.rad2deg(SOURCE_NOISE.rotation_sigma), rel=0.25)
+    assert repeatability(identify(NOMINAL, noisy_table(40, rng)[0])) is None
