@@ -74,7 +74,8 @@ def test_its_tables_serve_as_measurements_and_give_the_same_robot(calibrated: Pa
     assert max(numbers["validation"]["after"]["max_mm"]) < 5e-3
     one, two = load_robot(str(calibrated / "robot.yaml")), load_robot(str(again))
     for a, b in zip(one.joints, two.joints, strict=True):
-        np.testing.assert_allclose(a.placement.translation, b.placement.translation, atol=1e-12)
+        # The search stops at a thousandth of the noise, here of what still oscillates.
+        np.testing.assert_allclose(a.placement.translation, b.placement.translation, atol=1e-9)
 
 
 def test_a_run_with_the_calibrated_robot_is_on_its_path_without_a_camera(calibrated: Path, tmp_path: Path):

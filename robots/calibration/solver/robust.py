@@ -19,6 +19,7 @@ _SEEN = 0.3  # directions that the data show better than the prior does, in unit
 _TRIMMED = 0.25  # share of the rows that least trimmed squares leave out
 _STARTS, _FINALISTS, _CONCENTRATIONS = 300, 20, 12
 _RISK = 0.005  # that a clean table loses a row
+_GROSS = 2e-5  # m or rad: what is less is no gross error, however quiet the other rows are
 
 
 def least_distances(problem: Problem) -> tuple[np.ndarray, np.ndarray]:
@@ -49,11 +50,11 @@ class CleanRows:
 
     def __init__(self, at: Linearised, u: np.ndarray, noise: NoiseModel) -> None:
         W = noise.whitening(at.J)
-        A = W @ at.A
+        A, self._e = W @ at.A, at.residuals
         R = np.linalg.qr(A.reshape(-1, A.shape[2]), mode="r")
         _, s, Vt = np.linalg.svd(R, full_matrices=False)
         V = Vt[s > _SEEN].T
-        self._G = A @ V  # (n, k, r)
+        self._G, self._raw = A @ V, at.A @ V  # (n, k, r)
         self._y = np.einsum("nij,nj->ni", W, at.residuals)
         self._prior = -(V.T @ u)
         self._N = np.swapaxes(self._G, 1, 2) @ self._G
@@ -125,4 +126,6 @@ class CleanRows:
         inside = np.maximum(total - squared, 0.0) / max(freedom - k, 1.0)
         spread = np.where(clean, inside, total / max(freedom, 1.0))
         ratio = squared / k / np.maximum(spread, 1e-300)
-        return fisher.sf(ratio, k, np.where(clean, max(freedom - k, 1.0), max(freedom, 1.0))), is_controlled
+        chance = fisher.sf(ratio, k, np.where(clean, max(freedom - k, 1.0), max(freedom, 1.0)))
+        is_small = np.abs(self._e - self._raw @ d).max(axis=1) < _GROSS
+        return np.where(is_small, 1.0, chance), is_controlled

@@ -82,6 +82,18 @@ def test_good_rows_of_150_tables_are_left_in_peace():
     assert sum(called) <= 4
 
 
+def test_what_oscillates_by_a_micrometre_is_no_gross_error():
+    """Residuals of rare jumps of ten micrometres among nanometres: nobody wants a name for these rows."""
+    rng = np.random.default_rng(4)
+    table, _ = noisy_table(60, rng)
+    X_WE = DRAWN.displaced(rng).forward(table.q)
+    quiet = replace(
+        table, position=X_WE[:, :3, 3] + 1e-8 * rng.normal(size=(60, 3)), rotation=X_WE[:, :3, :3]
+    )
+    assert identify(NOMINAL, spoilt(quiet, np.array([5, 6]), 1e-5, rng)).outliers == ()
+    assert identify(NOMINAL, spoilt(quiet, np.array([5, 6]), 1e-3, rng)).outliers == (6, 7)
+
+
 def test_a_row_a_metre_off_is_named_whether_it_is_used_or_not():
     rng = np.random.default_rng(1)
     table, true = noisy_table(75, rng)
