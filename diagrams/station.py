@@ -266,9 +266,7 @@ class SimulatedStation(Diagram):
 def _camera(robot: RobotModel, config: StationConfig) -> PoseCamera | MarkerCamera:
     """Whichever the scenario asks for. Raises ValueError if it refuses its configuration."""
     camera = replace(config.camera, dropouts=[*config.camera.dropouts, *camera_losses(config.events)])
-    if camera.kind == "pose":
-        return PoseCamera(camera)
-    return MarkerCamera(camera, config.markers, robot, camera.kind)
+    return camera.camera(robot)
 
 
 def _changing_delay(config: StationConfig) -> ChangingDelay | None:

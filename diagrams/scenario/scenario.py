@@ -13,12 +13,12 @@ from robots.configuration.typed import typed
 from robots.description.geometric_errors import GeometricErrors
 from robots.description.model import NUM_JOINTS, Placement
 from robots.dynamics.plant import ELASTICITIES
+from systems.cell.cameras import CameraConfig
 from systems.cell.drive import DriveConfig
 from systems.cell.encoders import EncoderConfig
 from systems.cell.events.station_events import StationEvent
-from systems.cell.marker_camera import MarkerCameraConfig
 from systems.cell.network_faults import FaultConfig
-from systems.cell.pose_camera import CameraConfig
+from systems.cell.pose_camera import PoseCameraConfig
 from systems.controller_model import ControllerModelConfig
 from systems.feedforward import FEEDFORWARDS, FeedforwardConfig
 from systems.guard.guard import GuardConfig
@@ -87,8 +87,7 @@ class StationConfig:
     encoder: EncoderConfig = field(default_factory=EncoderConfig)
     errors: GeometricErrors = field(default_factory=GeometricErrors)
     drive: DriveConfig = field(default_factory=DriveConfig)
-    camera: CameraConfig = field(default_factory=CameraConfig)
-    markers: MarkerCameraConfig = field(default_factory=MarkerCameraConfig)  # of a camera that is not a pose
+    camera: CameraConfig = field(default_factory=PoseCameraConfig)
     # From command to drives: egm as a controller under EGM plans
     interface: str = choice("direct", ("direct", "egm"))
     egm: EgmConfig = field(default_factory=EgmConfig)

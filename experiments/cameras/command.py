@@ -132,7 +132,7 @@ def study_cameras_command(
     human = human_console(json_file)
     with json_output(json_file) as output, refusing(ValueError, OSError), ExitStack() as stack:
         at_least("--jobs", 1, jobs)
-        prepared = prepare(scenario, settings or [])
+        prepared = prepare(scenario, [*(settings or []), "station.camera=images"])
         page = stack.enter_context(staged_file(out, *PAGE))
         stack.enter_context(output.staged())
         setup = study_setup(prepared)

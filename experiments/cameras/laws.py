@@ -8,7 +8,7 @@ from experiments.cli.prepare import prepare
 from experiments.cli.workers import Progress, in_processes
 from experiments.comparison.compare import RunJob, compared_laws, run_job
 from experiments.metrics.run_metrics import error_metrics
-from systems.cell.pose_camera import CAMERAS
+from systems.cell.cameras import CAMERAS
 from systems.servo import LAWS
 from systems.servo.contract import law_traits
 

@@ -17,7 +17,7 @@ from experiments.cameras.accuracy import (
 from experiments.cameras.laws import LawResult
 from experiments.cameras.sweeps import SWEEPS, SweepPoint, SweepSetup
 from experiments.cli.prepare import Prepared
-from systems.cell.marker_camera import MarkerCamera
+from systems.cell.marker_camera import MarkerCamera, MarkerCameraConfig
 from systems.reference.paths import make_path
 from systems.vision.camera_rig import load_cell
 from systems.vision.marker_body import load_body
@@ -48,12 +48,14 @@ def study_setup(prepared: Prepared) -> SweepSetup:
         ValueError: if a file is missing or wrong, or the path is out of reach.
     """
     scenario, robot = prepared.scenario, prepared.nominal_robot
-    markers, path = scenario.station.markers, make_path(scenario.reference)
+    markers, path = prepared.scenario.station.camera, make_path(scenario.reference)
+    if not isinstance(markers, MarkerCameraConfig):
+        raise ValueError("a study of cameras needs a camera that sees markers: station.camera=images")
     times = np.linspace(path.path_start, path.dwell_start, 2_000)
     speed = np.linalg.norm(path.sample(times)[1][:, 3:], axis=1).max()
     cell, body = load_cell(markers.cell), load_body(markers.body)
     # Values of a sweep may fail, those that were given may not.
-    MarkerCamera(scenario.station.camera, markers, robot, "images")
+    MarkerCamera(markers, robot)
     return SweepSetup(
         cell=cell,
         body=body,

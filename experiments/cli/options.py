@@ -5,7 +5,7 @@ from typing import Annotated, Any
 
 import typer
 
-from systems.cell.pose_camera import CAMERAS
+from systems.cell.cameras import CAMERAS
 from systems.feedforward import FEEDFORWARDS
 
 ScenarioOption = Annotated[

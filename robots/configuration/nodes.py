@@ -1,7 +1,7 @@
 """YAML as nodes that know where they stand, so that a refusal can name file and line."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -19,6 +19,7 @@ class Node:
     value: Any  # dict[str, Node], list[Node] or a plain value
     place: str  # such as "scenario mine.yaml, line 3"
     tag: str = ""  # without the "!", of a member of a union
+    aside: dict[str, "Node"] = field(default_factory=dict)  # fields that other members of the union have
 
     @property
     def plain(self) -> Any:

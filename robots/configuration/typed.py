@@ -86,11 +86,15 @@ def _merged_members(
     if old is None or new is None:
         return change
     known = {entry.name for entry in fields(member)}
-    # What came with another member and does not fit goes; what fits no member at all is refused later.
+    # What came with another member is put aside for when that one is chosen; what is wrong is refused later.
     lost = {entry.name for entry in fields(before)} - known
-    kept = Node({key: node for key, node in old.items() if key not in lost}, base.place)
-    both = merged(kept, Node(new, change.place), member, path, merges_lists)
-    return Node(both.value, change.place, member.__name__)
+    aside = base.aside | {key: node for key, node in old.items() if key in lost}
+    kept = {key: node for key, node in aside.items() if key in known}
+    kept |= {key: node for key, node in old.items() if key not in lost}
+    new = {key: node for key, node in change.aside.items() if key in known} | new
+    aside = {key: node for key, node in (aside | change.aside).items() if key not in known}
+    both = merged(Node(kept, base.place), Node(new, change.place), member, path, merges_lists)
+    return Node(both.value, change.place, member.__name__, aside)
 
 
 def _checked(node: Node, schema: Any, declared: Declaration, path: str) -> Any:
@@ -101,6 +105,7 @@ def _checked(node: Node, schema: Any, declared: Declaration, path: str) -> Any:
         inside = entries(node, members)
         if inside is None:
             raise node.refuse(f"{path} must be a group of {_names(member)}, got {node.plain!r}")
+        inside = _with_aside(node.aside, members, member, path) | inside
         tree = _checked_fields(Node(inside, node.place), member, path)
         return tree if member is members[0] else {"_tag": f"!{member.__name__}"} | tree
     if members or _optional(schema) is not schema:
@@ -114,6 +119,18 @@ def _checked(node: Node, schema: Any, declared: Declaration, path: str) -> Any:
     if schema is np.ndarray or get_origin(schema) is list:
         return _checked_list(node, schema, declared, path)
     return _checked_scalar(node, schema, declared, path)
+
+
+def _with_aside(
+    aside: dict[str, Node], members: tuple[type, ...], member: type, path: str
+) -> dict[str, Node]:
+    """What was put aside and a member knows. Raises ConfigurationError for what no member knows."""
+    known = {each: [entry.name for entry in fields(each)] for each in members}
+    for key, node in aside.items():
+        if not any(key in names for names in known.values()):
+            names = dict.fromkeys(name for each in members for name in known[each])
+            raise node.refuse(f"unknown key '{path}.{key}'; known here: {', '.join(names)}")
+    return {key: node for key, node in aside.items() if key in known[member]}
 
 
 def _checked_fields(node: Node, schema: Any, path: str) -> dict[str, Any]:

@@ -1,7 +1,7 @@
 """Members of a tagged union of dataclasses: `camera: !MarkerFeatures {...}` chooses one by its name."""
 
 import re
-from dataclasses import is_dataclass
+from dataclasses import fields, is_dataclass
 from types import NoneType, UnionType
 from typing import Any, Union, get_args, get_origin
 
@@ -30,13 +30,13 @@ def selected(members: tuple[type, ...], node: Node, path: str) -> type | None:
     Raises:
         ConfigurationError: if there is no such member.
     """
-    name, where = node.tag, node
-    if not name and isinstance(node.value, str):
+    name, where = node.tag or None, node
+    if isinstance(node.value, str):
         name = node.value
-    if not name and isinstance(node.value, dict) and _is_selector(node.value.get(_SELECTOR), members):
+    elif name is None and isinstance(node.value, dict) and _is_selector(node.value.get(_SELECTOR), members):
         where = node.value[_SELECTOR]
         name = where.value
-    if not name:
+    if name is None:
         return None
     for member in members:
         if name in (short_name(member), member.__name__, member.__name__.removesuffix("Config")):
@@ -58,5 +58,5 @@ def entries(node: Node, members: tuple[type, ...]) -> dict[str, Node] | None:
 
 def _is_selector(node: Node | None, members: tuple[type, ...]) -> bool:
     """Whether a ``kind`` chooses a member; a member may have a field of that name instead."""
-    has_field = any(_SELECTOR in getattr(member, "__dataclass_fields__", {}) for member in members)
+    has_field = any(entry.name == _SELECTOR for member in members for entry in fields(member))
     return node is not None and isinstance(node.value, str) and not has_field

@@ -5,6 +5,7 @@ in simulated pictures of windows about where the tracker expects the body. From 
 """
 
 from dataclasses import dataclass, field
+from typing import ClassVar
 
 import numpy as np
 from pydrake.common import RandomDistribution
@@ -18,7 +19,7 @@ from robots.pose import pose_error
 from systems.cell.imaging.features import FeatureConfig, FeatureSource
 from systems.cell.imaging.image_blobs import ImageBlobs
 from systems.cell.imaging.images import ImageConfig
-from systems.cell.pose_camera import BLOCK, CameraConfig, PoseCamera
+from systems.cell.pose_camera import BLOCK, ExposureConfig
 from systems.samples import PoseSample
 from systems.vision.arm_capsules import ArmCapsules
 from systems.vision.camera_rig import load_cell
@@ -26,15 +27,15 @@ from systems.vision.centroids import CentroidConfig
 from systems.vision.marker_body import load_body
 from systems.vision.tracking.tracker import Tracker, TrackerConfig, TrackerState
 
-LEVELS = ("features", "images")
-
 _WIDTH = 15  # time, valid, the rows of the 3 x 4 pose matrix, residual
 _EPSILON = 1e-9  # s, a sample that is due at a tick arrives at it in spite of rounding
 
 
 @dataclass
-class MarkerCameraConfig:
+class MarkerCameraConfig(ExposureConfig):
     """Which cameras look at which body, and how well; read from a scenario file."""
+
+    kind: ClassVar[str]
 
     cell: str = "probst"  # a shipped cell or the path of a cell file
     # The cell as the tracker knows it, such as `truetip cameras calibrate --write` makes; none: as it is.
@@ -44,6 +45,24 @@ class MarkerCameraConfig:
     images: ImageConfig = field(default_factory=ImageConfig)
     centroids: CentroidConfig = field(default_factory=CentroidConfig)
     tracker: TrackerConfig = field(default_factory=TrackerConfig)
+
+    def camera(self, robot: RobotModel) -> "MarkerCamera":
+        """The camera of a station with this robot. Raises ValueError as `MarkerCamera`."""
+        return MarkerCamera(self, robot)
+
+
+@dataclass
+class MarkerFeaturesConfig(MarkerCameraConfig):
+    """Blobs are projected centres of markers with noise."""
+
+    kind: ClassVar[str] = "features"
+
+
+@dataclass
+class MarkerImagesConfig(MarkerCameraConfig):
+    """Blobs are found in simulated pictures."""
+
+    kind: ClassVar[str] = "images"
 
 
 class MarkerCamera(LeafSystem):
@@ -63,48 +82,37 @@ class MarkerCamera(LeafSystem):
     last one as invalid.
     """
 
-    def __init__(
-        self,
-        config: CameraConfig,
-        markers: MarkerCameraConfig | None = None,
-        robot: RobotModel | None = None,
-        level: str = "features",
-    ) -> None:
+    def __init__(self, config: MarkerCameraConfig, robot: RobotModel | None = None) -> None:
         """Reads cell and body.
 
         Args:
-            config: when exposures are made, arrive, and are lost altogether; its sigmas are not used.
-            markers: what the pose is measured with.
+            config: when exposures are made, what the pose is measured with, and where blobs come from.
             robot: whose base the cell stands about, and whose arm hides markers; None for a base at the
                 origin of the world.
-            level: where blobs come from, ``"features"`` or ``"images"``.
 
         Raises:
             ValueError: if something is out of its range, or a file is missing or wrong.
         """
         super().__init__()
-        if level not in LEVELS:
-            raise ValueError(f"marker camera: level must be one of {', '.join(LEVELS)}, got '{level}'")
-        PoseCamera(config)  # refuses what no camera can be
-        markers = markers or MarkerCameraConfig()
-        cell, body = load_cell(markers.cell), load_body(markers.body)
+        config.check()
+        cell, body = load_cell(config.cell), load_body(config.body)
         X_WB = robot.base.pose() if robot else None
         cameras = cell.camera_model(X_WB)
-        known = load_cell(markers.calibration) if markers.calibration else cell
+        known = load_cell(config.calibration) if config.calibration else cell
         names, known_names = ([camera.name for camera in each.cameras] for each in (cell, known))
         if known_names != names:
             raise ValueError(
-                f"marker camera: the calibration {markers.calibration} must have the cameras of the cell, "
+                f"marker camera: the calibration {config.calibration} must have the cameras of the cell, "
                 f"{', '.join(names)}, got {', '.join(known_names)}"
             )
-        self._config, self._level = config, level
+        self._config = config
         # Both are made, so that a wrong number is refused on either level.
-        self._features = FeatureSource(cameras, cell.windows, body, markers.features)
-        self._images = ImageBlobs(cameras, cell.windows, body, markers.images, markers.centroids)
-        self._tracker = Tracker(known.camera_model(X_WB), body, markers.tracker)
+        self._features = FeatureSource(cameras, cell.windows, body, config.features)
+        self._images = ImageBlobs(cameras, cell.windows, body, config.images, config.centroids)
+        self._tracker = Tracker(known.camera_model(X_WB), body, config.tracker)
         self._arm = ArmCapsules(robot) if robot else None
         self._lost_below = norm.ppf(config.dropout_probability)
-        source = self._features if level == "features" else self._images
+        source = self._features if config.kind == "features" else self._images
         self._per_exposure = source.noise_size + 1  # the last one for a lost exposure
         self._X_WE = self.DeclareAbstractInputPort("X_WE", Value(RigidTransform()))
         self._noise = self.DeclareVectorInputPort(
@@ -156,7 +164,7 @@ class MarkerCamera(LeafSystem):
         arm = None
         if self._arm is not None and self._motor_state.HasValue(context):
             arm = self._arm.at(self._motor_state.Eval(context)[:NUM_JOINTS])
-        if self._level == "features":
+        if self._config.kind == "features":
             return self._features.blobs(X_WE, noise, arm)
         time, V_WE = context.get_time(), np.zeros(6)
         before = context.get_discrete_state(self._before).value()

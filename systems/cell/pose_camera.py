@@ -1,6 +1,7 @@
 """A pose camera: it sees the tool at regular instants and reports it late, with noise, or not at all."""
 
 from dataclasses import dataclass, field
+from typing import ClassVar
 
 import numpy as np
 from pydrake.common import RandomDistribution
@@ -9,10 +10,9 @@ from pydrake.math import RigidTransform
 from pydrake.systems.framework import Context, DiscreteValues, LeafSystem, ValueProducer
 from scipy.stats import norm
 
-from robots.configuration.quantity import choice, quantity
+from robots.configuration.quantity import quantity
+from robots.description.model import RobotModel
 from systems.samples import PoseSample
-
-CAMERAS = ("pose", "features", "images")
 
 _WIDTH = 14  # time, valid, then the rows of the 3 x 4 pose matrix
 BLOCK = 64  # exposures whose noise is drawn at once: drawing is what Drake is slow at
@@ -22,27 +22,51 @@ _EPSILON = 1e-9  # s, a sample that is due at a tick arrives at it in spite of r
 
 
 @dataclass
-class CameraConfig:
-    """What a pose camera needs to know; read from a scenario file."""
+class ExposureConfig:
+    """When a camera exposes, when its samples arrive and what its clock shows; read from a scenario file."""
 
-    # Where poses come from: the true one with noise, or markers by their features or images.
-    kind: str = choice("pose", CAMERAS)
     period: float = quantity(4e-3, 5e-4, 1.0, "s")  # between exposures
     delay: float = quantity(4e-3, 0.0, 1.0, "s")  # transport delay: from exposure to arrival
-    position_sigma: float = quantity(0.0, 0.0, 0.02, "m")  # standard deviation of one sample along each axis
-    # Standard deviation of one sample about each axis
-    orientation_sigma_deg: float = quantity(0.0, 0.0, 10.0, "deg")
     dropout_probability: float = quantity(0.0, 0.0, 1.0)  # of a single sample to be lost
     dropouts: list[list[float]] = field(default_factory=list)  # s, windows [start, end) without a sample
-    outlier_probability: float = 0.0  # of a single sample to be a reflection, valid but wrong
-    outlier_mm: float = 20.0  # standard deviation of what it is off along each axis
-    outlier_deg: float = 2.0  # and about each axis
-    clock_offset: float = 0.0  # s, by which its stamps are ahead of the robot's clock
-    clock_drift_ppm: float = 0.0  # by which its clock runs faster than the robot's
+    # By which its stamps are ahead of the robot's clock
+    clock_offset: float = quantity(0.0, -10.0, 10.0, "s")
+    # By which its clock runs faster than the robot's
+    clock_drift_ppm: float = quantity(0.0, -1e5, 1e5, "ppm")
 
     def stamp(self, time: float) -> float:
         """What the camera's clock shows at a time of the robot's clock, both in s."""
         return time * (1.0 + 1e-6 * self.clock_drift_ppm) + self.clock_offset
+
+    def check(self) -> None:
+        """Raises ValueError if no camera can be so."""
+        if not self.period > 0.0:
+            raise ValueError(f"camera: period must be positive, got {self.period} s")
+        if not self.delay >= 0.0:
+            raise ValueError(f"camera: delay must not be negative, got {self.delay} s")
+        if not 0.0 <= self.dropout_probability < 1.0:
+            raise ValueError(f"camera: dropout_probability must be in [0, 1), got {self.dropout_probability}")
+        for window in self.dropouts:
+            if len(window) != 2 or not window[0] < window[1]:
+                raise ValueError(f"camera: a drop-out must be [start, end] with start < end, got {window}")
+
+
+@dataclass
+class PoseCameraConfig(ExposureConfig):
+    """A camera that sees the true pose with noise."""
+
+    kind: ClassVar[str] = "pose"
+    position_sigma: float = quantity(0.0, 0.0, 0.02, "m")  # standard deviation of one sample along each axis
+    # Standard deviation of one sample about each axis
+    orientation_sigma_deg: float = quantity(0.0, 0.0, 10.0, "deg")
+    outlier_probability: float = quantity(0.0, 0.0, 1.0)  # of a sample to be a reflection, valid but wrong
+    # Standard deviation of what it is off along each axis
+    outlier_mm: float = quantity(20.0, 0.0, 1000.0, "mm")
+    outlier_deg: float = quantity(2.0, 0.0, 180.0, "deg")  # and about each axis
+
+    def camera(self, robot: RobotModel) -> "PoseCamera":
+        """The camera of a station with this robot. Raises ValueError as `PoseCamera`."""
+        return PoseCamera(self)
 
 
 class PoseCamera(LeafSystem):
@@ -57,7 +81,7 @@ class PoseCamera(LeafSystem):
     Orientation noise is a small rotation about a random axis of the world.
     """
 
-    def __init__(self, config: CameraConfig) -> None:
+    def __init__(self, config: PoseCameraConfig) -> None:
         """Checks the configuration.
 
         Raises:
@@ -149,20 +173,12 @@ def _small_rotations(vectors: np.ndarray) -> np.ndarray:
     return np.moveaxis(np.array(rows), -1, 0).copy()
 
 
-def _check(config: CameraConfig) -> None:
-    if not config.period > 0.0:
-        raise ValueError(f"camera: period must be positive, got {config.period} s")
-    if not config.delay >= 0.0:
-        raise ValueError(f"camera: delay must not be negative, got {config.delay} s")
+def _check(config: PoseCameraConfig) -> None:
+    config.check()
     if not (config.position_sigma >= 0.0 and config.orientation_sigma_deg >= 0.0):
         raise ValueError(
             "camera: position_sigma and orientation_sigma_deg must not be negative, got "
             f"{config.position_sigma} m and {config.orientation_sigma_deg} deg"
         )
-    if not 0.0 <= config.dropout_probability < 1.0:
-        raise ValueError(f"camera: dropout_probability must be in [0, 1), got {config.dropout_probability}")
     if not 0.0 <= config.outlier_probability < 1.0:
         raise ValueError(f"camera: outlier_probability must be in [0, 1), got {config.outlier_probability}")
-    for window in config.dropouts:
-        if len(window) != 2 or not window[0] < window[1]:
-            raise ValueError(f"camera: a drop-out must be [start, end] with start < end, got {window}")

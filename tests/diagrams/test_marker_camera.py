@@ -59,7 +59,7 @@ def test_the_arm_hides_markers_of_the_true_station():
 @pytest.mark.parametrize(
     ("setting", "message"),
     [
-        ("station.camera.kind=stereo", "station.camera.kind must be one of pose, features, images"),
+        ("station.camera.kind=stereo", "station.camera must be one of pose, features, images"),
         ("station.markers.cell=nowhere", "cell 'nowhere': no file"),
         ("station.markers.features.missing=2", r"features: missing must be in \[0, 1\), got 2"),
         ("station.markers.images.exposure=0", "images: exposure must be positive, got 0"),

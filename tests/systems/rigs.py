@@ -13,7 +13,7 @@ from pydrake.systems.primitives import RandomSource
 
 from robots.description.model import RobotModel
 from robots.kinematics.forward import Kinematics
-from systems.cell.pose_camera import BLOCK, CameraConfig
+from systems.cell.pose_camera import BLOCK, ExposureConfig
 from systems.controller_model import ControllerModel
 from systems.guard.guard import KINDS, CommandGuard, GuardConfig
 from systems.samples import JointSample, PoseSample
@@ -56,7 +56,7 @@ class ValueSignal(LeafSystem):
 
 def camera_samples(
     camera: LeafSystem,
-    config: CameraConfig,
+    config: ExposureConfig,
     times: np.ndarray,
     tip: Callable[[float], RigidTransform],
     q: np.ndarray | None = None,
@@ -84,7 +84,7 @@ def camera_samples(
     return found
 
 
-def arrivals(config: CameraConfig, count: int) -> np.ndarray:
+def arrivals(config: ExposureConfig, count: int) -> np.ndarray:
     """Times in s at which the first samples of a camera have arrived, one from each exposure, (count,)."""
     return config.delay + config.period * (np.arange(count) + 0.5)
 

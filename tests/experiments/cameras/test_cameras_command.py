@@ -101,7 +101,7 @@ def test_run_and_compare_take_another_camera(tmp_path: Path):
     measured = [run["runs"]["numerical_ik"]["measured"]["rms_norm_mm"] for run in (by_features, by_pose)]
     assert measured[0] != measured[1]
     refused = refusal(truetip("compare", "--camera=stereo", f"--out={tmp_path / 'nothing'}"))
-    assert "station.camera.kind must be one of pose, features, images, got 'stereo'" in refused
+    assert "station.camera must be one of pose, features, images, got 'stereo'" in refused
 
 
 @pytest.mark.slow

@@ -5,7 +5,7 @@ import pytest
 from pydrake.math import RigidTransform
 
 from robots.pose import pose_error, rotation_from_zyx
-from systems.cell.pose_camera import CameraConfig, PoseCamera
+from systems.cell.pose_camera import PoseCamera, PoseCameraConfig
 from systems.samples import PoseSample
 from tests.systems.rigs import arrivals, camera_samples, pose
 
@@ -15,13 +15,13 @@ STILL[:3, 3] = [0.3, -0.4, 0.5]
 
 
 def samples(
-    config: CameraConfig, times: np.ndarray, tip=lambda time: pose(STILL), seed: int = 0
+    config: PoseCameraConfig, times: np.ndarray, tip=lambda time: pose(STILL), seed: int = 0
 ) -> list[PoseSample]:
     """What the camera reports at the given times."""
     return camera_samples(PoseCamera(config), config, times, tip, seed=seed)
 
 
-def each_exposure(config: CameraConfig, count: int, seed: int = 0) -> list[PoseSample]:
+def each_exposure(config: PoseCameraConfig, count: int, seed: int = 0) -> list[PoseSample]:
     """The first samples, one from each exposure, read when they have arrived."""
     return samples(config, arrivals(config, count), seed=seed)
 
@@ -33,7 +33,7 @@ def step_to(time_of_step: float, height: float):
 @pytest.mark.parametrize("delay", [0.0, 0.004, 0.006, 0.0075, 0.04])
 def test_a_step_is_seen_a_delay_after_its_exposure_and_bears_the_stamp_of_it(delay: float):
     """The step lies between the exposures at 16 and 20 ms; the latter shows it."""
-    config = CameraConfig(delay=delay)
+    config = PoseCameraConfig(delay=delay)
     times = np.arange(1, 300) * 2.5e-4 + 1e-6  # just after the instants at which samples arrive
     found = samples(config, times, step_to(0.018, 0.1))
     heights = np.array([sample.X_WE.translation()[2] for sample in found])
@@ -45,18 +45,18 @@ def test_a_step_is_seen_a_delay_after_its_exposure_and_bears_the_stamp_of_it(del
 
 def test_nothing_is_valid_before_the_first_sample_has_arrived():
     times = np.arange(1, 40) * 1e-3 + 1e-6
-    valid = [sample.valid for sample in samples(CameraConfig(delay=0.02), times)]
+    valid = [sample.valid for sample in samples(PoseCameraConfig(delay=0.02), times)]
     np.testing.assert_array_equal(valid, times >= 0.02)
 
 
 def test_without_noise_the_sample_is_the_tip():
-    for sample in each_exposure(CameraConfig(), 5):
+    for sample in each_exposure(PoseCameraConfig(), 5):
         np.testing.assert_array_equal(sample.X_WE.GetAsMatrix4(), STILL)
 
 
 def test_noise_has_the_declared_spread_about_and_along_each_axis_and_is_white():
     """2000 samples: the spread is known to 1.6 %, a mean to 2.2 % of it, a correlation to 0.022; 4 sigma."""
-    config = CameraConfig(position_sigma=50e-6, orientation_sigma_deg=0.01)
+    config = PoseCameraConfig(position_sigma=50e-6, orientation_sigma_deg=0.01)
     n = 2000
     X = np.array([sample.X_WE.GetAsMatrix4() for sample in each_exposure(config, n)])
     noise = pose_error(X, STILL[None]) / np.repeat([np.deg2rad(0.01), 50e-6], 3)
@@ -74,7 +74,7 @@ def test_noise_has_the_declared_spread_about_and_along_each_axis_and_is_white():
 
 
 def test_the_seed_decides_the_noise():
-    config = CameraConfig(position_sigma=50e-6, orientation_sigma_deg=0.01, dropout_probability=0.2)
+    config = PoseCameraConfig(position_sigma=50e-6, orientation_sigma_deg=0.01, dropout_probability=0.2)
     once, again, other = (
         np.array([[*s.X_WE.GetAsMatrix34().ravel(), s.valid] for s in each_exposure(config, 50, seed)])
         for seed in (7, 7, 8)
@@ -86,12 +86,14 @@ def test_the_seed_decides_the_noise():
 @pytest.mark.parametrize("probability", [0.02, 0.3])
 def test_samples_are_lost_with_the_declared_probability(probability: float):
     n = 2000
-    lost = sum(not sample.valid for sample in each_exposure(CameraConfig(dropout_probability=probability), n))
+    lost = sum(
+        not sample.valid for sample in each_exposure(PoseCameraConfig(dropout_probability=probability), n)
+    )
     assert abs(lost - n * probability) < 4.0 * np.sqrt(n * probability * (1.0 - probability))
 
 
 def test_exposures_in_a_window_are_lost_and_arrive_as_invalid():
-    config = CameraConfig(dropouts=[[0.02, 0.04], [0.1, 0.108]])
+    config = PoseCameraConfig(dropouts=[[0.02, 0.04], [0.1, 0.108]])
     found = each_exposure(config, 40)
     lost = [round(sample.time / config.period) for sample in found if not sample.valid]
     assert lost == [5, 6, 7, 8, 9, 25, 26]
@@ -99,8 +101,8 @@ def test_exposures_in_a_window_are_lost_and_arrive_as_invalid():
 
 
 def test_a_clock_of_its_own_changes_stamps_and_nothing_else():
-    config = CameraConfig(clock_offset=-3e-3, clock_drift_ppm=500.0)
-    true, found = each_exposure(CameraConfig(), 20), each_exposure(config, 20)
+    config = PoseCameraConfig(clock_offset=-3e-3, clock_drift_ppm=500.0)
+    true, found = each_exposure(PoseCameraConfig(), 20), each_exposure(config, 20)
     stamps = np.array([[a.time, b.time] for a, b in zip(true, found, strict=True)])
     np.testing.assert_allclose(stamps[:, 1], 1.0005 * stamps[:, 0] - 3e-3, atol=1e-12)
     assert [sample.valid for sample in found] == [sample.valid for sample in true]
@@ -108,7 +110,7 @@ def test_a_clock_of_its_own_changes_stamps_and_nothing_else():
 
 def test_reflections_are_valid_far_off_and_as_many_as_declared():
     """2000 samples: a share of 20 % is known to 0.9 %; three sigma."""
-    config = CameraConfig(outlier_probability=0.2, outlier_mm=20.0, outlier_deg=2.0)
+    config = PoseCameraConfig(outlier_probability=0.2, outlier_mm=20.0, outlier_deg=2.0)
     found = each_exposure(config, 2000)
     errors = pose_error(STILL, np.array([sample.X_WE.GetAsMatrix4() for sample in found]))
     is_off = np.abs(errors).max(axis=1) > 1e-12
@@ -135,4 +137,4 @@ def test_reflections_are_valid_far_off_and_as_many_as_declared():
 )
 def test_refuses_what_no_camera_can_be(change: dict, message: str):
     with pytest.raises(ValueError, match=f"camera: .*{message}"):
-        PoseCamera(CameraConfig(**change))
+        PoseCamera(PoseCameraConfig(**change))
