@@ -1,4 +1,4 @@
-"""A real robot cell with the ports of the contract: what came over the wire goes in, commands come out."""
+"""A real robot cell as a diagram with the same ports as a simulated station."""
 
 import numpy as np
 from pydrake.common.value import Value

@@ -1,4 +1,4 @@
-"""What one run leaves behind: arrays at the sampling rate, the guard's events and the marks of the path."""
+"""The log of one run: arrays at the sampling rate, guard events and the time marks of the path."""
 
 from dataclasses import dataclass, field
 from typing import Any

@@ -27,7 +27,7 @@ _SPIN = 1.5e-4  # s before an instant in which the loop does not sleep: a system
 
 @dataclass
 class CellStatistics:
-    """How a cell has run."""
+    """Timing and message counts of a cell."""
 
     cycles: int = 0
     late: int = 0  # messages of the robot that left more than a millisecond late
@@ -46,7 +46,7 @@ class CellStatistics:
 
 
 class CellLoop:
-    """Sends what the cell says when it is due, and hears commands at the beginning of every cycle."""
+    """Sends the messages of the cell when they are due, and receives commands at the start of every cycle."""
 
     def __init__(
         self,
@@ -62,7 +62,7 @@ class CellLoop:
 
         Args:
             scenario: whose station this is, with the faults.
-            robot: as it is drawn.
+            robot: the nominal one.
             target: where the robot's messages go.
             camera: to whom the exposures go.
             signal_target: where test signals go; None for none.

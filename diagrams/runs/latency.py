@@ -1,4 +1,4 @@
-"""Moves one joint of a real station back and forth and writes down when everything was said and seen."""
+"""Moves one joint of a station back and forth and records the times of all messages and frames."""
 
 import math
 from collections.abc import Callable
@@ -20,7 +20,7 @@ _RISE = 1.0  # s, in which the motion begins and ends
 
 @dataclass
 class LatencyConfig:
-    """How a station is shaken."""
+    """The test motion of a latency measurement."""
 
     joint: int = 1
     amplitude_deg: float = 4.0
@@ -29,7 +29,7 @@ class LatencyConfig:
 
 @dataclass(frozen=True)
 class LatencyRecord:
-    """What was said and seen. Times are of the steady clock of this process, unless they say otherwise."""
+    """Recorded messages and frames. Times are on this process's monotonic clock unless stated otherwise."""
 
     stamp: np.ndarray  # (n,) s, the controller's clock of every message
     commanded: np.ndarray  # (n,) rad, the joint as it was commanded in reply

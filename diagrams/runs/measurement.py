@@ -1,4 +1,4 @@
-"""Drives a station through configurations and writes down what its camera and its joints say there."""
+"""Moves a station through configurations and records camera poses and joint positions at rest."""
 
 import gc
 from collections.abc import Callable
@@ -35,14 +35,14 @@ class MeasurementProcedure:
 
 @dataclass(frozen=True)
 class MeasurementRecord:
-    """What was measured at the configurations, and where the tool truly was; row for row."""
+    """Measured and true tool poses at the configurations, row for row."""
 
     measured: Measurements
     truth: Measurements  # the true poses at the same measured joint positions
 
 
 class MeasurementRun:
-    """A station whose robot goes where it is told and stays until it is measured."""
+    """A station whose robot visits configurations and rests at each until it is measured."""
 
     def __init__(self, scenario: Scenario, procedure: MeasurementProcedure | None = None) -> None:
         """Builds the diagram. Raises ValueError if a part refuses its configuration."""

@@ -183,7 +183,7 @@ def measured_along(
 
 
 def nominal_robot(scenario: Scenario, robot: RobotModel | None) -> RobotModel:
-    """The robot as it is drawn, from which the true one differs by the station's errors.
+    """The nominal robot, from which the true one differs by the station's errors.
 
     Args:
         scenario: names it.

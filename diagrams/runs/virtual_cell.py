@@ -23,7 +23,7 @@ CLOCK_START = 1000.0  # s, what the controller's clock shows at the start: nobod
 
 
 class Exposure(NamedTuple):
-    """What the camera saw, and when it becomes known."""
+    """A camera sample and the time of its arrival."""
 
     published: float  # s
     sample: PoseSample
@@ -68,7 +68,7 @@ class VirtualCell:
 
         Args:
             scenario: whose station this is; its controller plans under EGM, whatever it says.
-            robot: as it is drawn.
+            robot: the nominal one.
             with_log: whether `record` will be asked for the truth.
 
         Raises:

@@ -1,4 +1,4 @@
-"""The candidates of a grid that a robot may stand at; each is checked when it comes into question."""
+"""The admissible candidates of a grid; each is checked only when it is considered."""
 
 from collections.abc import Callable
 
@@ -14,7 +14,7 @@ _POOL = 20  # times as many candidates as are wanted are sorted at once
 
 
 class Candidates:
-    """A grid with what is forbidden on it. Only the candidates with the largest gains are ever checked."""
+    """A grid with its constraints. Only the candidates with the largest gains are ever checked."""
 
     def __init__(self, grid: CandidateGrid, admissible: Admissible | None = None) -> None:
         """Takes a grid.

@@ -1,4 +1,4 @@
-"""Where a robot may stand for a measurement: within its limits, free of the floor and its base, in view."""
+"""Constraints on measurement configurations: joint limits, clearance of floor and base, visibility."""
 
 from dataclasses import dataclass
 
@@ -31,7 +31,7 @@ class View:
 
 @dataclass(frozen=True)
 class AdmissibleConfig:
-    """What a measurement needs besides the joint limits."""
+    """Constraints besides the joint limits."""
 
     floor: float = 0.0  # m, height of the floor in the world
     clearance: float = 0.01  # m, smallest distance of the arm from the floor and from the robot's own base
@@ -40,7 +40,7 @@ class AdmissibleConfig:
 
 
 class AdmissibleConfigurations:
-    """Tells of configurations whether a measurement may be made there.
+    """Checks whether configurations are admissible for a measurement.
 
     The arm is made of capsules along its links. Distances come from Drake's proximity queries. Links 1 and 2
     are next to the base and cannot touch it.

@@ -1,4 +1,4 @@
-"""What makes a set of measurements good: observability index B3, and D- and I-optimality.
+"""Optimality criteria of measurement sets: observability index B3, D- and I-optimality.
 
 Each criterion is written as a concave function of the information matrix M that grows in proportion with M.
 A gradient G of such a function bounds it from above everywhere: value(M') <= tr(G M'). So no set of N

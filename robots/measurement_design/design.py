@@ -1,4 +1,4 @@
-"""Where to measure: the configurations that say most about the error parameters, and how good they are."""
+"""Optimal experiment design: the configurations that determine the error parameters best, with a bound."""
 
 import math
 from collections.abc import Callable

@@ -1,4 +1,4 @@
-"""From shares to whole measurements: rounding, expansion and exchange after the manner of DetMax.
+"""Exact designs from relaxed ones: rounding, expansion and exchange as in DetMax.
 
 Probst (2024), section 4.2. The best partners of an exchange are found by their first-order gain among all
 candidates of the grid; what is left of them is compared exactly.

@@ -1,4 +1,4 @@
-"""The best design if measurements could be divided: how good any design can be, with a proof.
+"""The optimal relaxed design, which bounds how good any exact design can be.
 
 The relaxed problem gives each candidate a share of the measurements and is convex. Its solution is found on
 a small set of candidates that grows by those with the largest gains on the whole grid. Every step proves an

@@ -1,4 +1,4 @@
-"""In which order to visit configurations, so that the robot moves little in between."""
+"""The visiting order of configurations that keeps the motion between them short."""
 
 import numpy as np
 

@@ -1,4 +1,4 @@
-"""Frames measured from several device positions, one after the other: a measuring arm that walks.
+"""Chains of frames measured from several positions of a measuring device (leapfrogging).
 
 From its position j the device D_j sees two frames, K_j-1 and K_j; it is moved, sees K_j again and the next
 one. Each position gives a link, the second frame in the first, and the product of the links leads from the

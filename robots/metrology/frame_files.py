@@ -1,4 +1,4 @@
-"""Points, poses and transformations from the columns of a text file, in SI units, checked for plausibility.
+"""Points, poses and transformations from text files, in SI units, with plausibility checks.
 
 Units and conventions are never guessed: the caller states them, and numbers that cannot be meant so are
 refused with file and line.

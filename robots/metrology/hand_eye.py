@@ -1,4 +1,4 @@
-"""Where the camera stands in the robot's base, and where the body that it sees sits on the flange.
+"""Robot-world and hand-eye calibration: the camera in the robot base, the marker body on the flange.
 
 For every pose of the robot, the flange F in the base B and the detection body D in the camera C belong
 together by X_BF X_FD = X_BC X_CD: two unknown and constant poses around two measured ones (robot-world
@@ -32,7 +32,7 @@ _SETTLED = 1e-10  # rad and m
 
 @dataclass(frozen=True)
 class Alignment:
-    """Where camera and body are.
+    """The result of a robot-world or hand-eye calibration.
 
     The parameters of ``statistics`` are the errors (rotation vector in rad, translation in m) of X_FD, in F,
     then of X_BC, in B: the true pose is exp(rotation~) R, p + translation; zero for a pose that was known.
@@ -129,7 +129,7 @@ def align_hand_eye(
 
 
 def _refuse_strangers(residual: np.ndarray) -> None:
-    """Poses in the wrong order, inverse ones or another convention of angles fit nowhere."""
+    """Refuses rotations that cannot belong together: wrong order, inverse poses, other Euler angles."""
     angle = np.linalg.norm(residual[:, :3], axis=1)
     if np.median(angle) > LARGEST_MISMATCH:
         raise UndeterminedError(
@@ -215,7 +215,10 @@ def _refine(
     unknown: slice,
     sigmas: np.ndarray,
 ) -> tuple[RigidTransform, RigidTransform]:
-    """Full Gauss-Newton steps on the group: the start is near and the residuals are small."""
+    """Full Gauss-Newton steps on SE(3), which need no line search: start and residuals are small.
+
+    A general solver would need a chart of the group around the start and its derivative instead.
+    """
     for _ in range(_STEPS):
         jacobian = _jacobian(X_BF, X_FD, X_BC)[..., unknown] / sigmas[:, None]
         residual = _residual(X_BF, X_CD, X_FD, X_BC) / sigmas

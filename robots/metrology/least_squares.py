@@ -1,4 +1,4 @@
-"""What a least-squares fit is worth: degrees of freedom, covariance, confidence, outliers.
+"""Statistics of least-squares fits: degrees of freedom, covariance, confidence, outliers.
 
 A fit has n measurements of k numbers each (a point has three, a pose six) and m parameters. Residuals and
 Jacobians come whitened, that is divided by the standard deviation that is expected of them, or all alike;

@@ -1,4 +1,4 @@
-"""Text files of numbers: read strictly, refused by file and line.
+"""Reading text files of numbers; errors are reported with file and line.
 
 A line holds one measurement; its numbers are separated by ``;``, by ``,`` or by blanks, the same in the whole
 file. ``#`` begins a comment. Decimal commas are read where ``;`` or blanks separate; where commas do, "1,5"
@@ -19,7 +19,7 @@ _DECIMAL_COMMA = re.compile(r"[+-]?(\d+,\d*|,\d+)([eE][+-]?\d+)?")
 
 
 class NumberFileError(ValueError):
-    """A file cannot be read as measurements; the message says in which line."""
+    """A file cannot be read as measurements; the message names the line."""
 
 
 @dataclass(frozen=True)

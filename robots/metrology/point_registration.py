@@ -1,4 +1,4 @@
-"""A frame from three or more measured points whose places in it are known, by least squares.
+"""Registration of a frame by least squares from three or more points with known coordinates in it.
 
 K is the frame, with the nominal points p_K; D is the device that measures them. The residuals of the fit
 show what three points by Gram-Schmidt cannot: how well the points were measured.

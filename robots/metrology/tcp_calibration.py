@@ -18,7 +18,7 @@ _NEGLIGIBLE = 1e-9  # m, residuals that are rounding
 
 @dataclass(frozen=True)
 class ToolCentre:
-    """A tip and the spot that it stood on; the parameters of ``statistics`` are (p_FE, p_BP) in m."""
+    """The tool centre point and the pivot point; the parameters of ``statistics`` are (p_FE, p_BP) in m."""
 
     p_FE: np.ndarray  # m, (3,), the tip in the flange
     p_BP: np.ndarray  # m, (3,), the spot in the base
@@ -64,7 +64,7 @@ def tool_centre(X_BF: np.ndarray) -> ToolCentre:
 
 
 def refuse_alike_orientations(R: np.ndarray, body: str) -> None:
-    """Refuses orientations from which a lever arm on the body cannot be told, and names the reason.
+    """Refuses orientations that do not determine a lever arm on the body, and names the reason.
 
     The mean of the rotations shortens every direction of the body that they tilt, to a length s, and
     sqrt(1 - s^2) is how much they do so; a direction along a common axis keeps its length one.

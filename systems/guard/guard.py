@@ -1,4 +1,4 @@
-"""The last word before the robot: limits, missing commands, lost measurements and the smooth stop."""
+"""Supervision of the commands: limits, missing commands, lost measurements and the smooth stop."""
 
 import math
 from dataclasses import dataclass
@@ -38,7 +38,7 @@ _NO_DEVIATION = np.zeros(NUM_JOINTS)
 
 @dataclass
 class GuardConfig:
-    """What the guard allows; read from a scenario file."""
+    """Limits and time-outs of the guard; read from a scenario file."""
 
     # Without a usable sample: the correction is held, the path goes on
     hold_after: float = quantity(0.05, 1e-3, 10.0, "s")
@@ -56,7 +56,7 @@ class CommandGuard(LeafSystem):
     """Passes a law's command on, made safe.
 
     Ports:
-        in  ``position_command``  vector 6 in rad, NaN where the law has no answer
+        in  ``position_command``  vector 6 in rad, NaN where the law finds no solution
         in  ``velocity_command``  vector 6 in rad/s
         in  ``correction``        vector 6 in rad and m, rotation first
         in  ``measurement``       vector 3: when the last usable sample arrived (s), how many were refused,

@@ -1,4 +1,4 @@
-"""A camera's stamps on the clock of the station.
+"""Mapping of camera time stamps to the station's clock.
 
 A frame that is exposed at camera time s arrives at station time a = s + offset + drift * s + delay, where
 the delay is never below that of an idle line and now and then close to it. So the line below the points
@@ -22,7 +22,7 @@ import numpy as np
 
 @dataclass
 class ClockConfig:
-    """How stamps are mapped; read from a scenario file."""
+    """Parameters of the mapping; read from a scenario file."""
 
     smallest_delay: float = 0.0  # s, from the exposure to its arrival over an idle line
     bin_length: float = 1.0  # s of station time
@@ -32,7 +32,7 @@ class ClockConfig:
 
 @dataclass(frozen=True)
 class ClockQuality:
-    """How well the clocks are known. ``nan`` where there is too little data yet."""
+    """Uncertainty of the mapping. ``nan`` where there is too little data yet."""
 
     frames: int  # since the session began
     span: float  # s of station time behind the estimate
@@ -70,7 +70,7 @@ class _Bin:
 
 
 class CameraClock:
-    """Learns from stamps and arrivals where a stamp lies on the station's clock."""
+    """Estimates offset and drift between the clocks from time stamps and arrival times."""
 
     def __init__(self, config: ClockConfig | None = None) -> None:
         """Checks the configuration.

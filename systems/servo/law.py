@@ -63,7 +63,7 @@ class ServoLaw(LeafSystem):
         in  ``pose_sample``       PoseSample
         in  ``deviation``         vector 6 in rad, may be left open: what the guard issues less what the law
                                   commands; what the camera sees of it is not the law's to correct
-        out ``position_command``  vector 6 in rad, NaN before the first tick and where the law has no answer
+        out ``position_command``  vector 6 in rad, NaN before the first tick and where there is no solution
         out ``velocity_command``  vector 6 in rad/s, likewise
         out ``correction``        vector 6 in rad and m, rotation first: what the law has added to the path
         out ``measurement``       vector 3: when the last usable sample arrived (s), how many were refused,

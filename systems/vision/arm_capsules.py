@@ -1,4 +1,4 @@
-"""The arm as seen by cameras: capsules along its links, placed in the world by the joint positions."""
+"""The arm as an obstacle to the cameras: capsules along its links, placed by the joint positions."""
 
 from dataclasses import dataclass
 
@@ -12,7 +12,7 @@ _SHORTEST = 1e-6  # m, a link without length has no capsule of its own
 
 @dataclass(frozen=True)
 class Capsules:
-    """k capsules in the world: all points within ``radius`` of a segment."""
+    """k capsules in the world frame: all points within ``radius`` of a segment."""
 
     start: np.ndarray  # m, (k, 3)
     end: np.ndarray  # m, (k, 3)

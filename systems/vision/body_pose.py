@@ -1,4 +1,4 @@
-"""The pose of a body from the places of its markers, by singular value decomposition."""
+"""The pose of a rigid body from its marker positions, by singular value decomposition."""
 
 from dataclasses import dataclass
 
@@ -12,7 +12,7 @@ MINIMUM_WIDTH = 0.02  # of a set of points across its longest direction, relativ
 
 @dataclass(frozen=True)
 class BodyPose:
-    """A pose and how well it is known.
+    """A pose estimate with its covariance.
 
     The covariance belongs to (rotation vector in rad, translation in m) in the world: the true pose is
     exp(rotation~) R_WE, p_WE + translation.
@@ -29,7 +29,7 @@ class BodyPose:
 
 
 def body_pose(p_E: np.ndarray, p_W: np.ndarray, covariance: np.ndarray) -> BodyPose:
-    """The pose that brings markers to where they were seen, Probst (2024) eqs. (3.24) to (3.27), weighted.
+    """The weighted best fit of the markers to their measured positions, Probst (2024) eqs. (3.24) to (3.27).
 
     In the source, C is printed with the scalar r_I^T r_K in place of the matrix r_I r_K^T. The weights are
     one over the mean variances of the points; the covariance of the pose takes the whole covariances.

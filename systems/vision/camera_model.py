@@ -1,4 +1,4 @@
-"""Cameras as a pinhole and a lens: from points in space to pixels and back, all cameras and points at once.
+"""Pinhole cameras with lens distortion: projection and back-projection, vectorised over cameras and points.
 
 A camera frame C has its origin in the optical centre, z along the optical axis, x to the right and y down in
 the image; pixels (u, v) count from the upper left corner. The lens shifts the normalised coordinates

@@ -1,4 +1,4 @@
-"""The measuring cell: which cameras stand where, what they look at and how fast, read from one YAML file.
+"""The measuring cell: poses, lenses, windows and rates of its cameras, read from one YAML file.
 
 A cell file is the dataclass tree below, field for field. Every part carries a ``source``: where its numbers
 come from, or the word ``assumed``. Positions are those of the camera system's own frame Q (a calibration
@@ -20,7 +20,7 @@ _IN_METRES = 20.0  # mm; a cell in metres by mistake is no larger, and two camer
 
 @dataclass
 class Lens:
-    """What is inside a camera, in OpenCV's terms."""
+    """Intrinsic parameters of a camera, in OpenCV's terms."""
 
     focal_length_px: np.ndarray = field(default_factory=lambda: np.zeros(2))  # along u and v
     principal_point_px: np.ndarray = field(default_factory=lambda: np.zeros(2))
@@ -44,7 +44,7 @@ class CellCamera:
 
 @dataclass
 class MeasuringCell:
-    """Cameras about a robot. Load one with `load_cell`."""
+    """The cameras around a robot. Load one with `load_cell`."""
 
     name: str = ""
     sensor_px: np.ndarray = field(default_factory=lambda: np.zeros(2))  # width and height

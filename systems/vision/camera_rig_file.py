@@ -1,4 +1,4 @@
-"""A measuring cell as the text of its YAML file, and a cell with the cameras that a calibration has found."""
+"""Writing a measuring cell as YAML, and replacing its cameras by calibrated ones."""
 
 from dataclasses import replace
 

@@ -1,4 +1,4 @@
-"""From pictures to blobs: what is bright, hangs together and looks like a sphere, and where its middle is.
+"""Blob detection: connected bright regions that look like a sphere, and their centroids.
 
 Pixels above a threshold are put together to components by OpenCV. The middle of a component is the mean of
 its pixels weighted by brightness, Probst (2024) eq. (3.41), corrected: the factors 1/K and 1/J in front of
@@ -22,7 +22,7 @@ _LARGEST_LABEL = 32_767  # more components than that are no picture of markers
 
 @dataclass
 class CentroidConfig:
-    """What counts as a marker; read from a scenario file."""
+    """Thresholds for a marker in an image; read from a scenario file."""
 
     threshold: float = 0.4  # in full scales; Probst (2024), table A.8, has 0.3 to 0.84
     smallest: int = 8  # px, of the area
@@ -47,7 +47,7 @@ def check_centroids(config: CentroidConfig) -> None:
 
 
 def blobs_in(pictures: Sequence[Picture], cameras: Cameras, config: CentroidConfig) -> np.ndarray:
-    """Where the centres of spheres are seen.
+    """Detected images of sphere centres.
 
     Args:
         pictures: one of each camera.

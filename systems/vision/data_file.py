@@ -1,4 +1,4 @@
-"""Cells and bodies as YAML files: where the shipped ones are, and one-line errors for the others."""
+"""Reading cells and bodies from YAML files, shipped or one's own; errors are one line."""
 
 from collections.abc import Callable, Sequence
 from importlib.resources import files
@@ -16,7 +16,7 @@ _Schema = TypeVar("_Schema")
 def load_data_file(
     name: str, kind: str, schema: type[_Schema], problem_of: Callable[[_Schema], Problem | None]
 ) -> _Schema:
-    """Reads a cell or a body and refuses one that cannot be.
+    """Reads and checks a cell or a body.
 
     Args:
         name: as for `data_file`.

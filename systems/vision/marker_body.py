@@ -1,4 +1,4 @@
-"""The detection body: where the centres of the markers are in the frame of the tool."""
+"""The marker body: positions of the marker centres in the tool frame."""
 
 from dataclasses import dataclass, field
 from functools import cached_property

@@ -1,4 +1,4 @@
-"""Lit ellipses as pixels: edges that blur and motion have softened, noise, eight bits.
+"""Rendering of marker images: ellipses with blur, motion blur, noise and quantisation.
 
 Blur turns an edge into the integral of a Gauss curve across it, motion during the exposure shifts it, noise
 is added pixel by pixel. Only what is near a light is computed: elsewhere a pixel is as dark as the
@@ -31,7 +31,7 @@ class Picture:
 
 @dataclass(frozen=True)
 class Sensor:
-    """How light becomes numbers; brightness is counted in full scales."""
+    """Conversion of light to pixel values; brightness is in units of full scale."""
 
     brightness: float  # of a light
     background: float

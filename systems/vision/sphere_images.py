@@ -1,4 +1,4 @@
-"""What a sphere looks like: an ellipse, whose centre is not the image of the sphere's centre.
+"""The image of a sphere: an ellipse whose centre is not the image of the sphere's centre.
 
 The rays that touch a sphere form a cone, and the image plane cuts it in an ellipse. For a sphere of radius r
 at (X, Y, Z) in the camera frame it is, in normalised coordinates, centred at (X, Y) Z / (Z^2 - r^2): further

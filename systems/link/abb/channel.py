@@ -13,7 +13,7 @@ _BUFFER = 1 << 20  # bytes; the kernel keeps the oldest datagrams when it is ful
 
 
 class Buffering(Enum):
-    """What is done with datagrams that wait, Probst (2024), table A.5."""
+    """Which of several queued datagrams are used, Probst (2024), table A.5."""
 
     NEXT = "next"  # one after the other
     NEWEST = "newest"  # all are read, the newest counts

@@ -8,7 +8,7 @@ from systems.link.abb.session import EgmSession
 
 
 class EgmClient:
-    """Hears a controller and answers it."""
+    """Receives the messages of a controller and replies to them."""
 
     def __init__(
         self,

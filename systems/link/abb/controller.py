@@ -1,4 +1,4 @@
-"""The controller's side of EGM without sockets: reports, references, time-outs and the RAPID program."""
+"""A virtual EGM controller without sockets: reports, references, time-outs and the RAPID program."""
 
 import math
 from dataclasses import dataclass
@@ -30,7 +30,7 @@ _STANDING = np.full(NUM_JOINTS, math.nan)
 
 @dataclass
 class EgmRunConfig:
-    """How the RAPID program calls EGM; read from a scenario file."""
+    """Arguments of the RAPID program's EGM calls; read from a scenario file."""
 
     timeout: float = quantity(0.2, 0.01, 60.0, "s")  # without a command, after which EGM ends
     # Converged when every joint is so close to its reference
@@ -40,7 +40,7 @@ class EgmRunConfig:
 
 
 class RunState(Enum):
-    """What the RAPID program does."""
+    """States of the RAPID program."""
 
     RUNNING = "running"  # EGM takes commands
     PAUSED = "paused"  # EGM has ended and will be run again
@@ -48,7 +48,7 @@ class RunState(Enum):
 
 
 class VirtualController:
-    """Speaks for a robot as an ABB controller does. Times are the controller's clock in s."""
+    """Emulates an ABB controller. Times are on the controller's clock, in s."""
 
     def __init__(self, robot: RobotModel, config: EgmRunConfig) -> None:
         """Starts the program at its first cycle.

@@ -1,4 +1,4 @@
-"""What a robot controller reports over EGM, and what it is told: values in SI units, bytes on the wire."""
+"""EGM messages: reports of the controller and commands to it, in SI units and as bytes."""
 
 import math
 from dataclasses import dataclass
@@ -27,11 +27,11 @@ _LARGEST_COUNT = 2**32
 
 
 class EgmError(ValueError):
-    """A datagram that is not an EGM message, or one that says what cannot be."""
+    """A datagram that is not an EGM message, or has impossible content."""
 
 
 class Mode(Enum):
-    """What is sent to the controller, Probst (2024), table A.6; with Euler angles or a quaternion."""
+    """The kind of command that is sent, Probst (2024), table A.6; with Euler angles or a quaternion."""
 
     JOINT = "joint"
     JOINT_SPEED = "joint_speed"
@@ -101,7 +101,7 @@ class Pose:
 
 @dataclass(frozen=True)
 class Command:
-    """What to tell a controller; a mode takes from it what it sends."""
+    """A command to a controller; the mode selects which fields are sent."""
 
     position: np.ndarray | None = None  # (6,) rad
     velocity: np.ndarray | None = None  # (6,) rad/s
@@ -115,7 +115,7 @@ class Command:
 
 @dataclass(frozen=True, slots=True)
 class RobotReport:
-    """What every message of a controller says; the rest is behind properties, decoded when asked for."""
+    """A message of a controller; rarely used fields are properties and decoded on demand."""
 
     seqno: int
     time: float  # s, the controller's clock: when the joints were read
@@ -240,7 +240,7 @@ def _encode_path_correction(command: Command, seqno: int, time: float) -> bytes:
 
 
 def decode_command(data: bytes) -> tuple[int, Command]:
-    """Reads what a client tells a controller: the number of the message and its content.
+    """Decodes a command of a client: sequence number and content.
 
     Raises:
         EgmError: if it is not a command, or contains a number that is not finite.

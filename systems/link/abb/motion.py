@@ -1,4 +1,4 @@
-"""How a controller moves under EGM: from references that arrive to planned joint motion."""
+"""Motion generation of a controller under EGM: from received references to joint motion."""
 
 import math
 from dataclasses import dataclass

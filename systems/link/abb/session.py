@@ -1,4 +1,4 @@
-"""The client's side of EGM without sockets: which messages count, and what may be answered when."""
+"""The EGM client's protocol logic without sockets: which messages are valid, and when to reply."""
 
 import math
 from dataclasses import dataclass, fields, replace
@@ -20,7 +20,7 @@ _POSITION_SLACK = 0.02  # rad
 
 @dataclass
 class EgmCounters:
-    """What has come and gone; every datagram is counted once."""
+    """Counts of datagrams; each is counted once."""
 
     accepted: int = 0
     superseded: int = 0  # accepted, but a newer one was already there
@@ -42,7 +42,7 @@ class EgmCounters:
 
 
 class Link(Enum):
-    """How things stand between client and controller."""
+    """State of the connection between client and controller."""
 
     WAITING = "waiting"  # nothing has come yet
     STOPPED = "stopped"  # the controller reports, but does not follow commands
@@ -51,7 +51,7 @@ class Link(Enum):
 
 
 class EgmSession:
-    """Decides about every datagram and every reply. Times are of any one steady clock, in s."""
+    """Validates every datagram and decides on every reply. Times are on one monotonic clock, in s."""
 
     def __init__(
         self,
@@ -207,7 +207,7 @@ class EgmSession:
 
 
 def _standing(command: Command) -> Command:
-    """A command to be where another one says, and to stay there."""
+    """A command to hold the position of another one."""
     return replace(
         command,
         velocity=None if command.velocity is None else np.zeros_like(command.velocity),

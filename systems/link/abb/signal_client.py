@@ -1,11 +1,11 @@
-"""Hears the test signals of a controller."""
+"""Receives the test signals of a controller."""
 
 from systems.link.abb.channel import UdpChannel
 from systems.link.abb.signals import ControllerSignals, SignalCodec, SignalError, SignalLayout
 
 
 class SignalClient:
-    """Keeps the newest test signals that have come in."""
+    """Holds the newest test signals received."""
 
     def __init__(
         self, layout: SignalLayout, port: int = 0, address: str = "127.0.0.1", host: str | None = None

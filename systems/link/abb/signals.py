@@ -1,4 +1,4 @@
-"""Test signals of a controller (speeds, torques) on a UDP channel of their own, in a layout one can choose.
+"""Test signals of a controller (speeds, torques) on a separate UDP channel with a configurable layout.
 
 RAPID sends either a text or packed numbers; which, in what order and in what units is up to the program that
 runs on the controller (Probst 2024, A.2), so the layout is configuration and not protocol.
@@ -17,7 +17,7 @@ _ORDERS = {"little": "<", "big": ">"}
 
 @dataclass
 class SignalLayout:
-    """How one datagram is written; read from a scenario file."""
+    """Layout of a datagram; read from a scenario file."""
 
     fields: list[str] = field(default_factory=lambda: ["time", "velocity", "torque"])  # in this order
     number: str = "float32"  # float32, float64 or text
@@ -30,7 +30,7 @@ class SignalLayout:
 
 @dataclass(frozen=True)
 class ControllerSignals:
-    """What one datagram says; None for what it does not contain."""
+    """Content of one datagram; None for absent fields."""
 
     time: float  # s, the controller's clock; NaN if it is not sent
     velocity: np.ndarray | None = None  # (6,) rad/s
@@ -39,7 +39,7 @@ class ControllerSignals:
 
 
 class SignalError(ValueError):
-    """A datagram that does not fit the layout, or a layout that cannot be."""
+    """A datagram that does not fit the layout, or an invalid layout."""
 
 
 _SIZES = {"time": 1, "velocity": NUM_JOINTS, "torque": NUM_JOINTS, "position": NUM_JOINTS}

@@ -1,4 +1,4 @@
-"""A client of a Qualisys server: asks for the poses of a body and collects them without ever waiting.
+"""A non-blocking client of a Qualisys server that streams the poses of one body.
 
 `MocapClient.poll` belongs into a loop. It takes whatever has arrived, moves the conversation on by one answer
 and returns at once, connected or not; a server that goes away is noticed, reported and asked again. The
@@ -49,7 +49,7 @@ class MocapConfig:
 
 
 class MocapClient:
-    """A connection to a server, for one body; made anew when it breaks."""
+    """A connection to a server for one body; it reconnects when it breaks."""
 
     def __init__(self, config: MocapConfig) -> None:
         """Checks the configuration; the first `poll` connects.

@@ -1,4 +1,4 @@
-"""What a client says to a Qualisys server until frames come, and what it makes of the answers. No sockets."""
+"""The handshake with a Qualisys server until frames are streamed. No sockets."""
 
 from enum import Enum
 
@@ -11,11 +11,11 @@ VERSIONS = ("1.25", "1.21", "1.17", "1.12", "1.8")  # asked for in this order; b
 
 
 class MocapError(RuntimeError):
-    """The camera server cannot be used; the message says why."""
+    """The camera server cannot be used; the message gives the reason."""
 
 
 class State(Enum):
-    """How far a connection has come."""
+    """Stages of the handshake."""
 
     DISCONNECTED = "disconnected"
     CONNECTING = "connecting"

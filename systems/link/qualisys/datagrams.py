@@ -1,4 +1,4 @@
-"""Frames over UDP: from the right sender only, with the age of each."""
+"""Frames over UDP, accepted from the server's address only, each with its age."""
 
 import socket
 import struct
@@ -21,7 +21,7 @@ _OLDEST = 10.0  # s; a larger age is a wall clock that was set in between
 
 @dataclass
 class Counters:
-    """What a client has seen since it was made."""
+    """Counts since the client was created."""
 
     frames: int = 0  # that could be read
     wrong_sender: int = 0  # datagrams from elsewhere, ignored

@@ -32,7 +32,7 @@ class PacketError(ValueError):
 
 
 class PacketType(IntEnum):
-    """What a packet holds."""
+    """Type of a packet."""
 
     ERROR = 0
     COMMAND = 1
@@ -46,7 +46,7 @@ class PacketType(IntEnum):
 
 
 class Event(IntEnum):
-    """What a server says of itself unasked, and in answer to GetState."""
+    """State that a server announces, unasked or in reply to GetState."""
 
     CONNECTED = 1
     CONNECTION_CLOSED = 2
@@ -72,7 +72,7 @@ _WIDTH = {Component.POSE: 12, Component.POSE_RESIDUAL: 13}  # floats of a body
 
 @dataclass(frozen=True, slots=True)
 class Frame:
-    """One exposure as it travels: stamp and bodies in the order of the server's parameters."""
+    """One exposure on the wire: time stamp and bodies in the order of the server's parameters."""
 
     time_us: int  # since the server's measurement began
     number: int  # always 1 in the live mode of some servers: the stamp tells frames apart, not this
@@ -155,7 +155,7 @@ def _packet_type(kind: int) -> PacketType:
 
 
 class PacketStream:
-    """Cuts what arrives over TCP, in pieces of any size, into packets."""
+    """Splits a TCP byte stream into packets."""
 
     def __init__(self) -> None:
         self._pending = bytearray()

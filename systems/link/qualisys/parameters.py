@@ -7,12 +7,12 @@ from xml.sax.saxutils import escape
 
 
 class ParameterError(ValueError):
-    """The parameters of a camera server are no XML, or lack what is needed."""
+    """The parameters of a camera server are not XML, or lack a required element."""
 
 
 @dataclass(frozen=True)
 class Body:
-    """A rigid body as the server knows it."""
+    """A rigid body as defined on the server."""
 
     name: str
     enabled: bool = True  # servers since version 1.21 can leave a body out of the measurement

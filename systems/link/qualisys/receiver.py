@@ -1,4 +1,4 @@
-"""The camera as a station sees it: frames from the wire become pose samples on the station's clock.
+"""Converts received frames to pose samples on the station's clock.
 
 A station's loop calls `MocapReceiver.poll` between two steps of its diagram and sets what comes back into an
 input port; no system of the diagram touches a socket.
@@ -22,7 +22,7 @@ _EARLY = 1e-3  # s by which the jitter of the clock estimate may put an exposure
 
 @dataclass
 class MocapReceiverConfig:
-    """A camera server, its clock, and what it calls world and tool; read from a scenario file."""
+    """A camera server, its clock, and its names of world and tool; read from a scenario file."""
 
     server: MocapConfig = field(default_factory=MocapConfig)
     clock: ClockConfig = field(default_factory=ClockConfig)
@@ -31,7 +31,7 @@ class MocapReceiverConfig:
 
 @dataclass
 class SampleCounters:
-    """What became of the frames."""
+    """Counts of accepted and rejected frames."""
 
     samples: int = 0  # given out, valid or not
     skipped: int = 0  # in time, but a newer one was there already
@@ -43,7 +43,7 @@ class SampleCounters:
 
 @dataclass(frozen=True)
 class MocapReport:
-    """What a receiver has to say about its connection; for logs and tables."""
+    """Status of the connection, for logs and tables."""
 
     state: State
     last_error: str  # why the last connection ended or did not come about

@@ -1,4 +1,4 @@
-"""A virtual camera server: speaks the Qualisys protocol, so that any client can measure a simulated robot.
+"""A virtual camera server with the Qualisys protocol, so that any client can measure a simulated robot.
 
 It listens in a thread of its own. The simulation pushes poses in by `VirtualCameraServer.publish`, which
 sends them at once, from the thread of the simulation: a frame is on the wire before the call returns.

@@ -1,4 +1,4 @@
-"""One client of the virtual camera server: what it is answered, and which frames it gets."""
+"""One client session of the virtual camera server: replies and streamed frames."""
 
 import math
 import re
@@ -28,7 +28,7 @@ NO_MORE_DATA = packet(PacketType.NO_MORE_DATA)
 
 @dataclass
 class CameraState:
-    """What all clients of the virtual camera see."""
+    """State of the virtual camera that all clients share."""
 
     names: tuple[str, ...]  # of the bodies
     frequency: int  # Hz
@@ -42,7 +42,7 @@ class CameraState:
 
 @dataclass
 class Session:
-    """The conversation with one client; bytes in, bytes out."""
+    """The protocol with one client; bytes in, bytes out."""
 
     camera: CameraState
     host: str  # the client's address

@@ -1,4 +1,4 @@
-"""The command StreamFrames: how often, over which way, and which components."""
+"""The command StreamFrames: rate, transport and components."""
 
 from dataclasses import dataclass
 
@@ -14,7 +14,7 @@ _UDP_PORTS = range(1023, 65536)
 
 
 class RequestError(ValueError):
-    """A command that no server would understand."""
+    """An invalid StreamFrames command."""
 
 
 def parse_components(words: list[str]) -> tuple[Component, ...]:
@@ -40,7 +40,7 @@ def parse_components(words: list[str]) -> tuple[Component, ...]:
 
 @dataclass(frozen=True)
 class StreamRequest:
-    """What a client wants streamed."""
+    """The stream that a client asks for."""
 
     components: tuple[Component, ...] = (Component.POSE_RESIDUAL,)
     frequency: int | None = None  # Hz; None: every frame, or every ``divisor``-th

@@ -1,8 +1,9 @@
-"""All cameras and all places of the wand at once: the least squares of all pixels and wand lengths.
+"""Bundle adjustment of all cameras and all wand poses over all pixels and wand lengths.
 
-A Levenberg-Marquardt step has 15 unknowns for each camera and 6 for each place of the wand, thousands in
-all. Places of the wand depend on each other through the cameras only, so they are eliminated one by one (the
-Schur complement), and what is solved has the size of the cameras. Its inverse is their covariance.
+A Levenberg-Marquardt step has 15 unknowns per camera and 6 per wand pose, thousands in all. Wand poses are
+coupled only through the cameras, so they are eliminated (Schur complement) and the system that is solved has
+the size of the cameras. Its inverse is their covariance. This structure is why the loop is written here:
+`scipy.optimize.least_squares` would factor the whole sparse Jacobian at every step.
 """
 
 from dataclasses import dataclass
@@ -26,7 +27,7 @@ _LEAST_INFORMATION = 1e-14  # of a combination of parameters, relative to the be
 
 @dataclass(frozen=True)
 class Scene:
-    """What n cameras saw: k points whose places are known, and a wand with two ends in f places.
+    """Observations of n cameras: k points at known positions, and the two ends of a wand in f poses.
 
     Pixels are NaN where a camera saw nothing.
     """
@@ -43,7 +44,7 @@ class Scene:
 
 @dataclass(frozen=True)
 class Adjusted:
-    """The most likely cameras and places."""
+    """The maximum-likelihood cameras and wand poses."""
 
     cameras: Cameras
     wand: np.ndarray  # m, its ends, (f, 2, 3)
@@ -102,7 +103,7 @@ def adjust(cameras: Cameras, scene: Scene, wand_p_W: np.ndarray, with_lens: bool
 
 
 class _Linearized:
-    """Residuals and normal equations at one guess, everything in units of what is expected of it."""
+    """Whitened residuals and normal equations at one estimate."""
 
     def __init__(self, cameras: Cameras, scene: Scene, wand_p_W: np.ndarray) -> None:
         n, f = len(cameras), len(wand_p_W)

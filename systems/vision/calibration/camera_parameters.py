@@ -1,4 +1,4 @@
-"""What is unknown of a camera, how its pixels depend on that, and a camera after a small change of it.
+"""The parameters of a camera that a calibration estimates, their Jacobian, and small updates of them.
 
 The fifteen parameters are those of OpenCV's lens model and the pose: `NAMES`. A change of the pose turns and
 then shifts points in the camera frame, p_C -> exp(turn~) p_C + shift.

@@ -1,8 +1,8 @@
-"""Where cameras stand, about: the first guess of their calibration.
+"""Initial camera poses for the calibration.
 
-A camera that sees the frame finds its place by it, with the lens that its data sheet promises. What two of
-them see of the wand is triangulated, and a camera that does not see the frame, or has taken its mirror image
-for it, finds its place by the wand (direct linear transformation).
+A camera that sees the L-frame is located by it, with the lens parameters of its data sheet. Wand ends seen
+by two located cameras are triangulated, and a camera that does not see the frame, or was located at the
+mirrored solution, is located by the wand (direct linear transformation).
 """
 
 from dataclasses import replace

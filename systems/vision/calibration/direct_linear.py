@@ -1,4 +1,4 @@
-"""A camera from known points by one singular value decomposition: where the nonlinear refinement begins."""
+"""Direct linear transformation: a camera from known points, as the initial guess of the refinement."""
 
 import numpy as np
 from scipy.linalg import rq
@@ -11,7 +11,7 @@ _FLATTEST = 0.02  # a set of points in its thinnest direction, relative to its l
 
 
 def direct_linear(p_W: np.ndarray, pixels: np.ndarray) -> np.ndarray:
-    """The projection matrix that brings points to pixels, Probst (2024) eqs. (3.31) to (3.37).
+    """The projection matrix that maps points to pixels, Probst (2024) eqs. (3.31) to (3.37).
 
     Two corrections: a block A_i of (3.33) is 2 x 12, not 12 x 2 as printed; and the eigenvector of A^T A is
     that of the smallest eigenvalue, which is zero without noise only. It is found as the last right singular

@@ -15,7 +15,7 @@ MINIMUM_POINTS = (NUM + 1) // 2  # two numbers each
 
 @dataclass(frozen=True)
 class CalibratedCamera:
-    """One camera and how well it is known; the parameters are those of `camera_parameters.NAMES`."""
+    """One calibrated camera with its covariance; the parameters are those of `camera_parameters.NAMES`."""
 
     camera: Cameras  # of length one
     covariance: np.ndarray  # (15, 15), as the residuals scatter

@@ -1,4 +1,4 @@
-"""What cameras saw of wand and frame, as a table of text: read strictly, refused by file and line.
+"""Observations of wand and L-frame as a text table; errors are reported with file and line.
 
 The first line names the columns, in any order: ``exposure``, ``camera``, ``point``, ``u_px``, ``v_px`` and,
 if wanted, ``mean_of``. A point is ``A`` or ``B`` for the ends of the wand, or ``L1``, ``L2``, ... for a

@@ -1,4 +1,4 @@
-"""The wand that is waved through the cell, the frame that lies on its floor, and what cameras saw of both."""
+"""The calibration wand, the L-frame on the floor, and the observations of both; simulated ones, too."""
 
 from dataclasses import dataclass, field
 
@@ -10,7 +10,7 @@ from systems.vision.visibility import in_window
 
 @dataclass
 class CalibrationKit:
-    """Two bodies of known size. The frame defines the camera system's own frame Q: origin, axes and scale."""
+    """The dimensions of wand and L-frame. The L-frame defines the frame Q: origin, axes and scale."""
 
     wand_length_mm: float = 601.7  # between the centres of the two spheres at its ends; assumed
     # Standard deviation of that length from place to place, for a wand bends; assumed. What it is wrong by
@@ -31,7 +31,7 @@ class CalibrationKit:
 
 @dataclass(frozen=True)
 class WandRun:
-    """What n cameras saw of the frame, and of the wand in f places; NaN where they saw nothing."""
+    """Observations of n cameras: the L-frame, and the wand in f poses; NaN where nothing was seen."""
 
     frame_pixels: np.ndarray  # the mean over all exposures, (n, k, 2)
     frame_exposures: np.ndarray  # of how many it is the mean, (n, k)
@@ -40,7 +40,7 @@ class WandRun:
 
 @dataclass
 class SimulatedWandRun:
-    """How a wand is waved through a simulated cell."""
+    """Motion and noise of a simulated wand calibration."""
 
     places: int = 1000  # of the wand that are recorded, evenly in time
     middle_mm: np.ndarray = field(default_factory=lambda: np.array([400.0, 265.0, 1000.0]))  # in Q
@@ -59,7 +59,7 @@ def simulate_wand_run(
     run: SimulatedWandRun,
     rng: np.random.Generator,
 ) -> tuple[WandRun, np.ndarray]:
-    """Waves the wand and lets the cameras look, each with its whole sensor.
+    """Simulates the observations of a moving wand and of the L-frame, over the whole sensor of each camera.
 
     Args:
         cameras: in the frame Q of the camera system, n of them.

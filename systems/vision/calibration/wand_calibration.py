@@ -1,8 +1,7 @@
-"""From what the cameras saw of wand and frame to where they stand and how they see.
+"""Calibration of poses and lenses of all cameras from observations of wand and L-frame.
 
-The cameras are placed one by one (`camera_placement`), then everything is adjusted together
-(`bundle_adjustment`), first the places, then the lenses; pixels that do not belong to the rest are left out,
-and it is adjusted again.
+The cameras are located one by one (`camera_placement`), then everything is adjusted together
+(`bundle_adjustment`), first the poses, then the lenses; outliers are removed and the adjustment is repeated.
 """
 
 from dataclasses import dataclass, replace
@@ -32,7 +31,7 @@ _LARGEST_SIGMA = 3.0  # px; no camera is that bad, so points have wrong names or
 
 @dataclass(frozen=True)
 class WandCalibration:
-    """The cameras in the frame Q of the L-frame, and how well they are known."""
+    """The calibrated cameras in the L-frame Q, with covariances and residuals."""
 
     cameras: Cameras
     covariance: np.ndarray  # of the parameters `camera_parameters.NAMES` of each camera, (n, 15, 15)
@@ -58,7 +57,7 @@ class WandCalibration:
 def calibrate_with_wand(
     run: WandRun, kit: CalibrationKit, guess: Cameras, names: list[str], pixel_sigma: float = 0.1
 ) -> WandCalibration:
-    """The most likely cameras.
+    """Estimates poses and lenses of all cameras (maximum likelihood).
 
     Args:
         run: what n cameras saw.
@@ -157,7 +156,7 @@ def _refuse_contradiction(seen: np.ndarray, used: np.ndarray, names: list[str]) 
 
 
 def _adjusted(cameras: Cameras, scene: Scene, names: list[str]) -> tuple[Adjusted, Scene]:
-    """Adjusts, leaves out what does not belong to the rest, and adjusts again until nothing changes.
+    """Adjusts and removes outliers in turn until the set of inliers no longer changes.
 
     Returns:
         What was found, and the scene with what was used of it.

@@ -1,4 +1,4 @@
-"""Which blobs of which cameras show the same point, when nothing is known of the scene.
+"""Matching of blobs between cameras without prior knowledge of the scene.
 
 Every pair of blobs that lie on each other's epipolar lines is a candidate. It is triangulated and looked for
 in the other cameras; the candidate that most cameras confirm takes its blobs, and so on with what remains. A
@@ -14,7 +14,7 @@ _MOST_CANDIDATES = 20_000  # the best are kept; bounds memory in a room full of 
 
 
 class SceneMatcher:
-    """Puts blobs of n cameras together to points."""
+    """Groups the blobs of n cameras into points."""
 
     def __init__(self, cameras: Cameras, tolerance: float, min_cameras: int = 3) -> None:
         """Prepares the epipolar geometry.

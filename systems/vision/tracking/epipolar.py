@@ -1,4 +1,4 @@
-"""Epipolar geometry: where the point that one camera sees can appear in the image of another."""
+"""Epipolar geometry between pairs of cameras."""
 
 import numpy as np
 
@@ -38,7 +38,7 @@ def epipolar_lines(F: np.ndarray, pixels: np.ndarray) -> np.ndarray:
 
 
 def epipolar_distances(F: np.ndarray, first: np.ndarray, second: np.ndarray) -> np.ndarray:
-    """How far pairs of pixels are from being images of one point.
+    """Distances of pairs of pixels from satisfying the epipolar constraint.
 
     Args:
         F: from the first to the second camera, shape (..., 3, 3).

@@ -1,4 +1,4 @@
-"""How markers appear in the images: how large, and which of them as one."""
+"""Size of the marker images, and which of them merge into one blob."""
 
 import numpy as np
 
@@ -63,7 +63,7 @@ def shared_images(close: np.ndarray, seen: np.ndarray, diameters: np.ndarray) ->
 def merged_images(
     pixels: np.ndarray, seen: np.ndarray, diameters: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """What is seen of markers some of whose images touch.
+    """The blobs of markers some of whose images touch.
 
     Args:
         pixels: of the centres, shape (n, m, 2).

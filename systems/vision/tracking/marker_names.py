@@ -1,4 +1,4 @@
-"""Which point is which marker: the arrangement of the markers is asymmetric, and their distances tell them.
+"""Identification of markers by their distances, which the asymmetric arrangement makes unique.
 
 Three points whose distances are those of three markers are a guess at the pose. The guess that brings most
 markers to points wins, if no other one that names a point differently brings as many.
@@ -17,7 +17,7 @@ _MOST_GUESSES = 5_000
 
 
 class MarkerNames:
-    """Names points by the geometry of one body."""
+    """Labels points with the markers of one body."""
 
     def __init__(self, body: DetectionBody, tolerance: float) -> None:
         """Prepares the triples of markers.

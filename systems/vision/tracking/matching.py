@@ -1,10 +1,10 @@
-"""Which blob is which marker, when it is known about where the markers are."""
+"""Matching of blobs to markers whose approximate positions are known."""
 
 import numpy as np
 
 
 def match_to_prediction(predicted: np.ndarray, blobs: np.ndarray, gate: float) -> np.ndarray:
-    """Pairs markers with blobs near to where they are expected, and only those that leave no doubt.
+    """Pairs markers with blobs near their predicted images, and only where the pairing is unambiguous.
 
     A marker with two blobs inside its gate, or a blob inside the gates of two markers, is left unmatched:
     what is left out costs a little accuracy, what is confused costs the pose.

@@ -1,4 +1,4 @@
-"""The most likely pose given all pixels of all cameras, by Gauss-Newton steps.
+"""The maximum-likelihood pose given all pixels of all cameras, by Gauss-Newton steps.
 
 Triangulation and singular value decomposition treat points as equally good in all directions. The pixels
 know better: their errors are alike, and the pose with the least squared errors in the images reaches the

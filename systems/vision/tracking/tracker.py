@@ -1,4 +1,4 @@
-"""The pose of a detection body, frame by frame: predicted, matched, fitted to pixels, checked, or refused.
+"""Tracking of a marker body: prediction, matching, pose fit to the pixels, and plausibility checks.
 
 With a pose to start from, the markers are expected where it would show them a frame later. Without one, the
 blobs are put together to points by epipolar lines, the points are named by the body's geometry, and the pose
@@ -38,7 +38,7 @@ _MERGE_MARGIN = 1.05  # images nearer to each other than this many diameters may
 
 @dataclass
 class TrackerConfig:
-    """What a tracker takes for granted; read from a scenario file."""
+    """Parameters of a tracker; read from a scenario file."""
 
     pixel_sigma: float = 0.1  # px, expected of a blob
     gate: float = 6.0  # px, how far a marker may be from its prediction
@@ -52,7 +52,7 @@ class TrackerConfig:
 
 @dataclass(frozen=True)
 class TrackerState:
-    """All that a tracker remembers from frame to frame."""
+    """The state of a tracker between frames."""
 
     time: float = -np.inf  # s, of the last pose; minus infinity if there was none
     X_WE: np.ndarray = field(default_factory=lambda: np.eye(4))
@@ -72,7 +72,7 @@ class TrackerState:
 
 @dataclass(frozen=True)
 class TrackedPose:
-    """What one frame says of the pose."""
+    """The pose estimate of one frame."""
 
     valid: bool
     X_WE: np.ndarray  # homogeneous matrix (4, 4); where it was looked for last, if it is not valid
