@@ -134,7 +134,7 @@ def compare_command(
         bool, typer.Option("--quick", help="One cycle, a faster path, less settling: a few seconds.")
     ] = False,
     cycles: Annotated[
-        int, typer.Option(metavar="N", help="Runs of each law; those after the first serve repeatability.")
+        int, typer.Option(metavar="N", help="Runs of each law; repeatability needs at least two.")
     ] = 3,
     laps: LapsOption = None,
     jobs: JobsOption = None,
@@ -185,7 +185,7 @@ def run_command(
     meshcat: Annotated[bool, typer.Option("--meshcat", help="Show it live in a browser.")] = False,
     realtime: Annotated[
         float | None,
-        typer.Option(metavar="RATE", help="Simulated seconds per second at most: 1 is real time."),
+        typer.Option(metavar="RATE", help="Largest real-time factor: 1 is real time."),
     ] = None,
 ) -> None:
     """Run one law."""
@@ -234,9 +234,10 @@ def diagram_command(
     settings: SetOption = None,
     robot: RobotOption = None,
     out: Annotated[
-        Path, typer.Option(metavar="FILE.svg|FILE.dot", help="The picture, or its text for graphviz.")
+        Path,
+        typer.Option(metavar="FILE.svg|FILE.dot", help="The drawing as SVG, or its source for graphviz."),
     ] = Path("diagram.svg"),
-    depth: Annotated[int, typer.Option(metavar="N", help="Levels of diagrams that are opened.")] = 2,
+    depth: Annotated[int, typer.Option(metavar="N", help="Depth to which nested diagrams are expanded.")] = 2,
 ) -> None:
     """Draw the diagram that is simulated."""
     with refusing(ValueError, OSError):

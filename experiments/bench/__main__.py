@@ -1,4 +1,4 @@
-"""How fast and how exact it is, as ratios measured in one run on one core: ``python -m experiments.bench``.
+"""Cost and accuracy as ratios measured in one run on one core: ``python -m experiments.bench``.
 
 The closed loop is compared with the bare plant and its drives making the same motion, the kinematics with
 Drake's forward kinematics and Jacobian of one configuration after the other, the rest with what is required.

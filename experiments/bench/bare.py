@@ -1,4 +1,4 @@
-"""The yardstick of the closed loop: the same plant and drives making the same motion, and nothing else."""
+"""The baseline for the cost of the closed loop: plant and drives alone, making the same motion."""
 
 import numpy as np
 from pydrake.systems.analysis import Simulator

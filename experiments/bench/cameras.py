@@ -1,4 +1,4 @@
-"""The calibration of the cameras: how fast, how exact, and beside OpenCV: python -m, or the bench.
+"""Benchmark of the camera calibration: speed and accuracy, compared with OpenCV.
 
 OpenCV's ``calibrateCamera`` gets the points that the adjustment has found and may choose lens and pose of
 each camera anew, so that its residual is the smallest possible one.

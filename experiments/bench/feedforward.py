@@ -1,4 +1,4 @@
-"""What a tick of the inverse models costs, and what they reach: python -m, or the bench.
+"""Benchmark of the inverse models: cost of a tick and tracking error.
 
 The yardstick of the time is Drake's inverse dynamics of the elastic plant of the same robot, called once.
 """

@@ -1,4 +1,4 @@
-"""From images to a pose: how fast, and how near to the truth the centroids are: python -m, or the bench.
+"""Benchmark of the image pipeline: speed, and accuracy of the centroids.
 
 Only what a real system would have to do is timed: windows, centroids, matching, pose. The pictures are made
 beforehand.

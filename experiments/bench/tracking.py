@@ -1,4 +1,4 @@
-"""From markers to a pose: how fast, and how near to the best that the pixels allow: python -m, or the bench.
+"""Benchmark of the tracker: speed, and accuracy relative to the Cramer-Rao bound.
 
 The yardstick of the time is what OpenCV offers for two cameras: undistorted points, `triangulatePoints`, and
 scipy's rigid fit, with every blob already assigned to its marker. The yardstick of the accuracy is the

@@ -1,4 +1,4 @@
-"""How quickly the servo answers a controller, beside an echo: ``python -m experiments.bench.wire [MINUTES]``.
+"""Response time of the servo to a controller, beside an echo: ``python -m experiments.bench.wire [MINUTES]``.
 
 A virtual cell and the servo run in real time; at the same time a metronome sends a controller's messages to
 two echoes on the same machine. One does what the smallest client of EGM does, written with a package of
@@ -47,7 +47,7 @@ Row = tuple[str, str, float, str, float, str]
 
 @dataclass(frozen=True)
 class TurnAround:
-    """How a client has answered."""
+    """Response times of a client."""
 
     median: float  # ms
     late: float  # ms, 99 %

@@ -30,7 +30,7 @@ _STRETCHES = 8  # into which a set is divided to be measured side by side; part 
 
 @dataclass(frozen=True)
 class MeasuredSets:
-    """Tables to identify from and to validate with; the truth only where it was simulated."""
+    """Measurements for identification and validation; true poses only if they were simulated."""
 
     calibration: Measurements
     validation: Measurements | None
@@ -39,7 +39,7 @@ class MeasuredSets:
 
 @dataclass(frozen=True)
 class CalibrationStudy:
-    """All that a calibration has found."""
+    """The results of a calibration."""
 
     nominal: RobotModel
     calibrated: RobotModel

@@ -74,7 +74,7 @@ def calibrate_command(
     ] = False,
     compliance: Annotated[
         bool,
-        typer.Option("--compliance", help="Identify how far the joints yield; measures with two payloads."),
+        typer.Option("--compliance", help="Also identify joint compliances; measures with two payloads."),
     ] = False,
     fixed: Annotated[
         list[str] | None, typer.Option(metavar="NAME", help="A parameter that stays zero; repeatable.")
@@ -83,11 +83,13 @@ def calibrate_command(
         str | None,
         typer.Option(metavar="FILE.yaml", help="The calibrated robot, for --robot of other commands."),
     ] = None,
-    urdf: Annotated[str | None, typer.Option(metavar="FILE.urdf", help="The same as URDF.")] = None,
+    urdf: Annotated[
+        str | None, typer.Option(metavar="FILE.urdf", help="The calibrated robot as URDF.")
+    ] = None,
     out: OutOption = Path("out/calibration"),
     json_file: JsonOption = None,
 ) -> None:
-    """Find the true geometry of a robot and what it is worth on the path."""
+    """Identify the geometry of a robot and validate it on the path."""
     human = human_console(json_file)
     wanted = _Wanted(
         measurements, validation, count, criterion, noise, position_only, compliance, fixed or []

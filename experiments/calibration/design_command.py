@@ -1,4 +1,4 @@
-"""``truetip design``: where to measure, and how good that is."""
+"""``truetip design``: optimal measurement configurations."""
 
 import resource
 import sys
@@ -36,26 +36,26 @@ def design_command(
     count: Annotated[int, typer.Option(metavar="N", help="Configurations.")] = 75,
     criterion: Annotated[str, typer.Option(metavar="NAME", help=f"One of {', '.join(NAMES)}.")] = "b3",
     position_only: Annotated[
-        bool, typer.Option("--position-only", help="Only the position of the tool will be measured.")
+        bool, typer.Option("--position-only", help="Design for measurements of the tool position only.")
     ] = False,
     anywhere: Annotated[
-        bool, typer.Option("--anywhere", help="Do not mind the floor, the base and the joint limits.")
+        bool, typer.Option("--anywhere", help="Ignore floor, base and joint limits.")
     ] = False,
     camera: Annotated[
         str | None,
         typer.Option(
             metavar="X,Y,Z",
-            help="Place of a camera in m that must see the tool; without it they stand all around.",
+            help="Position of a camera in m that must see the tool; by default cameras are all around.",
         ),
     ] = None,
-    seed: Annotated[int, typer.Option(metavar="N", help="Another seed, another design as good.")] = 0,
+    seed: Annotated[int, typer.Option(metavar="N", help="Seed of the search.")] = 0,
     out: Annotated[
         str | None, typer.Option(metavar="FILE.csv", help="The configurations, in the order of the visits.")
     ] = None,
     report: PictureOption = Path("out/design.html"),
     json_file: JsonOption = None,
 ) -> None:
-    """Choose the configurations at which measurements say most about the robot's errors."""
+    """Choose the measurement configurations that determine the robot's errors best."""
     human = human_console(json_file)
     with json_output(json_file) as output, refusing(ValueError, OSError), ExitStack() as stack:
         page = stack.enter_context(staged_file(report, *PAGE))

@@ -1,4 +1,4 @@
-"""What a calibration tells: JSON, tables on the terminal, and a page."""
+"""Results of a calibration as JSON, as terminal tables and as a page."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict

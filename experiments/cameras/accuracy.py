@@ -1,4 +1,4 @@
-"""How well a pose can be known: by the geometry of cameras and markers, and by what images make of a marker.
+"""Achievable pose accuracy, from the geometry of cameras and markers and from the image quality.
 
 The bound is that of Cramer and Rao, sigma^2 (J^T J)^-1 over all blobs that are seen: markers that touch each
 other in an image are one blob there. The tracker reaches it within a few percent
@@ -34,7 +34,7 @@ _NEAR = 0.25  # diameters, within which a blob is the one of a marker
 
 @dataclass(frozen=True)
 class Places:
-    """Where the tool is looked at: p poses with the arm that stands behind them."""
+    """Tool poses at which accuracy is evaluated, with the arm configuration at each."""
 
     X_WE: np.ndarray  # (p, 4, 4)
     q: np.ndarray  # rad, (p, 6)

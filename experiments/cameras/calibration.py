@@ -1,4 +1,4 @@
-"""What a calibration of cameras tells: JSON, a table in the manner of motion capture, a page."""
+"""Results of a camera calibration as JSON, as a table and as a page."""
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -24,7 +24,7 @@ _COLOR = "#0f7cc0"
 
 @dataclass(frozen=True)
 class CamerasFound:
-    """A calibration, what it was made with, and the truth where it was simulated."""
+    """A calibration with its inputs, and the true cameras if they were simulated."""
 
     calibration: WandCalibration
     names: list[str]

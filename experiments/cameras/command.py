@@ -51,22 +51,25 @@ def calibrate_cameras_command(
         str,
         typer.Option(
             metavar="FILE.csv",
-            help="What the cameras saw of wand and frame, or simulated.",
+            help="Observations of wand and L-frame, or simulated.",
         ),
     ] = SIMULATED,
     cell: CellOption = "probst",
     wand_length: Annotated[
-        float, typer.Option("--wand-length", metavar="MM", help="Between the two ends of the wand.")
+        float, typer.Option("--wand-length", metavar="MM", help="Length of the wand between its two spheres.")
     ] = CalibrationKit.wand_length_mm,
     places: Annotated[
-        int, typer.Option(metavar="N", help="Of the wand that are simulated.")
+        int, typer.Option(metavar="N", help="Number of simulated wand poses.")
     ] = SimulatedWandRun.places,
     pixel_sigma: Annotated[
-        float, typer.Option("--pixel-sigma", metavar="PX", help="Standard deviation of a pixel, expected.")
+        float,
+        typer.Option(
+            "--pixel-sigma", metavar="PX", help="Expected standard deviation of an image coordinate."
+        ),
     ] = SimulatedWandRun.pixel_sigma,
-    seed: Annotated[int, typer.Option(metavar="N", help="Of the simulated noise and motion.")] = 0,
+    seed: Annotated[int, typer.Option(metavar="N", help="Seed of the simulated noise and motion.")] = 0,
     observations: Annotated[
-        str | None, typer.Option(metavar="FILE.csv", help="Write down what was seen, for --images.")
+        str | None, typer.Option(metavar="FILE.csv", help="Write the observations, for --images.")
     ] = None,
     write: Annotated[
         str | None, typer.Option(metavar="FILE.yaml", help="The cell with the calibrated cameras.")
@@ -74,7 +77,7 @@ def calibrate_cameras_command(
     out: Annotated[Path, typer.Option(metavar="FILE.html", help="The report.")] = Path("out/cameras.html"),
     json_file: JsonOption = None,
 ) -> None:
-    """Find where the cameras stand and how their lenses bend, from a wand and an L-frame."""
+    """Calibrate poses and lenses of the cameras with a wand and an L-frame."""
     human = human_console(json_file)
     with json_output(json_file) as output, refusing(ValueError, OSError), ExitStack() as stack:
         positive("--wand-length", wand_length)
@@ -128,7 +131,7 @@ def study_cameras_command(
     out: Annotated[Path, typer.Option(metavar="FILE.html", help="The report.")] = Path("out/study.html"),
     json_file: JsonOption = None,
 ) -> None:
-    """Find out what limits the accuracy of a pose: cameras, light, markers; and what the laws make of it."""
+    """Study how cameras, light and markers limit the pose accuracy, and the effect on the laws."""
     human = human_console(json_file)
     with json_output(json_file) as output, refusing(ValueError, OSError), ExitStack() as stack:
         at_least("--jobs", 1, jobs)

@@ -1,4 +1,4 @@
-"""What the camera is worth to each servo law: the same run with one camera after the other."""
+"""Effect of the camera model on each servo law: the same run with different cameras."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass

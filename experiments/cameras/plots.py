@@ -1,4 +1,4 @@
-"""Pictures of the accuracy of cameras: ellipsoids along the path, dots in the workspace, curves."""
+"""Figures of camera accuracy: ellipsoids along the path, points in the workspace, curves."""
 
 from collections.abc import Sequence
 

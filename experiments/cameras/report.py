@@ -1,4 +1,4 @@
-"""What a study of cameras tells: tables on the terminal, and a page."""
+"""Results of a camera study as terminal tables and as a page."""
 
 from collections.abc import Sequence
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""What a study of cameras looks at, and what it has found, in numbers and words."""
+"""Setup and results of a camera study."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -27,7 +27,7 @@ PATH_PLACES, WORKSPACE_PLACES = 60, 200
 
 @dataclass(frozen=True)
 class CamerasStudy:
-    """All that a study has found."""
+    """The results of a study."""
 
     setup: SweepSetup
     covariance_on_path: np.ndarray  # (p, 6, 6) in rad and m, NaN where a pose is not seen

@@ -1,4 +1,4 @@
-"""What limits the accuracy of a pose from cameras: one thing is changed at a time, the rest stays.
+"""Sensitivity of the pose accuracy: one parameter of the camera system is varied at a time.
 
 Geometry is judged by the Cramer-Rao bound over the test path and over the workspace. Where sharpness, light
 or size of the markers change, pictures are taken first and the bound is scaled with the error of their
@@ -33,7 +33,7 @@ PICTURED = 12  # poses of which pictures are taken
 
 @dataclass(frozen=True)
 class SweepSetup:
-    """What is looked at, by what, and how exactly."""
+    """Poses, cameras and noise of a sweep."""
 
     cell: MeasuringCell
     body: DetectionBody
@@ -48,7 +48,7 @@ class SweepSetup:
 
 @dataclass(frozen=True)
 class SweepPoint:
-    """One value of what is changed, and what comes of it."""
+    """One value of the varied parameter and the resulting accuracy."""
 
     value: float
     path: Accuracy
@@ -167,7 +167,7 @@ def _pictured(
 
 @dataclass(frozen=True)
 class Sweep:
-    """What is changed, to which values, and how the rest follows from it."""
+    """The varied parameter, its values and the resulting setup."""
 
     title: str
     unit: str  # of the values, where they have one

@@ -1,4 +1,4 @@
-"""The same cell with something changed: fewer cameras, others places, sharper images, another body."""
+"""Variations of a cell: fewer cameras, other positions, sharper images, another body."""
 
 from dataclasses import replace
 

@@ -20,7 +20,7 @@ def human_console(json_file: str | None) -> Console:
 
 
 class JsonOutput:
-    """The numbers of a command on their way out. Get one from `json_output`."""
+    """Collects the JSON output of a command. Get one from `json_output`."""
 
     _staged: Path  # where a file is written until its command has ended well
 

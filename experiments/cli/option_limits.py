@@ -1,4 +1,4 @@
-"""What the number behind an option may be; what it may not is refused in the option's name."""
+"""Range checks of numeric options; errors name the option."""
 
 import math
 

@@ -28,12 +28,18 @@ StationOption = Annotated[
     ),
 ]
 WithCellOption = Annotated[
-    bool, typer.Option("--with-cell", help="Start a virtual cell for it, over loopback, in real time.")
+    bool, typer.Option("--with-cell", help="Start a virtual cell on loopback, in real time.")
 ]
-YesOption = Annotated[bool, typer.Option("--yes", help="Do not ask before a real robot moves.")]
+YesOption = Annotated[
+    bool, typer.Option("--yes", help="Do not ask for confirmation before a real robot moves.")
+]
 SetOption = Annotated[
     list[str] | None,
-    typer.Option("--set", metavar="KEY=VALUE", help="Change a value, as station.payload=0; repeatable."),
+    typer.Option(
+        "--set",
+        metavar="KEY=VALUE",
+        help="Set a value of the scenario, for example station.payload=0; repeatable.",
+    ),
 ]
 RobotOption = Annotated[
     str | None,
@@ -53,7 +59,9 @@ PayloadOption = Annotated[
         "--payload", metavar="KG", help="Mass at the flange.", show_default="the largest it may carry"
     ),
 ]
-GridOption = Annotated[int, typer.Option("--grid", metavar="N", help="Positions of axis 2, and of axis 3.")]
+GridOption = Annotated[
+    int, typer.Option("--grid", metavar="N", help="Grid points along each of the axes 2 and 3.")
+]
 FeedforwardOption = Annotated[
     str | None,
     typer.Option(
@@ -77,15 +85,15 @@ LapsOption = Annotated[
     typer.Option(
         "--laps",
         metavar="N",
-        help="How often the path is run within a run; a law keeps what it has learnt.",
+        help="Laps of the path within one run; a law keeps what it has learnt.",
         show_default="the scenario's",
     ),
 ]
 JobsOption = Annotated[
     int | None,
-    typer.Option("--jobs", metavar="N", help="Processes at a time.", show_default="one per core"),
+    typer.Option("--jobs", metavar="N", help="Number of parallel processes.", show_default="one per core"),
 ]
-OutOption = Annotated[Path, typer.Option("--out", metavar="DIR", help="Where the results go.")]
+OutOption = Annotated[Path, typer.Option("--out", metavar="DIR", help="Folder of the results.")]
 PictureOption = Annotated[Path, typer.Option(metavar="FILE.html", help="The picture.")]  # --out or --report
 
 

@@ -1,4 +1,4 @@
-"""From what was typed to something that can run, or a refusal before anything has run."""
+"""Prepares a run from command-line options; wrong input is refused before anything runs."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace

@@ -1,4 +1,4 @@
-"""Work spread over processes, with progress, and with one who decides when it ends."""
+"""Distributes work over processes, with progress and a clean end on Ctrl-C."""
 
 import multiprocessing
 import os
@@ -19,7 +19,7 @@ Progress = Callable[[float], None]
 
 
 class SimulationError(RuntimeError):
-    """A run broke off, for example because the integrator could not go on."""
+    """A run was aborted, for example because the integrator failed."""
 
 
 def in_processes(

@@ -1,1 +1,1 @@
-"""Laws side by side on one scenario, and their numbers."""
+"""Comparison of laws on one scenario."""

@@ -1,4 +1,4 @@
-"""The result in one picture: the distance of the true tip from its path over time, as an SVG file."""
+"""The result as a figure: the distance of the true tip from its path over time, as an SVG file."""
 
 import math
 from collections.abc import Mapping

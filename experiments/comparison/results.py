@@ -1,4 +1,4 @@
-"""The files that a comparison or a single run leaves in its folder."""
+"""The result files of a comparison or a single run."""
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""What a Drake diagram consists of, read from the diagram itself: systems, the ports in use, connections."""
+"""The structure of a Drake diagram: systems, connected ports and connections."""
 
 from dataclasses import dataclass, field
 

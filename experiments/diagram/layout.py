@@ -1,4 +1,4 @@
-"""Where the blocks of a diagram stand on a page, and how its wires run between them.
+"""Layout of a block diagram: placement of blocks and routing of wires.
 
 Blocks stand in columns, so that wires run from left to right through the channels between the columns; a
 wire that closes a loop runs back in a lane below. Lengths are in pixels, y points down.

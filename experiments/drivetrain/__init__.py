@@ -1,1 +1,1 @@
-"""``truetip drivetrain``: what drive trains are made of, as figures."""
+"""``truetip drivetrain``: figures of the drive-train models."""

@@ -1,4 +1,4 @@
-"""``truetip drivetrain``: pictures of the models that drive trains are made of."""
+"""``truetip drivetrain``: figures of the drive-train models."""
 
 from contextlib import ExitStack
 from pathlib import Path

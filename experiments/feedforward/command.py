@@ -41,9 +41,11 @@ def feedforward_command(
     grid: GridOption = 7,
     stiffness_error: Annotated[
         float,
-        typer.Option(metavar="SHARE", help="By which the models' springs and dampers are too stiff."),
+        typer.Option(
+            metavar="SHARE", help="Relative error of the models' springs and dampers; positive is too stiff."
+        ),
     ] = 0.0,
-    out: Annotated[Path, typer.Option("--out", metavar="DIR", help="Where the pictures go.")] = Path("out"),
+    out: Annotated[Path, typer.Option("--out", metavar="DIR", help="Folder of the figures.")] = Path("out"),
     json_file: JsonOption = None,
     jobs: JobsOption = None,
 ) -> None:

@@ -47,7 +47,7 @@ class RectangleTrial:
 
 @dataclass(frozen=True)
 class Deviation:
-    """How far the tip is from where it shall be."""
+    """Deviation of the tip from its desired position."""
 
     time: np.ndarray  # (n,) s
     distance: np.ndarray  # (n,) m

@@ -20,7 +20,7 @@ ANGLES_DEG = (5, 20)  # of the motions
 
 @dataclass(frozen=True)
 class FeedforwardStudy:
-    """What came of it; a grid has n positions of axis 2 and of axis 3, the other axes stand at zero."""
+    """The results of a study; a grid has n positions each of axes 2 and 3, the other axes are at zero."""
 
     robot: RobotModel
     payload: float  # kg

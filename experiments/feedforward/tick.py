@@ -1,4 +1,4 @@
-"""How long a tick of an inverse model takes, as part of a diagram."""
+"""Run time of one tick of an inverse model within a diagram."""
 
 import time
 from collections.abc import Callable

@@ -108,7 +108,10 @@ def chain_command(
     files: FilesArgument,
     unit: UnitOption = "mm",
     is_closed: Annotated[
-        bool, typer.Option("--closed", help="The last frame is the first one again: show the closing error.")
+        bool,
+        typer.Option(
+            "--closed", help="The chain is closed: the last frame is the first; report the closing error."
+        ),
     ] = False,
     json_file: JsonOption = None,
 ) -> None:
@@ -145,9 +148,7 @@ def tool_command(
     unit: UnitOption = "mm",
     angles: AnglesOption = "deg",
     orientation: OrientationOption = "ZYX",
-    without_outliers: Annotated[
-        bool, typer.Option("--without-outliers", help="Leave out the poses that do not belong to the rest.")
-    ] = False,
+    without_outliers: Annotated[bool, typer.Option("--without-outliers", help="Exclude outliers.")] = False,
     json_file: JsonOption = None,
 ) -> None:
     """The tool centre point by pivoting: the tip stays on one spot, every line is a pose of the flange."""
@@ -192,7 +193,11 @@ def align_command(
         str | None, typer.Option(metavar="POSE", help="The camera in the robot's base, if known: x;y;z;...")
     ] = None,
     camera_on_flange: Annotated[
-        bool, typer.Option("--camera-on-flange", help="The robot carries the camera; the body stands still.")
+        bool,
+        typer.Option(
+            "--camera-on-flange",
+            help="Hand-eye calibration: the camera is on the flange, the target is fixed.",
+        ),
     ] = False,
     rotation_sigma_deg: Annotated[
         float, typer.Option(metavar="DEG", help="Assumed scatter of the camera about an axis.")

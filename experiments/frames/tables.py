@@ -1,4 +1,4 @@
-"""Frames, tools and alignments as people read them: in mm and degrees, on a terminal and as JSON."""
+"""Frames, tools and alignments in mm and degrees, as terminal tables and as JSON."""
 
 import math
 from collections.abc import Mapping

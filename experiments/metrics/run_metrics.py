@@ -1,4 +1,4 @@
-"""From the log of a run to the numbers that judge it.
+"""Error metrics computed from the log of a run.
 
 The error of the tip is e = (rotation vector, translation) of `robots.pose.pose_error`, Probst (2024)
 eqs. (2.36) and (2.37), axis by axis in the world. It is counted twice: *true*, what a perfect instrument

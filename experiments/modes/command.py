@@ -37,20 +37,20 @@ def modes_command(
         str, typer.Option(metavar="NAME", help="structure, or joints for elastic gears alone.")
     ] = "structure",
     grid: GridOption = 25,
-    mode: Annotated[int, typer.Option(metavar="N", help="The mode that is animated, from 1.")] = 1,
+    mode: Annotated[int, typer.Option(metavar="N", help="Number of the animated mode, from 1.")] = 1,
     out: PictureOption = Path("out/modes.html"),
     animation: Annotated[
         Path | None,
         typer.Option(
             metavar="FILE.html",
-            help="The mode in motion, stretched.",
+            help="Animation of the mode, arm stretched.",
             show_default="beside --out, as out/modes-animation.html",
         ),
     ] = None,
     json_file: JsonOption = None,
     meshcat: Annotated[bool, typer.Option("--meshcat", help="Show the motion live in a browser.")] = False,
 ) -> None:
-    """Find out how fast a robot swings with its motors held, and which joints yield."""
+    """Compute the natural frequencies and mode shapes of a robot with its motors held."""
     human = human_console(json_file)
     with json_output(json_file) as output, refusing(ValueError, OSError), ExitStack() as stack:
         model = load_robot(robot)

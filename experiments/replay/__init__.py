@@ -1,1 +1,1 @@
-"""The robot in motion, live or recorded, in meshcat."""
+"""Animation of the robot in Meshcat, live or recorded."""

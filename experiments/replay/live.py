@@ -1,4 +1,4 @@
-"""A run that one can watch: the robot in a browser while it is simulated."""
+"""Live view of a run: the robot in a browser while it is simulated."""
 
 from collections.abc import Callable
 

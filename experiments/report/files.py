@@ -1,4 +1,4 @@
-"""Writing a result so that a reader finds the old file or the new one, never half of one."""
+"""Atomic writing of result files."""
 
 import json
 import os

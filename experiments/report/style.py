@@ -1,4 +1,4 @@
-"""How laws look and what they are called, the same in the table, the report and the replay."""
+"""Titles and colours of the laws, common to table, report and replay."""
 
 import re
 from collections.abc import Iterable

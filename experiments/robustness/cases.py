@@ -1,4 +1,4 @@
-"""The cases in which laws are tried: the plain scenario, and one thing after another made worse."""
+"""Test cases for robustness: the plain scenario, and one property of the station degraded at a time."""
 
 from experiments.robustness.study import Case
 

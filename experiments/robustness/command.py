@@ -24,24 +24,26 @@ PATHS = ("rectangle", "circle", "figure_eight")
 
 
 def robustness_command(
-    scenario: Annotated[str, typer.Option(metavar="NAME|FILE", help="What is drawn anew for each seed.")] = (
-        "everything"
-    ),
-    laws: Annotated[str, typer.Option(metavar="A,B", help="Laws, with commas.")] = "open_loop,numerical_ik",
+    scenario: Annotated[
+        str, typer.Option(metavar="NAME|FILE", help="Properties drawn at random for each seed.")
+    ] = ("everything"),
+    laws: Annotated[
+        str, typer.Option(metavar="A,B", help="Comma-separated laws.")
+    ] = "open_loop,numerical_ik",
     cases: Annotated[
         str, typer.Option(metavar="A,B", help=f"With commas: {', '.join(CASES)}; or all.")
     ] = "plain",
     paths: Annotated[
         str, typer.Option(metavar="A,B", help=f"With commas: {', '.join(PATHS)}.")
     ] = "rectangle",
-    seeds: Annotated[int, typer.Option(metavar="N", help="Robots, each with noise of its own.")] = 3,
-    first_seed: Annotated[int, typer.Option(metavar="N", help="The first of the seeds.")] = 1000,
-    laps: Annotated[int, typer.Option(metavar="N", help="How often each path is run.")] = 1,
+    seeds: Annotated[int, typer.Option(metavar="N", help="Number of random robots.")] = 3,
+    first_seed: Annotated[int, typer.Option(metavar="N", help="First seed.")] = 1000,
+    laps: Annotated[int, typer.Option(metavar="N", help="Laps of the path in each run.")] = 1,
     settings: SetOption = None,
     jobs: JobsOption = None,
     json_file: JsonOption = None,
 ) -> None:
-    """Run laws on random robots and print what is left in the worst case and in the median."""
+    """Run laws on random robots and print the worst and the median error."""
     human = human_console(json_file)
     with refusing(ValueError):
         for name, value in (("--seeds", seeds), ("--laps", laps), ("--jobs", jobs)):

@@ -16,7 +16,7 @@ from experiments.metrics.run_metrics import error_metrics, pose_errors
 
 @dataclass(frozen=True)
 class Case:
-    """A way in which a station is hard on a law."""
+    """A degraded station."""
 
     name: str
     settings: tuple[str, ...] = ()  # of the scenario, as ``--set`` takes them

@@ -34,15 +34,15 @@ def cell_command(
         ),
     ] = None,
     duration: Annotated[
-        float | None, typer.Option(metavar="S", help="Ends after so many seconds; without it, at Ctrl-C.")
+        float | None, typer.Option(metavar="S", help="Stop after this time; by default at Ctrl-C.")
     ] = None,
     truth: Annotated[
         str | None,
-        typer.Option(metavar="FILE.npz", help="The true motion by the controller's time stamps."),
+        typer.Option(metavar="FILE.npz", help="Record of the true motion, by the controller's time stamps."),
     ] = None,
     json_file: Annotated[str | None, json_option("How it ran, at the end.")] = None,
     announce: Annotated[
-        bool, typer.Option("--announce", help="First print one line of JSON with the ports, for a program.")
+        bool, typer.Option("--announce", help="Print the ports as one line of JSON first, for scripts.")
     ] = False,
 ) -> None:
     """Run a virtual robot cell in real time: a controller under EGM and a camera server."""
@@ -102,7 +102,7 @@ def fault_settings(faults: str | None) -> list[str]:
 
 
 def print_statistics(console: Console, statistics: CellStatistics) -> None:
-    """Says how a cell has run."""
+    """Prints the statistics of a cell."""
     lateness = 1e3 * statistics.worst_lateness
     console.print(
         f"{count(statistics.cycles, 'cycle')}, {statistics.late} of them more than 1 ms late (worst "
@@ -128,7 +128,7 @@ def _camera_config(scenario: Scenario) -> CameraServerConfig:
 
 
 class _Stop:
-    """The end of a cell: a duration, Ctrl-C or a signal."""
+    """The stop condition of a cell: a duration, Ctrl-C or a signal."""
 
     def __init__(self, duration: float | None) -> None:
         self._duration, self._is_asked = duration, False

@@ -82,7 +82,7 @@ def station_clients(
 
 
 class CellBeside:
-    """``truetip cell`` in a process of its own, which this process learns nothing from but its ports."""
+    """``truetip cell`` in a separate process, which shares nothing with this one but its ports."""
 
     def __init__(self, scenario: Scenario, port: int, signal_port: int = 0) -> None:
         """Prepares it; `__enter__` starts it.

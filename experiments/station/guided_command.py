@@ -109,7 +109,7 @@ def write_log(path: Path, record: RealTimeRecord) -> None:
 
 
 def print_link(console: Console, link: dict[str, Any]) -> None:
-    """Says how the wire and the run were, a line for each run."""
+    """Prints the statistics of the connection, a line for each run."""
     for law, runs in link["runs"].items():
         for run in runs:
             turn = run["turn_around_ms"]

@@ -1,4 +1,4 @@
-"""From what was said and seen to delays: by how much must one motion be shifted to lie on the other?"""
+"""Delays from recorded motions: the time shift at which one motion matches the other."""
 
 from dataclasses import dataclass
 from typing import Any

@@ -1,4 +1,4 @@
-"""``truetip latency``: how late a station is, and where."""
+"""``truetip latency``: measures the delays of a station."""
 
 from contextlib import ExitStack
 from pathlib import Path
@@ -36,9 +36,9 @@ def latency_command(
     settings: SetOption = None,
     with_cell: WithCellOption = False,
     yes: YesOption = False,
-    joint: Annotated[int, typer.Option(metavar="N", help="The joint that is moved.")] = 1,
-    amplitude: Annotated[float, typer.Option(metavar="DEG", help="By how much, to each side.")] = 4.0,
-    duration: Annotated[float, typer.Option(metavar="S", help="For how long.")] = 20.0,
+    joint: Annotated[int, typer.Option(metavar="N", help="Joint to move.")] = 1,
+    amplitude: Annotated[float, typer.Option(metavar="DEG", help="Amplitude of the motion.")] = 4.0,
+    duration: Annotated[float, typer.Option(metavar="S", help="Duration of the motion.")] = 20.0,
     report: PictureOption = Path("out/latency.html"),
     write: Annotated[
         str | None,
