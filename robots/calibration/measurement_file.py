@@ -8,8 +8,6 @@ One row a measurement, separated by commas or semicolons, lines that begin with 
 known. Other columns are left alone. A configuration may be there more than once.
 """
 
-import csv
-import io
 import math
 from dataclasses import dataclass
 from pathlib import Path
@@ -20,6 +18,7 @@ from scipy.spatial.transform import Rotation
 from robots.calibration.measurements import Measurements
 from robots.description.model import NUM_JOINTS
 from robots.pose import rotation_from_zyx
+from robots.text_table import TextTable, TextTableError, finite_number, parse_fields, read_text
 
 _JOINTS = tuple(f"q{number}" for number in range(1, NUM_JOINTS + 1))
 _AXES, _QUATERNION, _EULER = ("x", "y", "z"), ("qw", "qx", "qy", "qz"), ("alpha", "beta", "gamma")
@@ -50,34 +49,28 @@ def read_measurements(path: str | Path) -> tuple[Measurements, list[RowProblem]]
             explains, or has no usable row.
     """
     try:
-        text = Path(path).read_text(encoding="utf-8-sig")
-    except (OSError, UnicodeDecodeError) as error:
-        raise MeasurementFileError(f"measurements {path}: cannot be read: {error}") from error
+        return parse_measurements(read_text(path), str(path))
+    except TextTableError as error:
+        raise MeasurementFileError(f"measurements {error}") from error
+
+
+def parse_measurements(text: str, name: str = "table") -> tuple[Measurements, list[RowProblem]]:
+    """Reads a table from its text, as `read_measurements`; ``name`` is where it came from."""
     try:
-        return parse_measurements(text)
+        table = parse_fields(text, name, has_head=True)
+    except TextTableError as error:
+        raise MeasurementFileError(f"measurements {error}") from error
+    try:
+        return _measurements(table)
     except MeasurementFileError as error:
-        raise MeasurementFileError(f"measurements {path}: {error}") from error
+        raise MeasurementFileError(f"measurements {name}: {error}") from error
 
 
-def parse_measurements(text: str) -> tuple[Measurements, list[RowProblem]]:
-    """Reads a table from its text, as `read_measurements`."""
-    lines = [
-        (number, line)
-        for number, line in enumerate(text.splitlines(), 1)
-        if line.strip() and not line.lstrip().startswith("#")
-    ]
-    if not lines:
-        raise MeasurementFileError("the table is empty")
-    separator = ";" if ";" in lines[0][1] else ","
-    try:
-        cells = list(csv.reader(io.StringIO("\n".join(line for _, line in lines)), delimiter=separator))
-    except csv.Error as error:
-        raise MeasurementFileError(f"no table: {error}") from error
-    header = [name.strip() for name in cells[0]]
-    columns = _Columns(header)
+def _measurements(table: TextTable) -> tuple[Measurements, list[RowProblem]]:
+    columns = _Columns(table.rows[0])
     problems: list[RowProblem] = []
     rows, numbers = [], []
-    for (line, _), row in zip(lines[1:], cells[1:], strict=False):
+    for line, row in zip(table.lines[1:], table.rows[1:], strict=True):
         try:
             values = columns.numbers(row)
         except ValueError as error:

@@ -13,6 +13,8 @@ from pathlib import Path
 
 import numpy as np
 
+from robots.text_table import TextTableError, parse_fields, read_text
+
 _NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?")
 _FRACTION = re.compile(r"\d+([eE][+-]?\d+)?")
 _DECIMAL_COMMA = re.compile(r"[+-]?(\d+,\d*|,\d+)([eE][+-]?\d+)?")
@@ -55,11 +57,9 @@ def read_table(path: str | Path) -> NumberTable:
             is not a finite number.
     """
     try:
-        text = Path(path).read_text(encoding="utf-8-sig")
-    except UnicodeDecodeError as error:
-        raise NumberFileError(f"{path}: not a text file in UTF-8") from error
-    except OSError as error:
-        raise NumberFileError(f"{path}: {(error.strerror or str(error)).lower()}") from error
+        text = read_text(path)
+    except TextTableError as error:
+        raise NumberFileError(str(error)) from error
     return parse_table(text, str(path))
 
 
@@ -69,28 +69,17 @@ def parse_table(text: str, name: str) -> NumberTable:
     Raises:
         NumberFileError: see `read_table`.
     """
-    numbered = [(number, line.split("#")[0].strip()) for number, line in enumerate(text.splitlines(), 1)]
-    lines = {number: line for number, line in numbered if line}
-    if not lines:
-        raise NumberFileError(f"{name}: no measurements, only comments or blank lines")
-    separator = _separator(list(lines.values()))
-    fields = {number: [field.strip() for field in line.split(separator)] for number, line in lines.items()}
+    try:
+        table = parse_fields(text, name, has_head=False)
+    except TextTableError as error:
+        raise NumberFileError(str(error)) from error
+    fields, separator = dict(zip(table.lines, table.rows, strict=True)), table.separator
     _refuse_ragged_rows(name, fields)
     if separator == ",":
         _refuse_hidden_decimal_commas(name, fields)
     _refuse_two_decimal_marks(name, fields)
     values = [[_number(name, line, field) for field in row] for line, row in fields.items()]
     return NumberTable(name, np.array(values), tuple(fields))
-
-
-def _separator(lines: Sequence[str]) -> str | None:
-    if any(";" in line for line in lines):
-        return ";"
-    # "1,5 2,0" are decimal commas between blanks; "1, 5, 2" has a comma in front of every blank.
-    if any("," in line for line in lines):
-        between_blanks = all(re.search(r"[^,\s]\s+[^,\s]", line) for line in lines)
-        return None if between_blanks else ","
-    return None
 
 
 def _refuse_ragged_rows(name: str, fields: dict[int, list[str]]) -> None:

@@ -113,7 +113,7 @@ def test_bad_rows_are_named_and_do_no_harm(calibrated: Path, tmp_path: Path):
         (["calibrate", "--noise", "loud"], "--noise must be estimate, source or the path of a YAML file"),
         (["calibrate", "--measurements", "x.csv", "--count", "30"], "--count is for simulated measurements"),
         (["calibrate", "--validation", "x.csv"], "--validation needs --measurements"),
-        (["calibrate", "--measurements", "none.csv"], "measurements none.csv: cannot be read"),
+        (["calibrate", "--measurements", "none.csv"], "measurements none.csv: no such file"),
         (["calibrate", "--count", "2"], "--count must be at least 5, got 2"),
     ],
 )

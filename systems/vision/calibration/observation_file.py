@@ -8,12 +8,12 @@ of how many in ``mean_of``. Exposures of the wand are its places.
 
 import csv
 import io
-import math
 from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
 
+from robots.text_table import TextTableError, finite_number, parse_fields, read_text
 from systems.vision.calibration.wand import WandRun
 
 COLUMNS = ("exposure", "camera", "point", "u_px", "v_px")
@@ -30,16 +30,10 @@ def read_observations(path: str | Path, cameras: Sequence[str], frame_points: in
         frame_points: number of spheres of the frame.
 
     Raises:
-        ValueError: if the file is missing, a column is, or a line says what cannot be; one line that says
+        TextTableError: if the file is missing, a column is, or a line says what cannot be; one line that says
             which.
     """
-    try:
-        text = Path(path).read_text(encoding="utf-8-sig")
-    except UnicodeDecodeError as error:
-        raise ValueError(f"{path}: not a text file in UTF-8") from error
-    except OSError as error:
-        raise ValueError(f"{path}: {(error.strerror or str(error)).lower()}") from error
-    return parse_observations(text, str(path), cameras, frame_points)
+    return parse_observations(read_text(path), str(path), cameras, frame_points)
 
 
 def parse_observations(text: str, name: str, cameras: Sequence[str], frame_points: int) -> WandRun:
@@ -49,23 +43,22 @@ def parse_observations(text: str, name: str, cameras: Sequence[str], frame_point
     camera_of = {camera: index for index, camera in enumerate(cameras)}
     frame: dict[tuple[int, int], list[tuple[float, float, int]]] = {}
     wand: dict[tuple[int, str, int], tuple[float, float]] = {}
-    for line, row in rows:
-        where = f"{name}, line {line}"
+    for where, row in rows:
         camera, point = row["camera"], row["point"]
         if camera not in camera_of:
-            raise ValueError(f"{where}: camera '{camera}' is none of the cell: {', '.join(cameras)}")
+            raise TextTableError(f"{where}: camera '{camera}' is none of the cell: {', '.join(cameras)}")
         if point not in points:
-            raise ValueError(f"{where}: point '{point}' must be one of {', '.join(points)}")
+            raise TextTableError(f"{where}: point '{point}' must be one of {', '.join(points)}")
         pixel = _number(row["u_px"], where, "u_px"), _number(row["v_px"], where, "v_px")
         mean_of = _count(row.get(MEAN_OF, "1"), where)
         if point not in ENDS:
             frame.setdefault((camera_of[camera], int(point[1:]) - 1), []).append((*pixel, mean_of))
             continue
         if mean_of != 1:
-            raise ValueError(f"{where}: the wand moves, {MEAN_OF} must be 1 for {point}, got {mean_of}")
+            raise TextTableError(f"{where}: the wand moves, {MEAN_OF} must be 1 for {point}, got {mean_of}")
         key = camera_of[camera], row["exposure"], ENDS.index(point)
         if key in wand:
-            raise ValueError(f"{where}: camera {camera} has seen {point} in exposure {key[1]} already")
+            raise TextTableError(f"{where}: camera {camera} has seen {point} in exposure {key[1]} already")
         wand[key] = pixel
     place_of = {exposure: index for index, exposure in enumerate(dict.fromkeys(key[1] for key in wand))}
     frame_pixels = np.full((len(cameras), frame_points, 2), np.nan)
@@ -97,38 +90,34 @@ def _written(pixel: np.ndarray) -> list[str]:
     return [f"{value:.6f}" for value in pixel]
 
 
-def _rows(text: str, name: str) -> list[tuple[int, dict[str, str]]]:
-    """The lines with their numbers, as columns and fields."""
-    lines = [(number, line) for number, line in enumerate(text.splitlines(), 1) if line.strip()]
-    if len(lines) < 2:
-        raise ValueError(f"{name}: no observations")
-    separator = ";" if ";" in lines[0][1] else ","
-    head, *body = [(number, [field.strip() for field in line.split(separator)]) for number, line in lines]
+def _rows(text: str, name: str) -> list[tuple[str, dict[str, str]]]:
+    """Where each row stands in the file, and its fields by the names of their columns."""
+    table = parse_fields(text, name, has_head=True)
+    head, *body = table.rows
     for column in COLUMNS:
-        if head[1].count(column) != 1:
-            raise ValueError(
-                f"{name}, line {head[0]}: needs one column '{column}' of {', '.join(COLUMNS)}, "
-                f"got {', '.join(head[1])}"
+        if head.count(column) != 1:
+            raise TextTableError(
+                f"{table.where(0)}: needs one column '{column}' of {', '.join(COLUMNS)}, "
+                f"got {', '.join(head)}"
             )
-    for number, fields in body:
-        if len(fields) != len(head[1]):
-            raise ValueError(
-                f"{name}, line {number}: {len(fields)} fields, the head has {len(head[1])} (decimal commas?)"
+    if not body:
+        raise TextTableError(f"{name}: no observations")
+    for row, fields in enumerate(body, 1):
+        if len(fields) != len(head):
+            raise TextTableError(
+                f"{table.where(row)}: {len(fields)} fields, the head has {len(head)} (decimal commas?)"
             )
-    return [(number, dict(zip(head[1], fields, strict=True))) for number, fields in body]
+    return [(table.where(row), dict(zip(head, fields, strict=True))) for row, fields in enumerate(body, 1)]
 
 
 def _number(field: str, where: str, column: str) -> float:
-    try:
-        value = float(field)
-    except ValueError:
-        value = math.nan
-    if not math.isfinite(value):
-        raise ValueError(f"{where}: {column} must be a finite number with a decimal point, got '{field}'")
+    value = finite_number(field)
+    if value is None:
+        raise TextTableError(f"{where}: {column} must be a finite number with a decimal point, got '{field}'")
     return value
 
 
 def _count(field: str, where: str) -> int:
     if not field.isascii() or not field.isdigit() or int(field) < 1:
-        raise ValueError(f"{where}: {MEAN_OF} must be a number of exposures, one or more, got '{field}'")
+        raise TextTableError(f"{where}: {MEAN_OF} must be a number of exposures, one or more, got '{field}'")
     return int(field)

@@ -108,7 +108,7 @@ def test_standard_deviations_of_rows_come_back_in_any_unit():
 
 
 def test_a_missing_file_is_named(tmp_path: Path):
-    with pytest.raises(MeasurementFileError, match=r"nothing\.csv: cannot be read"):
+    with pytest.raises(MeasurementFileError, match=r"nothing\.csv: no such file"):
         read_measurements(tmp_path / "nothing.csv")
 
 

@@ -47,7 +47,7 @@ def test_any_text_is_either_read_or_refused(text: str):
 
 
 UNREADABLE = {
-    "empty": ("# nothing\n\n", "no measurements"),
+    "empty": ("# nothing\n\n", "the table is empty"),
     "word": ("1;2;3\n4;x;6", "line 2: 'x' is not a finite number"),
     "heading": ("x;y;z\n1;2;3", "line 1: 'x' is not a finite number"),
     "nan": ("1;2;3\n# comment\n4;nan;6", "line 3: 'nan' is not a finite number"),

@@ -51,7 +51,7 @@ def test_a_mean_counts_as_often_as_it_says():
 HEAD = "exposure,camera,point,u_px,v_px\n"
 MEANS = "exposure,camera,point,u_px,v_px,mean_of\n"
 REFUSED = {
-    "empty": ("", "x: no observations"),
+    "empty": ("", "x: the table is empty"),
     "head only": (HEAD, "x: no observations"),
     "column": ("exposure,camera,point,u_px\n1,left,A,2\n", "x, line 1: needs one column 'v_px'"),
     "camera": (

@@ -1,0 +1,99 @@
+"""Tables in text files: lines of fields with their line numbers, for every reader of measurements.
+
+Fields are separated by ``;``, by ``,`` or by blanks, the same in the whole file; ``#`` begins a comment. What
+the fields mean, their units and their ranges are checked by the reader of each kind of file, whose messages
+name file and line through `TextTable.where`.
+"""
+
+import csv
+import math
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+
+class TextTableError(ValueError):
+    """A file cannot be read as a table; the message names the file and, if there is one, the line."""
+
+
+@dataclass(frozen=True)
+class TextTable:
+    """The fields of a file, one row a line."""
+
+    name: str  # of the file
+    separator: str | None  # None for blanks
+    rows: list[list[str]]  # stripped
+    lines: list[int]  # of the rows, from one
+
+    def where(self, row: int) -> str:
+        """File and line of a row."""
+        return f"{self.name}, line {self.lines[row]}"
+
+
+def read_text(path: str | Path) -> str:
+    """The text of a file in UTF-8, with or without byte order mark.
+
+    Raises:
+        TextTableError: if it is missing, cannot be read or is not text.
+    """
+    try:
+        return Path(path).read_text(encoding="utf-8-sig")
+    except UnicodeDecodeError as error:
+        raise TextTableError(f"{path}: not a text file in UTF-8") from error
+    except OSError as error:
+        raise TextTableError(f"{path}: {(error.strerror or str(error)).lower()}") from error
+
+
+def parse_fields(text: str, name: str, has_head: bool) -> TextTable:
+    """Splits a text into fields.
+
+    Args:
+        text: the table.
+        name: of the file, for messages.
+        has_head: whether the first row names the columns. Its separator then is that of the file, fields
+            may be quoted, and only whole lines are comments, because a column of remarks may hold a ``#``.
+
+    Raises:
+        TextTableError: if there is no row, or quotes cannot be matched.
+    """
+    numbered = list(enumerate(text.splitlines(), 1))
+    if has_head:
+        kept = [(number, line) for number, line in numbered if not line.lstrip().startswith("#")]
+    else:
+        kept = [(number, line.split("#")[0]) for number, line in numbered]
+    kept = [(number, line.strip()) for number, line in kept if line.strip()]
+    if not kept:
+        raise TextTableError(f"{name}: the table is empty: there are only comments or blank lines")
+    separator = _separator([line for _, line in (kept[:1] if has_head else kept)])
+    rows = []
+    for number, line in kept:
+        try:
+            fields = (
+                next(csv.reader([line], delimiter=separator))
+                if has_head and separator
+                else line.split(separator)
+            )
+        except csv.Error as error:
+            raise TextTableError(f"{name}, line {number}: {error}") from error
+        rows.append([field.strip() for field in fields])
+    return TextTable(name, separator, rows, [number for number, _ in kept])
+
+
+def finite_number(field: str) -> float | None:
+    """The number in a field, written with a decimal point; None if there is none or it is not finite."""
+    try:
+        value = float(field)
+    except ValueError:
+        return None
+    return value if math.isfinite(value) else None
+
+
+def _separator(lines: Sequence[str]) -> str | None:
+    if any(";" in line for line in lines):
+        return ";"
+    # "1,5 2,0" are decimal commas between blanks; "1, 5, 2" has a comma in front of every blank.
+    if any("," in line for line in lines):
+        between_blanks = all(re.search(r"[^,\s]\s+[^,\s]", line) for line in lines)
+        return None if between_blanks else ","
+    return None
