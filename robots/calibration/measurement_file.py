@@ -134,13 +134,10 @@ class _Columns:
         """The numbers of a row in the units of the file. Raises ValueError."""
         values = []
         for place, name in zip(self._places, self._names, strict=True):
-            text = row[place].strip() if place < len(row) else ""
-            try:
-                value = float(text)
-            except ValueError:
-                raise ValueError(f"{name} is not a number: '{text}'") from None
-            if not math.isfinite(value):
-                raise ValueError(f"{name} is not finite: {text}")
+            text = row[place] if place < len(row) else ""
+            value = finite_number(text)
+            if value is None:
+                raise ValueError(f"{name} is not a finite number: '{text}'")
             if value < 0.0 and name == "payload_kg":
                 raise ValueError(f"payload_kg must not be negative, got {text}")
             if value <= 0.0 and name.startswith("sigma_"):

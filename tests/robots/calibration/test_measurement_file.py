@@ -83,11 +83,9 @@ def test_bad_rows_are_named_and_the_others_used():
     read, problems = parse_measurements("\n".join(lines))
     assert [problem.row for problem in problems] == [3, 4, 5, 8]
     assert [
-        next(
-            word for word in ("not finite", "not a number", "quaternion", "not be negative") if word in p.what
-        )
+        next(word for word in ("'nan'", "number: ''", "quaternion", "not be negative") if word in p.what)
         for p in problems
-    ] == ["not finite", "not a number", "quaternion", "not be negative"]
+    ] == ["'nan'", "number: ''", "quaternion", "not be negative"]
     np.testing.assert_array_equal(read.rows, [2, 6, 7])
 
 
