@@ -6,7 +6,7 @@ from pydrake.systems.framework import Context, Diagram, DiagramBuilder, OutputPo
 from pydrake.systems.primitives import Adder, ConstantVectorSource
 
 from diagrams.scenario.controller_model import controller_model
-from diagrams.scenario.scenario import Scenario
+from diagrams.scenario.scenario import Scenario, ScenarioError
 from diagrams.tick_clock import timed
 from robots.description.model import NUM_JOINTS, RobotModel
 from systems.controller_model import ControllerModel
@@ -61,6 +61,8 @@ class Servo(Diagram):
         self.drive = config.drive
         self.law = _built(law, self.model, config, scenario.servo.guard) if isinstance(law, type) else law
         check_ports(self.law)
+        if self.traits.uses_camera:
+            _refuse_slow_camera(scenario)
         builder = DiagramBuilder()
         self.reference = builder.AddNamedSystem("reference", Reference(scenario.reference, self.model.period))
         check_path = getattr(self.law, "check_path", None)  # of laws that cannot follow every path
@@ -151,6 +153,16 @@ class Servo(Diagram):
             builder.Connect(commands[name], total.get_input_port(0))
             builder.Connect(ahead.GetOutputPort(offset), total.get_input_port(1))
             commands[name] = total.get_output_port()
+
+
+def _refuse_slow_camera(scenario: Scenario) -> None:
+    """Refuses a camera between two samples of which the guard would hold every correction."""
+    period, patience = scenario.station.camera.period, scenario.servo.guard.hold_after
+    if period > patience:
+        raise ScenarioError(
+            f"station.camera.period={period:g} s must be at most servo.guard.hold_after={patience:g} s: "
+            "the guard holds the correction when no sample comes for so long"
+        )
 
 
 def law_config(scenario: Scenario, law: type[System] | System) -> LawConfig:

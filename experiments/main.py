@@ -12,7 +12,7 @@ from rich.markup import escape
 
 from diagrams.record.log import RunLog
 from diagrams.runs.simulation import Experiment
-from diagrams.scenario.scenario import load_scenario, shipped_scenarios
+from diagrams.scenario.scenario import Scenario, load_scenario, shipped_scenarios
 from experiments.calibration.calibrate_command import calibrate_command
 from experiments.calibration.design_command import design_command
 from experiments.cameras.command import cameras_app
@@ -60,6 +60,7 @@ from experiments.station.cell_command import cell_command
 from experiments.station.guided_command import ask_before_moving, guide, on_station
 from experiments.station.latency_command import latency_command
 from experiments.zeros.command import zeros_command
+from robots.configuration.described import described
 from robots.description.model import load_robot, shipped_robots
 from systems.servo import LAWS
 
@@ -265,8 +266,16 @@ app.command("align")(align_command)
 
 
 @app.command("scenarios")
-def scenarios_command() -> None:
-    """List the scenarios that come with truetip."""
+def scenarios_command(
+    shows_fields: Annotated[
+        bool, typer.Option("--fields", help="All fields of a scenario: default, range and unit, choices.")
+    ] = False,
+) -> None:
+    """List the scenarios that come with truetip, or what can stand in one."""
+    if shows_fields:
+        for row in described(Scenario()):
+            print(f"{row.path:<58} {row.default or '-':<24} {row.allowed}")
+        return
     print_list((name, load_scenario(name).description) for name in shipped_scenarios())
 
 

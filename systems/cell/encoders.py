@@ -7,6 +7,7 @@ from pydrake.symbolic import Expression, MakeVectorContinuousVariable, cos, sin
 from pydrake.systems.framework import BasicVector, Context, DiscreteValues, LeafSystem
 from pydrake.systems.primitives import SymbolicVectorSystem
 
+from robots.configuration.quantity import choice, quantity
 from robots.description.model import NUM_JOINTS, RobotModel
 
 SIDES = ("joint", "motor")
@@ -17,9 +18,11 @@ _MOST_BITS = 32
 class EncoderConfig:
     """How well the angles of the motors are known; read from a scenario file."""
 
-    side: str = "joint"  # of the gear on which the discs sit: joint or motor
-    bits: int = 0  # a turn of a disc has 2**bits steps; 0 for none, that is, exact angles
-    eccentricity_deg: float = 0.0  # largest error of a disc's angle, once a turn of it
+    side: str = choice("joint", SIDES)  # of the gear on which the discs sit
+    # A turn of a disc has 2**bits steps; 0 for none, that is, exact angles
+    bits: int = quantity(0, 0, _MOST_BITS)
+    # Largest error of a disc's angle, once a turn of it
+    eccentricity_deg: float = quantity(0.0, 0.0, 10.0, "deg")
     phase_deg: np.ndarray = field(default_factory=lambda: np.zeros(NUM_JOINTS))  # of that error at zero
 
 

@@ -142,6 +142,10 @@ def test_a_scenario_of_nothing_is_the_default(tmp_path: Path):
         ("station.drive.command_delay=0.001", ["command", "0.001"]),
         ("servo.guard.hold_after=0.9", ["hold_after", "0.9"]),
         (
+            "station.camera.period=0.1",
+            ["station.camera.period=0.1 s", "servo.guard.hold_after=0.05 s"],
+        ),
+        (
             "reference.path=square",
             ["reference.path must be one of rectangle, circle, figure_eight, points"],
         ),
