@@ -13,6 +13,8 @@ _WINDOW = 12.0  # samples of the running mean
 _SUSPICIOUS = 4.0, 1.0  # sigmas of the camera alone, of one sample and of the mean: below, nothing is to do
 _OUTLIER, _LONGEST_OUTLIER = 6.0, 5  # sigmas; and how many samples in a row may be so called
 _JUMP = 9.0  # sigmas of the mean
+_FIRST = 15  # samples, whose median is what the next ones are compared with
+_MARGIN = np.repeat([3e-3, 1e-3], 3)  # rad and m, what the first linearisations may be wrong by
 _PAUSE = 50  # samples after an event before the next one
 _EXPLAINED = 0.15  # what a cause leaves of the mean error if it is the cause
 
@@ -41,7 +43,32 @@ class Innovations:
     def __init__(self, variances: np.ndarray) -> None:
         """Takes the variances of one sample, (6,)."""
         self._variances = variances
-        self.layout = Layout(mean=(6,), error=(6,), outliers=(1,), pause=(1,))
+        self.layout = Layout(mean=(6,), error=(6,), outliers=(1,), pause=(1,), seen=(1,), first=(_FIRST, 6))
+
+    def is_false_start(
+        self, memory: SimpleNamespace, r: np.ndarray, H: np.ndarray, solve: Callable[[], np.ndarray]
+    ) -> bool:
+        """Whether one of the first innovations is an outlier, or too early to tell. Arguments as of `judge`.
+
+        The very first samples only say where the others have to be: nothing is known then that would tell a
+        reflection from a robot that is elsewhere.
+        """
+        seen = int(memory.seen[0])
+        if seen < _FIRST:
+            memory.first[seen] = r
+            memory.seen[0] += 1.0
+            return True
+        if seen < 2 * _FIRST:
+            memory.seen[0] += 1.0
+            return bool((np.abs(r - np.median(memory.first, axis=0)) > _OUTLIER * _MARGIN).any())
+        spread = _MARGIN
+        if (np.abs(r) > _OUTLIER * _MARGIN).any():
+            spread = np.sqrt(self._variances + _MARGIN**2 + np.einsum("ij,ji->i", H, solve()))
+        if (np.abs(r) < _OUTLIER * spread).all() or memory.outliers[0] >= _LONGEST_OUTLIER:
+            memory.outliers[0] = 0.0
+            return False
+        memory.outliers[0] += 1.0
+        return True
 
     def judge(
         self, memory: SimpleNamespace, r: np.ndarray, H: np.ndarray, solve: Callable[[], np.ndarray]

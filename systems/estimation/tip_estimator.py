@@ -115,15 +115,16 @@ class TipEstimator:
         found = self.predict(memory, pair)
         r, H = pose_error(pair.X_WE, found.X_WE[0]), found.H[0]
         weight = 1.0 / (1.0 + (pair.unrest / config.calm) ** 2)
-        event = None
-        if memory.count[0] > config.test_after and weight > 0.2:
-            verdict = self._innovations.judge(
-                memory.innovations, r, H, lambda: self._solve_columns(memory, H)
-            )
+        event, innovations = None, memory.innovations
+        if memory.count[0] <= config.test_after:
+            if self._innovations.is_false_start(innovations, r, H, lambda: self._solve_columns(memory, H)):
+                return None
+        else:
+            verdict = self._innovations.judge(innovations, r, H, lambda: self._solve_columns(memory, H))
             if verdict.is_outlier:
                 return None
-            if verdict.has_jumped:
-                event = self._innovations.explain(memory.innovations, H, self.model)
+            if verdict.has_jumped and weight > 0.2:
+                event = self._innovations.explain(innovations, H, self.model)
                 self._widen(memory)
         y = r + H @ memory.xi
         weighted = (weight * self._weights)[:, None] * H
