@@ -147,6 +147,9 @@ def test_what_the_readme_shows_can_be_run(tmp_path):
     for command in commands:
         words = command.split()
         settings = [value for option, value in pairwise(words) if option == "--set"]
+        # The cell of the example is a file that another command writes.
+        settings += [f"station.camera={value}" for option, value in pairwise(words) if option == "--camera"]
+        settings = [setting.replace("=cell.yaml", "=probst") for setting in settings]
         name = "mine.yaml" if "--scenario" in words else "misaligned"
         check(prepare(name, settings), ["pbvs"])
 
