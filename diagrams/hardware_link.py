@@ -6,14 +6,9 @@ from collections.abc import Callable
 import numpy as np
 
 from diagrams.scenario.scenario import Scenario
-from robots.description.model import NUM_JOINTS, RobotModel
-from systems.link.abb.channel import steady_time
-from systems.link.abb.client import EgmClient
-from systems.link.abb.messages import Command, Mode, RobotReport
-from systems.link.abb.session import Link
-from systems.link.abb.signal_client import SignalClient
-from systems.link.clock import CameraClock, ClockConfig
-from systems.link.qualisys.receiver import MocapReceiver
+from robots.description.model import RobotModel
+from systems.link.clock import ClockConfig, StampClock, steady_time
+from systems.link.protocols import PoseSource, RobotLink, RobotReport
 from systems.reference.joint_mover import smooth_motion
 from systems.samples import PoseSample
 
@@ -24,7 +19,6 @@ _PATIENCE, _NEARLY = 3.0, math.radians(0.5)  # s after which it is enough to com
 _LONGEST_APPROACH = 60.0  # s
 _APPROACH_GAIN = 2.0  # 1/s, where only speeds are sent
 _PHASE_SHARE = 0.02  # of the distance between a stamp and its tick, by which the phase follows
-_SIGNAL_AGE = 0.1  # s, beyond which signals and earlier messages say nothing of the present motion
 _SLICE = 8e-4  # s between two looks at the camera
 _REHEARSAL = 7e-4  # s before the next report is due
 _CLOSE = 3e-4  # s about the time at which it is due: a frame of the camera would delay the reply
@@ -41,30 +35,27 @@ class HardwareLink:
 
     def __init__(
         self,
-        client: EgmClient,
-        camera: MocapReceiver | None,
+        client: RobotLink,
+        camera: PoseSource | None,
         scenario: Scenario,
         robot: RobotModel,
         is_speed_only: bool,
         now: Callable[[], float] = steady_time,
-        signals: SignalClient | None = None,
     ) -> None:
-        """Takes over sockets that are open.
+        """Takes over connections that are open.
 
         Args:
-            client: of the controller.
-            camera: of the camera server, None to do without.
+            client: to the controller.
+            camera: to the camera server, None to do without.
             scenario: which cycle and which limits the station has.
             robot: whose speeds count on the way to the start.
             is_speed_only: whether the controller is sent speeds without positions.
             now: the clock of the client's arrivals, in s.
-            signals: of the controller's test signals, None where it sends none.
         """
-        self._client, self._camera, self._now, self._signals = client, camera, now, signals
+        self._client, self._camera, self._now = client, camera, now
         self._link, self._speed, self._period = scenario.station.link, robot.speed, scenario.station.period
-        self._mode = Mode.JOINT_SPEED_ONLY if is_speed_only else Mode.JOINT_SPEED
-        self.robot_clock = CameraClock(ClockConfig())
-        self.velocity = self.effort = np.zeros(NUM_JOINTS)
+        self._is_speed_only = is_speed_only
+        self.robot_clock = StampClock(ClockConfig())
         self.last: RobotReport | None = None
         self._unlearned: tuple[float, float] | None = None  # stamp and arrival of the last report, in s
         self.turn_around: list[float] = []  # s, from a report in to its reply out
@@ -75,12 +66,22 @@ class HardwareLink:
     @property
     def epoch(self) -> int:
         """Grows whenever commands must start anew."""
-        return self._client.session.epoch
+        return self._client.epoch
 
     @property
     def sample(self) -> PoseSample:
         """The newest sample of the camera; its time is of the steady clock."""
         return self._sample
+
+    @property
+    def velocity(self) -> np.ndarray:
+        """Joint speeds at the newest report, (6,) in rad/s."""
+        return self._client.velocity
+
+    @property
+    def effort(self) -> np.ndarray:
+        """Torques at the newest report, (6,) in N m."""
+        return self._client.effort
 
     @property
     def arrived(self) -> float:
@@ -92,10 +93,8 @@ class HardwareLink:
         link = self._link
         deadline = self._now() + link.connect
         if self.wait_until_ready(link.connect) is None:
-            address, port = self._client.channel.address
-            heard = self._client.session.link is not Link.WAITING
-            what = "the controller does not run EGM" if heard else "no message of a controller came in"
-            raise StationError(f"{what}: waited {link.connect:g} s on UDP {address}:{port}")
+            what, place = self._client.why_not_ready(), self._client.place
+            raise StationError(f"{what}: waited {link.connect:g} s on {place}")
         while needs_camera and self._camera is not None and not self._sample.valid:
             if self._now() > deadline:
                 report = self._camera.report()
@@ -156,8 +155,7 @@ class HardwareLink:
                 warm_up()
                 self._client.warm_up()
                 warm_up, is_prepared = None, True
-        last, self.last = self.last, report
-        self._note_motion(last, report)
+        self.last = report
         self._unlearned = (report.time, self._client.arrived)
         return report
 
@@ -190,7 +188,7 @@ class HardwareLink:
 
     def send_command(self, position: np.ndarray, velocity: np.ndarray) -> None:
         """Replies to the newest report, if it may be answered."""
-        if self._client.reply(self._mode, Command(position=position, velocity=velocity)):
+        if self._client.send(position, velocity, self._is_speed_only):
             self.turn_around.append(self._now() - self.arrived)
 
     def approach(self, goal: np.ndarray) -> None:
@@ -208,7 +206,7 @@ class HardwareLink:
             position, velocity, left = smooth_motion(
                 start, goal, report.time - begin, _APPROACH_SHARE * self._speed
             )
-            if self._mode is Mode.JOINT_SPEED_ONLY:
+            if self._is_speed_only:
                 velocity = velocity + _APPROACH_GAIN * (position - report.position)
             self.send_command(position, velocity)
             off = float(np.abs(report.position - goal).max())
@@ -216,22 +214,6 @@ class HardwareLink:
                 return
         off = np.rad2deg(np.abs(self.last.position - goal).max()) if self.last else math.nan
         raise StationError(f"the robot did not reach the start of the path: a joint is {off:.2f} deg away")
-
-    def _note_motion(self, last: RobotReport | None, report: RobotReport) -> None:
-        """Speeds and torques: from test signals if there are new ones, else from the messages themselves."""
-        newest = self._signals.newest if self._signals else None
-        is_new = newest is not None and not newest.time < report.time - _SIGNAL_AGE
-        if newest is not None and is_new and newest.velocity is not None:
-            self.velocity = newest.velocity
-        elif last is not None and 0.0 < report.time - last.time < _SIGNAL_AGE:
-            self.velocity = (report.position - last.position) / (report.time - last.time)
-        else:
-            self.velocity = np.zeros(NUM_JOINTS)
-        if newest is not None and is_new and newest.torque is not None:
-            self.effort = newest.torque
-        else:
-            torques = list(report.message.torqueRef.joints)
-            self.effort = np.array(torques) if len(torques) == NUM_JOINTS else np.zeros(NUM_JOINTS)
 
     def _learn_clock(self) -> None:
         """Tells the clock of the last report; after the reply, because it may take a while."""
@@ -241,8 +223,7 @@ class HardwareLink:
             self._unlearned = None
 
     def _hear_camera(self) -> None:
-        if self._signals is not None:
-            self._signals.poll()
+        self._client.poll_aside()
         if self._camera is not None:
             sample = self._camera.poll(self._now())
             if sample is not None:

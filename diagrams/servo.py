@@ -168,11 +168,8 @@ def _refuse_slow_camera(scenario: Scenario) -> None:
 def law_config(scenario: Scenario, law: type[System] | System) -> LawConfig:
     """Gains and limits of a law: the scenario's, or those with which its class begins."""
     kind = law if isinstance(law, type) else type(law)
-    name = LAWS.name_of(kind) or ""
-    if name == "self_calibrating":
-        return scenario.servo.self_calibrating
-    config = scenario.servo.laws.get(name)
-    return law_traits(kind).Config() if config is None else config
+    name = LAWS.name_of(kind)
+    return law_traits(kind).Config() if name is None else scenario.servo.laws[name]
 
 
 def law_name(law: str | type[System] | System) -> str:

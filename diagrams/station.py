@@ -31,7 +31,6 @@ from systems.cell.joint_sensor import JointSensor
 from systems.cell.marker_camera import MarkerCamera
 from systems.cell.pose_camera import BLOCK, PoseCamera
 from systems.cell.tip_pose import TipPose
-from systems.link.abb.motion import EgmMotion
 
 _RUNAWAY = 10.0  # times the largest joint speed: no drive of a working simulation gets there
 
@@ -85,9 +84,9 @@ class SimulatedStation(Diagram):
             robot: the nominal robot; the true one differs from it by ``config.errors``, ``config.variation``
                 and ``config.payload_centre_mm``.
             config: the station part of a scenario.
-            drive: ``"position"``, ``"velocity"`` or ``"cascade"``; under EGM, where ``"velocity"``
-                follows speeds alone, there is no other difference.
-            takes_torque: whether the drives take a torque feedforward; EGM has none.
+            drive: ``"position"``, ``"velocity"`` or ``"cascade"``; behind a controller that
+                plans, where ``"velocity"`` follows speeds alone, there is no other difference.
+            takes_torque: whether the drives take a torque feedforward; behind such a controller they do not.
 
         Raises:
             ValueError: if a part refuses its configuration.
@@ -99,10 +98,10 @@ class SimulatedStation(Diagram):
         self._delay = _changing_delay(config)
         if self._delay:
             builder.AddNamedSystem("changing_delay", self._delay)
-        if config.interface == "egm":
+        if config.interface != "direct":
             # The controller plans the motion; its drives follow positions, whatever it is told.
-            motion = EgmMotion(config.egm.motion, config.period, takes_position=drive != "velocity")
-            self._motion = builder.AddNamedSystem("egm", motion)
+            planner = config.link.planner(config.period, takes_position=drive != "velocity")
+            self._motion = builder.AddNamedSystem(config.interface, planner)
             drive, takes_torque = "cascade", False
         self._true_robot = true_robot(robot, config)
         drive_config = replace(
@@ -222,7 +221,7 @@ class SimulatedStation(Diagram):
             RuntimeError: if the drives take commands directly and nothing plans.
         """
         if self._motion is None:
-            raise RuntimeError("only a controller under EGM plans")
+            raise RuntimeError("only a guided controller plans")
         return self._motion.planned_position(self._motion.GetMyContextFromRoot(root_context))
 
     def fastest_rate(self, root_context: Context) -> float:

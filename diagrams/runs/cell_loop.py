@@ -14,11 +14,9 @@ from diagrams.runs.virtual_cell import Exposure, VirtualCell
 from diagrams.scenario.scenario import Scenario
 from robots.description.model import RobotModel
 from systems.cell.network_faults import FaultyLink
-from systems.link.abb.channel import Buffering, UdpChannel, steady_time
-from systems.link.abb.controller import VirtualController
-from systems.link.abb.session import Address
-from systems.link.abb.signals import ControllerSignals, SignalCodec
-from systems.link.qualisys.server import VirtualCameraServer
+from systems.link.clock import steady_time
+from systems.link.protocols import VirtualPoseSource
+from systems.link.udp_channel import Address, Buffering, UdpChannel
 
 _LATE = 1e-3  # s after which a message counts as late
 _LOST_TRACK = 0.25  # s behind after which the schedule is moved instead of being caught up with
@@ -53,7 +51,7 @@ class CellLoop:
         scenario: Scenario,
         robot: RobotModel,
         target: Address,
-        camera: VirtualCameraServer | None = None,
+        camera: VirtualPoseSource | None = None,
         signal_target: Address | None = None,
         address: str = "127.0.0.1",
         with_log: bool = True,
@@ -73,9 +71,9 @@ class CellLoop:
             ValueError: if a part refuses its configuration or the address cannot be used.
         """
         config = scenario.station
-        self._faults, self._body = config.faults, config.link.camera.server.body
+        self._faults = config.faults
         self.cell = VirtualCell(scenario, robot, with_log)
-        self.controller = VirtualController(robot, config.egm.run)
+        self.controller = config.link.virtual_controller(robot)
         self.statistics = CellStatistics()
         self._links = {
             name: FaultyLink(config.faults, period, scenario.seed + offset)
@@ -87,7 +85,6 @@ class CellLoop:
                 )
             )
         }
-        self._codec = SignalCodec(config.link.signals)
         self._target, self._signal_target, self._camera = target, signal_target, camera
         self._channel = UdpChannel(0, address, Buffering.NEWEST)
         self._stranger = UdpChannel(0, address)
@@ -110,9 +107,7 @@ class CellLoop:
             gc.unfreeze()
         for name, link in self._links.items():
             self.statistics.faults[name] = dict(link.counts)
-        self.statistics.controller = {
-            name: getattr(self.controller, name) for name in ("restarts", "undecodable", "late", "ignored")
-        }
+        self.statistics.controller = self.controller.counters()
         return self.statistics
 
     def close(self) -> None:
@@ -183,9 +178,10 @@ class CellLoop:
                 lambda data=delivery.data, channel=channel: channel.send(data, self._target),
             )
         if self._signal_target is not None:
-            signals = ControllerSignals(stamp, joints.velocity, joints.effort, joints.position)
-            data, target = self._codec.encode(signals), self._signal_target
-            self._post(now, lambda: self._channel.send(data, target))
+            target = self._signal_target
+            data = self.controller.signals(stamp, joints.position, joints.velocity, joints.effort)
+            if data is not None:
+                self._post(now, lambda data=data: self._channel.send(data, target))
 
     def _post_exposure(self, exposure: Exposure) -> None:
         camera, sample = self._camera, exposure.sample
@@ -200,7 +196,7 @@ class CellLoop:
 
         def publish() -> None:
             self.statistics.camera_frames += 1
-            camera.publish(stamp, number, {self._body: X_WE}, {self._body: sample.residual})
+            camera.publish_body(stamp, number, X_WE, sample.residual)
 
         for delivery in self._links["camera"].pass_on(exposure.published, b""):
             if not delivery.is_foreign and delivery.data == b"":

@@ -9,10 +9,8 @@ import numpy as np
 from diagrams.hardware_link import HardwareLink, StationError
 from diagrams.scenario.scenario import Scenario
 from robots.description.model import NUM_JOINTS, RobotModel
-from systems.link.abb.channel import steady_time
-from systems.link.abb.client import EgmClient
-from systems.link.clock import ClockQuality
-from systems.link.qualisys.receiver import MocapReceiver
+from systems.link.clock import ClockQuality, steady_time
+from systems.link.protocols import PoseSource, RobotLink
 
 _FREQUENCIES = (0.15, 0.25, 0.4)  # Hz: so slow that no filter or controller of the drives adds a millisecond
 _RISE = 1.0  # s, in which the motion begins and ends
@@ -66,8 +64,8 @@ def measure_latency(
     scenario: Scenario,
     robot: RobotModel,
     config: LatencyConfig,
-    client: EgmClient,
-    camera: MocapReceiver | None,
+    client: RobotLink,
+    camera: PoseSource | None,
     progress: Callable[[float], None] | None = None,
     now: Callable[[], float] = steady_time,
 ) -> LatencyRecord:
@@ -77,8 +75,8 @@ def measure_latency(
         scenario: which station.
         robot: whose joint is moved.
         config: how.
-        client: of the controller.
-        camera: of the camera server; its clock must be set to no delay. None to do without.
+        client: to the controller.
+        camera: to the camera server; its clock must be set to no delay. None to do without.
         progress: is called now and then with the share that is done, 0 to 1.
         now: the clock of the client's arrivals, in s.
 
@@ -105,7 +103,7 @@ def measure_latency(
             f"latency: joint {config.joint} has no room to move by {config.amplitude_deg} deg here"
         )
     rows, frames = [], []
-    before = client.session.counters.as_dict()
+    before = client.counters()
     while (time := report.time - began) < config.duration:
         displacement, speed = motion(config, time)
         position, velocity = start.copy(), np.zeros(NUM_JOINTS)
@@ -127,7 +125,7 @@ def measure_latency(
     stamp, commanded, measured = np.array(rows).T
     reported = np.array([wire.robot_clock.station_time(round(1e6 * each)) for each in stamp])
     seen = np.array(frames).reshape(-1, 4)
-    counters = client.session.counters.as_dict()
+    counters = client.counters()
     return LatencyRecord(
         stamp,
         commanded,

@@ -19,12 +19,8 @@ from diagrams.scenario.scenario import Scenario, ScenarioError
 from diagrams.servo import Servo, law_name
 from robots.description.model import NUM_JOINTS, RobotModel, load_robot
 from systems.guard.guard import KINDS
-from systems.link.abb.channel import steady_time
-from systems.link.abb.client import EgmClient
-from systems.link.abb.messages import RobotReport
-from systems.link.abb.signal_client import SignalClient
-from systems.link.clock import ClockQuality
-from systems.link.qualisys.receiver import MocapReceiver
+from systems.link.clock import ClockQuality, steady_time
+from systems.link.protocols import PoseSource, RobotLink, RobotReport
 from systems.reference.paths import CartesianPath
 from systems.samples import JointSample, PoseSample
 
@@ -70,7 +66,7 @@ class RealTimeRun:
         self.robot = robot or load_robot(scenario.robot)
         self.period = scenario.station.period
         if scenario.servo.feedforward.kind != "none":
-            raise ScenarioError("servo.feedforward.kind must be none on a real station: EGM takes no torques")
+            raise ScenarioError("servo.feedforward.kind must be none on a real station: it takes no torques")
         builder = DiagramBuilder()
         self.station = builder.AddNamedSystem("station", HardwareStation())
         self.servo = builder.AddNamedSystem("servo", Servo(self.robot, scenario, law))
@@ -100,20 +96,18 @@ class RealTimeRun:
 
     def run(
         self,
-        client: EgmClient,
-        camera: MocapReceiver | None,
+        client: RobotLink,
+        camera: PoseSource | None,
         progress: Callable[[float], None] | None = None,
         now: Callable[[], float] = steady_time,
-        signals: SignalClient | None = None,
     ) -> RealTimeRecord:
         """Runs the law on the station at the other end.
 
         Args:
-            client: of the controller.
-            camera: of the camera server; None for laws that do without.
+            client: to the controller.
+            camera: to the camera server; None for laws that do without.
             progress: is called now and then with the share that is done, 0 to 1.
             now: the clock of the client's arrivals, in s.
-            signals: of the controller's test signals, None where it sends none.
 
         Raises:
             StationError: if there is no controller or camera, or its cycle is not the scenario's.
@@ -124,9 +118,9 @@ class RealTimeRun:
         gc.freeze()
         gc.disable()
         sys.setswitchinterval(_SWITCH)
-        before = client.session.counters.as_dict()
+        before = client.counters()
         try:
-            wire = HardwareLink(client, camera, self.scenario, self.robot, self._is_speed_only, now, signals)
+            wire = HardwareLink(client, camera, self.scenario, self.robot, self._is_speed_only, now)
             wire.connect(self.uses_camera)
             wire.approach(self.start)
             ended = self._follow(wire, progress or (lambda share: None), now)
@@ -135,7 +129,7 @@ class RealTimeRun:
             gc.unfreeze()
             if collecting:
                 gc.enable()
-        counters = {name: number - before[name] for name, number in client.session.counters.as_dict().items()}
+        counters = {name: number - before[name] for name, number in client.counters().items()}
         return self._record(counters, camera, wire, ended)
 
     def _follow(self, wire: HardwareLink, progress: Callable[[float], None], now: Callable[[], float]) -> str:
@@ -224,7 +218,7 @@ class RealTimeRun:
         self.station.command(self._scratch)
 
     def _record(
-        self, counters: dict[str, int], camera: MocapReceiver | None, wire: HardwareLink, ended: str
+        self, counters: dict[str, int], camera: PoseSource | None, wire: HardwareLink, ended: str
     ) -> RealTimeRecord:
         times, data = self._log.read(self._context)
         n = len(times)
@@ -269,7 +263,7 @@ class RealTimeRun:
             stamps=stamps,
             ended=ended,
             counters=counters,
-            camera={**vars(report.wire), **vars(report.samples)} if report else {},
+            camera=report.counters if report else {},
             turn_around=np.array(wire.turn_around),
             camera_clock=report.clock if report else None,
             robot_clock=wire.robot_clock.quality(),

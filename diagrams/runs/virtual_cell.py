@@ -1,4 +1,4 @@
-"""A robot cell that exists only in this process: the elastic robot behind a controller with EGM."""
+"""A robot cell that exists only in this process: the elastic robot behind its controller."""
 
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -15,7 +15,7 @@ from diagrams.scenario.controller_model import controller_model
 from diagrams.scenario.scenario import Scenario
 from diagrams.station import SimulatedStation
 from robots.description.model import RobotModel
-from systems.link.abb.controller import VirtualController
+from systems.link.protocols import VirtualController
 from systems.reference.paths import make_path
 from systems.samples import JointSample, PoseSample
 
@@ -67,14 +67,14 @@ class VirtualCell:
         """Puts the robot at the start of the scenario's path.
 
         Args:
-            scenario: whose station this is; its controller plans under EGM, whatever it says.
+            scenario: whose station this is; its controller plans as that of the link, whatever it says.
             robot: the nominal one.
             with_log: whether `record` will be asked for the truth.
 
         Raises:
             ValueError: if a part refuses its configuration or the start is out of reach.
         """
-        config = replace(scenario.station, interface="egm")
+        config = replace(scenario.station, interface=scenario.station.link.kind)
         self.period = config.period
         self._camera = config.camera
         builder = DiagramBuilder()

@@ -13,6 +13,12 @@ _FORMER: dict[tuple[str, str], tuple[str, str, str]] = {
     ("station", "markers"): ("camera", "", ""),
 }
 
+# Groups that stand elsewhere now, as they are.
+_MOVED = {
+    ("station", "egm"): ("station", "link"),
+    ("servo", "self_calibrating"): ("servo", "laws", "self_calibrating"),
+}
+
 
 def renamed(node: Node) -> Node:
     """A tree in which entries that stand under a former name stand under the present one.
@@ -33,4 +39,34 @@ def renamed(node: Node) -> Node:
             if not member or not isinstance(present.value, str) or present.value == member:
                 entries[new] = replace(present, aside=fields | present.aside)
             node = replace(node, value={**node.value, group: replace(inside, value=entries)})
+    for former, present in _MOVED.items():
+        node = _moved(node, former, present)
     return node
+
+
+def _moved(node: Node, former: tuple[str, ...], present: tuple[str, ...]) -> Node:
+    """A tree whose group at one path is part of the one at another path; what stands there already counts."""
+    found = node
+    for key in former:
+        if not isinstance(found.value, dict) or key not in found.value:
+            return node
+        found = found.value[key]
+    return _with(_without(node, former), present, found)
+
+
+def _without(node: Node, path: tuple[str, ...]) -> Node:
+    key, *rest = path
+    below = {name: each for name, each in node.value.items() if name != key or rest}
+    if rest:
+        below[key] = _without(below[key], tuple(rest))
+    return replace(node, value=below)
+
+
+def _with(node: Node, path: tuple[str, ...], group: Node) -> Node:
+    if not path:
+        both = isinstance(node.value, dict) and isinstance(group.value, dict)
+        return replace(node, value=group.value | node.value) if both else node
+    key, *rest = path
+    inside = node.value if isinstance(node.value, dict) else {}
+    below = inside.get(key, replace(group, value={}))
+    return replace(node, value={**inside, key: _with(below, tuple(rest), group)})

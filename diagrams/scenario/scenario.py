@@ -11,7 +11,7 @@ from robots.configuration.nodes import ConfigurationError
 from robots.configuration.quantity import choice, numbers, quantity
 from robots.configuration.typed import typed
 from robots.description.geometric_errors import GeometricErrors
-from robots.description.model import NUM_JOINTS, Placement
+from robots.description.model import NUM_JOINTS
 from robots.dynamics.plant import ELASTICITIES
 from systems.cell.cameras import CameraConfig
 from systems.cell.drive import DriveConfig
@@ -22,44 +22,12 @@ from systems.cell.pose_camera import PoseCameraConfig
 from systems.controller_model import ControllerModelConfig
 from systems.feedforward import FEEDFORWARDS, FeedforwardConfig
 from systems.guard.guard import GuardConfig
-from systems.link.abb.controller import EgmRunConfig
-from systems.link.abb.motion import EgmMotionConfig
-from systems.link.abb.signals import SignalCodec, SignalLayout
-from systems.link.qualisys.receiver import MocapReceiverConfig
+from systems.link.makers import LINK_NAMES, RobotLinkConfig, default_link
 from systems.reference.paths import ReferenceConfig
-from systems.servo import LAWS, LawConfig
-from systems.servo.self_calibrating_config import SelfCalibratingConfig
+from systems.servo import LAWS
+from systems.servo.gains import LawGains
 
 __all__ = ["Scenario", "ScenarioError", "load_scenario", "scenario_text", "shipped_scenarios"]
-
-
-@dataclass
-class EgmConfig:
-    """Externally Guided Motion on the controller."""
-
-    motion: EgmMotionConfig = field(default_factory=EgmMotionConfig)
-    run: EgmRunConfig = field(default_factory=EgmRunConfig)
-
-
-@dataclass
-class LinkConfig:
-    """Where the controller and the camera of a real station are, and what to do when they fall silent."""
-
-    address: str = "127.0.0.1"  # of this machine, to listen on for the controller
-    port: int = quantity(6510, 0, 65535)  # where the controller sends its messages
-    controller: str = ""  # its address; empty to take whoever speaks first
-    connect: float = quantity(10.0, 0.1, 3600.0, "s")  # to wait for controller and camera
-    # Silence after which the controller counts as gone
-    break_after: float = quantity(0.1, 0.01, 10.0, "s")
-    # What a run does then, or when the controller stops: end, or resume
-    on_break: str = choice("end", ("end", "resume"))
-    resume_within: float = quantity(10.0, 0.1, 3600.0, "s")  # in which it must be back
-    signal_port: int = quantity(0, 0, 65535)  # of this machine, where test signals arrive; 0 for none
-    signals: SignalLayout = field(default_factory=SignalLayout)
-    has_camera: bool = True
-    camera: MocapReceiverConfig = field(default_factory=MocapReceiverConfig)
-    camera_frame: Placement = field(default_factory=Placement)  # of the camera system in the world
-    tool_frame: Placement = field(default_factory=Placement)  # of the tool in the body that the camera tracks
 
 
 @dataclass
@@ -75,8 +43,8 @@ class Variation:
 class StationConfig:
     """The robot cell: what the controller does not see, and what it is connected to."""
 
-    # egm: a controller and a camera at the addresses of ``link``
-    kind: str = choice("simulated", ("simulated", "egm"))
+    # Or the name of a link: a controller and a camera at the addresses of ``link``
+    kind: str = choice("simulated", ("simulated", *LINK_NAMES))
     period: float = quantity(4e-3, 5e-4, 0.1, "s")  # between two commands and between two joint samples
     elasticity: str = choice("joints", ELASTICITIES)  # of the true robot: rigid, joints or structure
     payload: float = quantity(0.0, 0.0, 1000.0, "kg")  # at the flange
@@ -88,10 +56,9 @@ class StationConfig:
     errors: GeometricErrors = field(default_factory=GeometricErrors)
     drive: DriveConfig = field(default_factory=DriveConfig)
     camera: CameraConfig = field(default_factory=PoseCameraConfig)
-    # From command to drives: egm as a controller under EGM plans
-    interface: str = choice("direct", ("direct", "egm"))
-    egm: EgmConfig = field(default_factory=EgmConfig)
-    link: LinkConfig = field(default_factory=LinkConfig)
+    # From command to drives: direct, or as the controller of ``link`` plans
+    interface: str = choice("direct", ("direct", *LINK_NAMES))
+    link: RobotLinkConfig = field(default_factory=default_link)
     faults: FaultConfig = field(default_factory=FaultConfig)
     events: list[StationEvent] = field(default_factory=list)  # of runs along a path
 
@@ -101,10 +68,7 @@ class ServoConfig:
     """The controller: what it believes, gains of each law, and the guard."""
 
     model: ControllerModelConfig = field(default_factory=ControllerModelConfig)
-    laws: dict[str, LawConfig] = field(
-        default_factory=lambda: {name: LawConfig() for name in LAWS if name != "self_calibrating"}
-    )
-    self_calibrating: SelfCalibratingConfig = field(default_factory=SelfCalibratingConfig)
+    laws: LawGains = field(default_factory=LawGains)
     feedforward: FeedforwardConfig = field(default_factory=FeedforwardConfig)
     guard: GuardConfig = field(default_factory=GuardConfig)
 
@@ -179,7 +143,7 @@ def _contradiction(scenario: Scenario) -> tuple[list[str | int], str] | None:
     except ValueError as error:
         return ["servo", "feedforward", "kind"], str(error)
     try:
-        SignalCodec(scenario.station.link.signals)
+        scenario.station.link.check()
     except ValueError as error:
-        return ["station", "link", "signals"], f"station.link.signals: {error}"
+        return ["station", "link"], f"station.link: {error}"
     return None

@@ -26,9 +26,10 @@ import numpy as np
 from diagrams.scenario.scenario import load_scenario
 from experiments.station.guided import compare_on_station
 from robots.description.model import load_robot
-from systems.link.abb.channel import UdpChannel, steady_time
 from systems.link.abb.controller import EgmRunConfig, VirtualController
 from systems.link.abb.messages import decode_report
+from systems.link.clock import steady_time
+from systems.link.udp_channel import UdpChannel
 
 LAW = "numerical_ik"
 PERIOD = 4.032e-3  # s
@@ -36,8 +37,8 @@ PERIOD = 4.032e-3  # s
 # waits at its start for minutes.
 PATIENT = [
     "station.link.break_after=5",
-    "station.egm.run.timeout=5",
-    "station.egm.run.condition_time=3600",
+    "station.link.run.timeout=5",
+    "station.link.run.condition_time=3600",
 ]
 ALLOWED, ALLOWED_LATE = 0.5, 4.032  # ms, median and 99 %
 ALLOWED_RATIO = 4.0

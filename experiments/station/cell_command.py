@@ -4,7 +4,7 @@ import json
 import signal
 import sys
 from contextlib import ExitStack
-from dataclasses import fields, replace
+from dataclasses import fields
 from types import FrameType
 from typing import Annotated
 
@@ -12,14 +12,12 @@ import typer
 from rich.console import Console
 
 from diagrams.runs.cell_loop import CellLoop, CellStatistics
-from diagrams.scenario.scenario import Scenario
 from experiments.cli.console import count, refusing
 from experiments.cli.options import RobotOption, ScenarioOption, SetOption, json_option
 from experiments.cli.prepare import prepare
 from experiments.cli.staging import staged_file
 from experiments.report.files import write_json
 from systems.cell.network_faults import FaultConfig
-from systems.link.qualisys.server import CameraServerConfig, VirtualCameraServer
 
 
 def cell_command(
@@ -56,7 +54,7 @@ def cell_command(
             for name, suffix in ((truth, ".npz"), (json_file, ".json"))
         ]
         link = prepared.scenario.station.link
-        camera = stack.enter_context(VirtualCameraServer(_camera_config(prepared.scenario)))
+        camera = stack.enter_context(link.camera.virtual_server(prepared.scenario.station.camera.period))
         loop = CellLoop(
             prepared.scenario,
             prepared.nominal_robot,
@@ -72,8 +70,7 @@ def cell_command(
             sys.stdout.flush()
         human.print(
             f"{prepared.nominal_robot.name}: speaks EGM to UDP {link.address}:{link.port} every "
-            f"{1e3 * prepared.scenario.station.period:g} ms; its camera listens on TCP "
-            f"{link.camera.server.address}:{camera.port}"
+            f"{1e3 * prepared.scenario.station.period:g} ms; its camera listens on {camera.place}"
         )
         if duration is None and not announce:
             human.print("Ctrl-C ends it")
@@ -113,18 +110,6 @@ def print_statistics(console: Console, statistics: CellStatistics) -> None:
         happened = ", ".join(f"{number} {name}" for name, number in counts.items() if number)
         if happened:
             console.print(f"Faults {link}: {happened}")
-
-
-def _camera_config(scenario: Scenario) -> CameraServerConfig:
-    server = scenario.station.link.camera.server
-    frequency = round(1.0 / scenario.station.camera.period)
-    return replace(
-        CameraServerConfig(),
-        bodies=[server.body],
-        address=server.address,
-        port=server.port,
-        frequency=frequency,
-    )
 
 
 class _Stop:

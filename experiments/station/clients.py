@@ -7,7 +7,7 @@ import sys
 import tempfile
 from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -16,9 +16,7 @@ from diagrams.runs.virtual_cell import CellRecord
 from diagrams.scenario.scenario import Scenario, scenario_text
 from experiments.cli.workers import SimulationError
 from robots.description.model import RobotModel
-from systems.link.abb.client import EgmClient
-from systems.link.abb.signal_client import SignalClient
-from systems.link.qualisys.receiver import MocapReceiver
+from systems.link.protocols import PoseSource, RobotLink
 
 _PATIENCE = 30.0  # s in which a cell must have ended
 
@@ -27,9 +25,8 @@ _PATIENCE = 30.0  # s in which a cell must have ended
 class StationClients:
     """Open connections."""
 
-    client: EgmClient
-    camera: MocapReceiver | None
-    signals: SignalClient | None
+    client: RobotLink
+    camera: PoseSource | None
     cell: "CellBeside | None"  # has its truth once the connections are closed
 
 
@@ -57,26 +54,17 @@ def station_clients(
     link, period = scenario.station.link, scenario.station.period
     # The camera's delay is one named number, whoever delays it.
     delay = scenario.station.camera.delay if camera_delay is None else camera_delay
-    config = replace(link.camera, clock=replace(link.camera.clock, smallest_delay=delay))
     try:
         with ExitStack() as stack:
-            port, host = 0 if with_cell else link.port, link.controller or None
-            client = EgmClient(robot.speed, port, link.address, host, link.break_after, period=period)
-            stack.enter_context(client)
-            signals = None
-            if link.signal_port:
-                own = 0 if with_cell else link.signal_port
-                signals = stack.enter_context(SignalClient(link.signals, own, link.address, host))
-            signal_port = signals.channel.address[1] if signals else 0
-            cell = CellBeside(scenario, client.channel.address[1], signal_port) if with_cell else None
-            if cell:
-                server = replace(config.server, port=stack.enter_context(cell))
-                config = replace(config, server=server)
+            wire = link.wire(period, any_port=with_cell)
+            client = stack.enter_context(link.open(robot, wire))
+            cell = CellBeside(scenario, *client.ports) if with_cell else None
+            camera_port = stack.enter_context(cell) if cell else None
             camera = None
             if needs_camera and link.has_camera:
                 frames = link.camera_frame.pose(), link.tool_frame.pose()
-                camera = stack.enter_context(MocapReceiver(config, *frames))
-            yield StationClients(client, camera, signals, cell)
+                camera = stack.enter_context(link.camera.connect(*frames, delay, camera_port))
+            yield StationClients(client, camera, cell)
     except StationError as error:
         raise SimulationError(str(error)) from error
 

@@ -64,7 +64,6 @@ def compare_on_station(
                 station.client,
                 station.camera,
                 progress=lambda share, number=number: report((number + share) / len(jobs)),
-                signals=station.signals,
             )
             records[law].append(record)
     cell = station.cell

@@ -10,7 +10,7 @@ from pydrake.common.yaml import yaml_dump, yaml_load_typed
 
 from robots.configuration.nodes import Node
 from robots.configuration.quantity import Declaration, declaration, dotted, out_of_range
-from robots.configuration.union import entries, selected, union_members
+from robots.configuration.union import entries, selected, tags, union_members
 
 _Schema = TypeVar("_Schema")
 
@@ -110,8 +110,10 @@ def _checked(node: Node, schema: Any, declared: Declaration, path: str) -> Any:
         return tree if member is members[0] else {"_tag": f"!{member.__name__}"} | tree
     if members or _optional(schema) is not schema:
         return None if node.value is None else _checked(node, _optional(schema), declared, path)
-    if node.tag:
-        raise node.refuse(f"{path or 'the file'} takes no tag, got !{node.tag}")
+    own = tags(schema) if is_dataclass(schema) else ()
+    if node.tag and node.tag not in own:
+        allowed = f"no tag but !{own[-1]}" if own else "no tag"
+        raise node.refuse(f"{path or 'the file'} takes {allowed}, got !{node.tag}")
     if is_dataclass(schema):
         return _checked_fields(node, schema, path)
     if get_origin(schema) is dict:

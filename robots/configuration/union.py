@@ -24,6 +24,11 @@ def short_name(member: type) -> str:
     return str(getattr(member, _SELECTOR, "")) or re.sub(r"(?<!^)(?=[A-Z])", "_", name).lower()
 
 
+def tags(member: type) -> tuple[str, str]:
+    """How a tag may name a class: with and without ``Config`` at its end."""
+    return member.__name__, member.__name__.removesuffix("Config")
+
+
 def selected(members: tuple[type, ...], node: Node, path: str) -> type | None:
     """The member that a node selects by tag, short name or ``kind``; None if it leaves that open.
 
@@ -39,7 +44,7 @@ def selected(members: tuple[type, ...], node: Node, path: str) -> type | None:
     if name is None:
         return None
     for member in members:
-        if name in (short_name(member), member.__name__, member.__name__.removesuffix("Config")):
+        if name in (short_name(member), *tags(member)):
             return member
     allowed = ", ".join(short_name(member) for member in members)
     raise where.refuse(f"{path} must be one of {allowed}, got '{name}'")

@@ -1,4 +1,4 @@
-"""Mapping of camera time stamps to the station's clock.
+"""Mapping of the time stamps of a camera, or of a robot's controller, to the station's clock.
 
 A frame that is exposed at camera time s arrives at station time a = s + offset + drift * s + delay, where
 the delay is never below that of an idle line and now and then close to it. So the line below the points
@@ -14,6 +14,7 @@ What no clock comparison can see is the smallest delay itself. It is a property 
 """
 
 import math
+import time
 from collections import deque
 from dataclasses import dataclass
 
@@ -49,6 +50,11 @@ _FEWEST_FOR_DRIFT = 5  # bins: before, a slope says more of the jitter than of t
 _SAME_DRIFT = 1e-5  # bins are summed up along the drift known at the time; a change below this leaves them
 
 
+def steady_time() -> float:
+    """The clock of the station, that arrivals are stamped with, in s."""
+    return time.perf_counter()
+
+
 class _Bin:
     """A second of frames, in s since the session began, and what is to be known of it."""
 
@@ -69,7 +75,7 @@ class _Bin:
         self.excess = [float(value) - self.smallest for value in high]
 
 
-class CameraClock:
+class StampClock:
     """Estimates offset and drift between the clocks from time stamps and arrival times."""
 
     def __init__(self, config: ClockConfig | None = None) -> None:

@@ -1,10 +1,18 @@
 """Geometric compensation: the path in joint positions of the robot as it is, without a camera."""
 
+from dataclasses import dataclass
+
 import numpy as np
 
 from robots.kinematics.forward import robust_solve
 from systems.servo.law import LawInput, LawOutput, ServoLaw
+from systems.servo.law_config import LawConfig
 from systems.servo.sine_feedback import sine_feedback
+
+
+@dataclass
+class CompensationConfig(LawConfig):
+    """Its gains."""
 
 
 class Compensation(ServoLaw):
@@ -20,6 +28,7 @@ class Compensation(ServoLaw):
 
     title = "Compensation"
     colour = "#b89400"
+    Config = CompensationConfig
     uses_camera = False
     memory_size = 12
 

@@ -16,7 +16,3 @@ class LawConfig:
     correction_limit: float = quantity(0.1, 1e-4, 2.0, "m")  # the largest correction of the position
     # The largest correction of the orientation
     correction_limit_deg: float = quantity(20.0, 0.01, 180.0, "deg")
-    # Of one joint, where a law corrects velocities
-    correction_speed_limit_deg_s: float = quantity(30.0, 0.01, 1000.0, "deg/s")
-    # How position_level corrects the orientation; euler, as the source does
-    angles: str = choice("rotation_vector", ("rotation_vector", "euler"))

@@ -1,11 +1,19 @@
 """Numerical inverse kinematics closed over the camera: joint velocities from the pose error, integrated."""
 
+from dataclasses import dataclass
+
 import numpy as np
 
 from robots.kinematics.forward import robust_solve
 from robots.pose import error_of_rows
 from systems.servo.law import LawInput, LawOutput, ServoLaw
+from systems.servo.law_config import LawConfig
 from systems.servo.sine_feedback import sine_feedback
+
+
+@dataclass
+class NumericalIkConfig(LawConfig):
+    """Its gains."""
 
 
 class NumericalIk(ServoLaw):
@@ -21,6 +29,7 @@ class NumericalIk(ServoLaw):
 
     title = "Numerical IK"
     colour = "#0f7cc0"
+    Config = NumericalIkConfig
     is_compared = True
     memory_size = 18
 

@@ -1,8 +1,16 @@
 """The baseline: the path through the nominal inverse kinematics, blind to the camera."""
 
+from dataclasses import dataclass
+
 import numpy as np
 
 from systems.servo.law import LawInput, LawOutput, ServoLaw
+from systems.servo.law_config import LawConfig
+
+
+@dataclass
+class OpenLoopConfig(LawConfig):
+    """Its drive and limits."""
 
 
 class OpenLoop(ServoLaw):
@@ -13,6 +21,7 @@ class OpenLoop(ServoLaw):
 
     title = "Open loop"
     colour = "#8a8f98"
+    Config = OpenLoopConfig
     uses_camera = False
     is_compared = True
     memory_size = 18

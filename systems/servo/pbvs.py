@@ -1,12 +1,23 @@
 """Position-based visual servoing: joint velocities from the difference of the poses in Euler angles."""
 
 import math
+from dataclasses import dataclass
 
 import numpy as np
 
+from robots.configuration.quantity import quantity
 from robots.kinematics.forward import robust_solve
 from robots.pose import Rows, angular_velocity, error_of_rows, euler_difference, zyx_angles
 from systems.servo.law import LawInput, LawOutput, ServoLaw, refuse_jump
+from systems.servo.law_config import LawConfig
+
+
+@dataclass
+class PbvsConfig(LawConfig):
+    """Its gains, and how fast it corrects."""
+
+    # The largest correction of one joint
+    correction_speed_limit_deg_s: float = quantity(30.0, 0.01, 1000.0, "deg/s")
 
 
 class Pbvs(ServoLaw):
@@ -21,6 +32,7 @@ class Pbvs(ServoLaw):
 
     title = "PBVS"
     colour = "#d55e00"
+    Config = PbvsConfig
     commands_motors = True
     is_compared = True
 

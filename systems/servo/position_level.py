@@ -1,9 +1,11 @@
 """The error system on position level: the wanted pose, shifted by the integral of its error."""
 
 import math
+from dataclasses import dataclass
 
 import numpy as np
 
+from robots.configuration.quantity import choice
 from robots.description.model import NUM_JOINTS
 from robots.kinematics.forward import rotation_about
 from robots.pose import Rows, error_of_rows, rotation_vector
@@ -54,6 +56,14 @@ class RotationVectorCorrection:
         return R_WC, w_WD + R_WC @ rate, R_WD @ turn
 
 
+@dataclass
+class PositionLevelConfig(LawConfig):
+    """Its gains, and how it corrects the orientation."""
+
+    # The form of the correction; euler, as the source has it
+    angles: str = choice("rotation_vector", ("rotation_vector", "euler"))
+
+
 class PositionLevel(ServoLaw):
     """Commands q(z_d + c) with dc/dt = K (z_d - z_m), Probst (2024) eqs. (5.18), (5.19).
 
@@ -69,10 +79,11 @@ class PositionLevel(ServoLaw):
 
     title = "Position level"
     colour = "#009e73"
+    Config = PositionLevelConfig
     is_compared = True
     memory_size = 24
 
-    def __init__(self, model: ControllerModel, config: LawConfig, guard: GuardConfig) -> None:
+    def __init__(self, model: ControllerModel, config: PositionLevelConfig, guard: GuardConfig) -> None:
         """Checks the configuration.
 
         Raises:

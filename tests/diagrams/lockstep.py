@@ -12,8 +12,8 @@ from diagrams.runs.virtual_cell import VirtualCell
 from diagrams.scenario.scenario import Scenario
 from robots.description.model import load_robot
 from systems.cell.network_faults import FaultyLink
-from systems.link.abb.controller import VirtualController
 from systems.link.abb.messages import Command, Mode, RobotReport
+from systems.link.abb.robot_link import AbbRobotLink
 from systems.link.abb.session import EgmSession
 from systems.link.clock import ClockQuality
 from systems.samples import PoseSample
@@ -29,7 +29,7 @@ class Lockstep:
     def __init__(self, scenario: Scenario) -> None:
         robot, config = load_robot(scenario.robot), scenario.station
         self.cell = VirtualCell(scenario, robot)
-        self.controller = VirtualController(robot, config.egm.run)
+        self.controller = config.link.virtual_controller(robot)
         self.session = EgmSession(robot.speed, config.link.break_after, period=config.period)
         self.channel = SimpleNamespace(address=("127.0.0.1", 6510))
         self.time = self.arrived = 0.0
@@ -90,6 +90,11 @@ class Lockstep:
         for _ in range(cycles):
             self._cycle()
 
+    @property
+    def link(self) -> AbbRobotLink:
+        """The client's end as a run takes it."""
+        return AbbRobotLink(self)  # pyright: ignore[reportArgumentType]
+
     def camera(self) -> "LockstepCamera":
         """The camera's end of the wire."""
         return LockstepCamera(self)
@@ -136,4 +141,4 @@ class LockstepCamera:
     def report(self) -> SimpleNamespace:
         """What the run asks for at its end."""
         clock = ClockQuality(0, 0.0, 0.0, 0.0, 0.0, {}, 1)
-        return SimpleNamespace(wire=SimpleNamespace(), samples=SimpleNamespace(), clock=clock, last_error="")
+        return SimpleNamespace(counters={}, clock=clock, last_error="")

@@ -12,7 +12,7 @@ import pytest
 from diagrams.runs.cell_loop import CellLoop
 from diagrams.scenario.scenario import load_scenario
 from robots.description.model import load_robot
-from systems.link.abb.channel import UdpChannel
+from systems.link.udp_channel import UdpChannel
 
 CLIENT = Path(__file__).parents[1] / "systems" / "link" / "abb" / "foreign_client.py"
 
@@ -26,7 +26,7 @@ def moved_by(package: str, mode: str) -> dict:
     assert client.stdout is not None
     assert client.stdout.readline().strip() == "listening"
     # A busy machine may keep the client from answering for a while.
-    scenario = load_scenario("cell", ["station.egm.run.timeout=5"])
+    scenario = load_scenario("cell", ["station.link.run.timeout=5"])
     loop = CellLoop(scenario, load_robot("irb1200"), ("127.0.0.1", port), with_log=False)
     finished = threading.Event()
     waiter = threading.Thread(target=lambda: (client.wait(60.0), finished.set()))

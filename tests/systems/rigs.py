@@ -152,7 +152,8 @@ class LawRig:
         preview: float = 0.0,
     ) -> None:
         model = ControllerModel(nominal, period=PERIOD, preview=preview, camera_delay=0.2)
-        self.law = LAWS[law](model, config or LawConfig(), GuardConfig())
+        config = LAWS[law].Config(**vars(config or LawConfig()))
+        self.law = LAWS[law](model, config, GuardConfig())
         self.context = self.law.CreateDefaultContext()
         self.true = Kinematics(true or nominal)
         self.path, self.preview, self.delay = path, preview, delay

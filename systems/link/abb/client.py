@@ -2,9 +2,10 @@
 
 import numpy as np
 
-from systems.link.abb.channel import Buffering, UdpChannel, steady_time
 from systems.link.abb.messages import Command, Mode, RobotReport
 from systems.link.abb.session import EgmSession
+from systems.link.clock import steady_time
+from systems.link.udp_channel import Buffering, UdpChannel
 
 
 class EgmClient:

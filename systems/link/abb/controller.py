@@ -23,6 +23,7 @@ from systems.link.abb.schema import (
     RAPID_RUNNING,
     EgmRobot,
 )
+from systems.link.abb.signals import ControllerSignals, SignalCodec, SignalLayout
 
 _WRAP = 2**32
 _STANDING = np.full(NUM_JOINTS, math.nan)
@@ -50,11 +51,11 @@ class RunState(Enum):
 class VirtualController:
     """Emulates an ABB controller. Times are on the controller's clock, in s."""
 
-    def __init__(self, robot: RobotModel, config: EgmRunConfig) -> None:
+    def __init__(self, robot: RobotModel, config: EgmRunConfig, signals: SignalLayout | None = None) -> None:
         """Starts the program at its first cycle.
 
         Raises:
-            ValueError: if a time or an angle is not positive.
+            ValueError: if a time or an angle is not positive, or there cannot be such a layout of signals.
         """
         for name in ("timeout", "condition_deg", "condition_time"):
             if not getattr(config, name) > 0.0:
@@ -63,6 +64,7 @@ class VirtualController:
         self.motors_on = True
         self.restarts = self.undecodable = self.late = self.ignored = 0
         self._config = config
+        self._codec = SignalCodec(signals or SignalLayout())
         self._kinematics, self._inverse = Kinematics(robot), inverse_kinematics(robot)
         self._seqno = 0
         self._began: float | None = None
@@ -172,6 +174,14 @@ class VirtualController:
         message.torqueRef.joints.extend(torque.tolist())
         message.utilizationRate = 0.0
         return message.SerializeToString()
+
+    def signals(self, time: float, position: np.ndarray, velocity: np.ndarray, torque: np.ndarray) -> bytes:
+        """The test signals of this cycle; arguments as of `report`, velocity in rad/s."""
+        return self._codec.encode(ControllerSignals(time, velocity, torque, position))
+
+    def counters(self) -> dict[str, int]:
+        """How often the program began anew, and what became of the datagrams, by name."""
+        return {name: getattr(self, name) for name in ("restarts", "undecodable", "late", "ignored")}
 
     def _pose(self, joints: np.ndarray) -> Pose:
         X = self._kinematics.forward(joints)

@@ -7,8 +7,7 @@ from enum import Enum
 import numpy as np
 
 from systems.link.abb.messages import Command, EgmError, Mode, RobotReport, decode_report, encode_command
-
-Address = tuple[str, int]
+from systems.link.udp_channel import Address
 
 _WRAP = 2**32  # sequence numbers begin anew after it
 _LARGEST_GAP = 1000  # messages; four seconds

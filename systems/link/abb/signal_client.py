@@ -1,7 +1,7 @@
 """Receives the test signals of a controller."""
 
-from systems.link.abb.channel import UdpChannel
 from systems.link.abb.signals import ControllerSignals, SignalCodec, SignalError, SignalLayout
+from systems.link.udp_channel import UdpChannel
 
 
 class SignalClient:

@@ -9,7 +9,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from pydrake.math import RigidTransform, RotationMatrix
 
-from systems.link.clock import CameraClock, ClockConfig, ClockQuality
+from systems.link.clock import ClockConfig, ClockQuality, StampClock
 from systems.link.qualisys.client import MocapClient, MocapConfig
 from systems.link.qualisys.conversation import State
 from systems.link.qualisys.datagrams import Counters
@@ -52,6 +52,11 @@ class MocapReport:
     samples: SampleCounters
     clock: ClockQuality
 
+    @property
+    def counters(self) -> dict[str, int]:
+        """What became of packets and frames, by name."""
+        return {**vars(self.wire), **vars(self.samples)}
+
 
 class MocapReceiver:
     """Pose samples of one body, from a Qualisys server."""
@@ -75,7 +80,7 @@ class MocapReceiver:
         if not config.oldest > 0.0:
             raise ValueError(f"camera server: oldest must be positive, got {config.oldest} s")
         self.client = MocapClient(config.server)
-        self.clock = CameraClock(config.clock)
+        self.clock = StampClock(config.clock)
         self.counters = SampleCounters()
         self._oldest = config.oldest
         self._X_WM, self._X_BE = X_WM, X_BE

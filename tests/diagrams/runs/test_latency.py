@@ -20,8 +20,8 @@ def measured(*settings: str, **config) -> Latency:
         scenario,
         ROBOT,
         LatencyConfig(**{"duration": 12.0, **config}),
-        wire,  # pyright: ignore[reportArgumentType]
-        wire.camera(),  # pyright: ignore[reportArgumentType]
+        wire.link,
+        wire.camera(),
         now=wire.now,
     )
     return evaluate(record)

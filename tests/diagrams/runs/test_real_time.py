@@ -27,7 +27,7 @@ def quick(*settings: str) -> Scenario:
 def guided(scenario: Scenario, law: str = "numerical_ik") -> tuple[RealTimeRecord, Any, Lockstep]:
     """The record of a run, the true errors by tick (n, 6), and the wire."""
     wire = Lockstep(scenario)
-    record = RealTimeRun(scenario, law).run(wire, wire.camera(), now=wire.now)  # pyright: ignore[reportArgumentType]
+    record = RealTimeRun(scenario, law).run(wire.link, wire.camera(), now=wire.now)
     stamps, ticks = record.stamps, np.arange(len(record.stamps))
     heard = np.isfinite(stamps)
     X_WE, _ = wire.cell.record().at(np.interp(ticks, ticks[heard], stamps[heard]))
@@ -119,7 +119,7 @@ def test_a_run_may_go_on_where_it_was_interrupted(fault: str, law: str):
 
 
 def test_a_controller_that_does_not_come_back_ends_the_run():
-    settings = ["stop_at=5"], ["link.on_break=resume", "link.resume_within=1", "egm.run.restart_after=-1"]
+    settings = ["stop_at=5"], ["link.on_break=resume", "link.resume_within=1", "link.run.restart_after=-1"]
     scenario = quick(f"station.faults.{settings[0][0]}", *(f"station.{each}" for each in settings[1]))
     record, _, _ = guided(scenario)
     assert record.ended == "the controller did not come back"
@@ -129,11 +129,11 @@ def test_a_station_that_is_not_there_or_another_one_is_named_before_anything_mov
     wire = Lockstep(quick())
     wire.switch_motors_off()
     with pytest.raises(StationError, match=r"does not run EGM: waited 0\.5 s on UDP"):
-        RealTimeRun(quick("station.link.connect=0.5"), "open_loop").run(wire, None, now=wire.now)  # pyright: ignore
+        RealTimeRun(quick("station.link.connect=0.5"), "open_loop").run(wire.link, None, now=wire.now)
     wire = Lockstep(quick())
     with pytest.raises(StationError, match=r"sends every 4.032 ms, station.period is 8 ms"):
         RealTimeRun(quick("station.period=0.008", "station.drive.command_delay=0.008"), "open_loop").run(
-            wire,  # pyright: ignore[reportArgumentType]
+            wire.link,
             None,
             now=wire.now,
         )

@@ -85,6 +85,32 @@ def test_settings_come_last_and_are_read_as_yaml():
     assert (law.translation, law.drive) == (3.0, "velocity")  # the rest of the law stays
 
 
+def test_a_tag_may_say_whose_gains_and_whose_link_they_are(tmp_path: Path):
+    """As Drake tags the members of a union; one that is not what belongs there is refused."""
+    name = written(
+        tmp_path,
+        "extends: misaligned\nservo: {laws: {numerical_ik: !NumericalIk {translation: 3}}}\n"
+        "station: {link: !AbbEgm {run: {timeout: 5}}}\n",
+    )
+    scenario = load_scenario(name, ["servo.laws.numerical_ik.rotation=2"])
+    gains = scenario.servo.laws["numerical_ik"]
+    assert (gains.translation, gains.rotation, gains.drive) == (3.0, 2.0, "cascade")
+    assert scenario.station.link.run.timeout == 5.0
+    wrong = written(tmp_path, "servo: {laws: {numerical_ik: !Pbvs {translation: 3}}}\n", "wrong.yaml")
+    with pytest.raises(
+        ScenarioError, match=r"line 1: servo\.laws\.numerical_ik takes .* !NumericalIk, got !Pbvs"
+    ):
+        load_scenario(wrong)
+
+
+def test_a_law_takes_its_own_gains_alone():
+    assert load_scenario("nominal", ["servo.laws.position_level.angles=euler"])
+    with pytest.raises(
+        ScenarioError, match=r"unknown key 'servo\.laws\.pbvs\.angles'; known here: .*speed_limit"
+    ):
+        load_scenario("nominal", ["servo.laws.pbvs.angles=euler"])
+
+
 def test_a_small_number_may_be_written_with_an_exponent_and_no_point():
     """YAML 1.1 takes 50e-6 for a text; whoever sets a spread does not."""
     scenario = load_scenario("nominal", ["station.camera.position_sigma=50e-6"])

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from systems.link.clock import CameraClock, ClockConfig
+from systems.link.clock import ClockConfig, StampClock
 
 RATE = 250.0  # Hz
 DELAY = 0.004  # s, of an idle line
@@ -20,7 +20,7 @@ def exposures(duration: float, drift: float, start_us: int = 7_000_000_000):
     return 1000.0 + time, start_us + np.rint(1e6 * time / (1.0 + drift)).astype(int)
 
 
-def observe(clock: CameraClock, stamps: np.ndarray, arrivals: np.ndarray) -> None:
+def observe(clock: StampClock, stamps: np.ndarray, arrivals: np.ndarray) -> None:
     for stamp, arrival in zip(stamps.tolist(), arrivals.tolist(), strict=True):
         clock.observe(stamp, arrival)
 
@@ -31,7 +31,7 @@ def test_a_minute_of_jittery_frames_gives_the_drift_and_the_place_of_a_stamp(jit
     """In 25 runs the drift spread by 0.25 ppm, a place was off by 10 +- 7 us; four times that is allowed."""
     time, stamps = exposures(60.0, drift)
     arrivals = time + DELAY + JITTERS[jitter](np.random.default_rng(3), len(time))
-    clock = CameraClock(ClockConfig(smallest_delay=DELAY))
+    clock = StampClock(ClockConfig(smallest_delay=DELAY))
     observe(clock, stamps, arrivals)
     quality = clock.quality()
     assert quality.drift_ppm == pytest.approx(1e6 * drift, abs=1.0)
@@ -46,7 +46,7 @@ def test_a_minute_of_jittery_frames_gives_the_drift_and_the_place_of_a_stamp(jit
 def test_a_fast_drift_is_known_after_ten_seconds_from_bins_that_began_without_it():
     """At 1000 ppm a bin is 1 ms from end to end; ten of them know the slope to 2.5 ppm."""
     time, stamps = exposures(10.5, 1e-3)
-    clock = CameraClock(ClockConfig(smallest_delay=DELAY))
+    clock = StampClock(ClockConfig(smallest_delay=DELAY))
     observe(clock, stamps, time + DELAY + np.random.default_rng(1).uniform(0.0, 1e-3, len(time)))
     assert clock.quality().drift_ppm == pytest.approx(1000.0, abs=10.0)
 
@@ -56,7 +56,7 @@ def test_the_stated_sigmas_are_those_of_repeated_runs():
     found = []
     for seed in range(25):
         time, stamps = exposures(20.0, 100e-6)
-        clock = CameraClock(ClockConfig(smallest_delay=DELAY))
+        clock = StampClock(ClockConfig(smallest_delay=DELAY))
         observe(clock, stamps, time + DELAY + np.random.default_rng(seed).exponential(3e-3, len(time)))
         quality = clock.quality()
         error = clock.station_time(int(stamps[-1])) - time[-1]
@@ -76,7 +76,7 @@ def test_frames_that_wait_in_a_pattern_do_not_look_like_a_drift():
     share = 0.1 + 0.05 * (time - 1000.0) / 20.0
     arrivals = time + DELAY + np.random.default_rng(2).exponential(2e-5, len(time))
     arrivals[phase > share] += 2e-4  # a tenth is read at once, and more towards the end
-    clock = CameraClock(ClockConfig(smallest_delay=DELAY))
+    clock = StampClock(ClockConfig(smallest_delay=DELAY))
     observe(clock, stamps, arrivals)
     assert clock.quality().drift_ppm == pytest.approx(0.0, abs=1.0)
 
@@ -88,7 +88,7 @@ def test_stamps_that_are_far_off_do_not_move_it():
     wild = rng.random(len(time)) < 0.03
     spoiled = stamps.copy()
     spoiled[wild] += rng.integers(-2_000_000, 2_000_000, wild.sum())
-    clock = CameraClock(ClockConfig(smallest_delay=DELAY))
+    clock = StampClock(ClockConfig(smallest_delay=DELAY))
     observe(clock, spoiled, arrivals)
     assert clock.quality().sessions == 1
     assert clock.quality().drift_ppm == pytest.approx(100.0, abs=10.0)
@@ -100,7 +100,7 @@ def test_a_stall_of_a_second_is_no_new_session():
     arrivals = time + DELAY + np.random.default_rng(1).uniform(0.0, 1e-3, len(time))
     stalled = (time >= 1015.3) & (time < 1016.3)
     arrivals[stalled] = 1016.3 + DELAY
-    clock = CameraClock(ClockConfig(smallest_delay=DELAY))
+    clock = StampClock(ClockConfig(smallest_delay=DELAY))
     observe(clock, stamps, arrivals)
     assert clock.quality().sessions == 1
     assert clock.quality().drift_ppm == pytest.approx(100.0, abs=2.0)
@@ -111,7 +111,7 @@ def test_a_stall_of_a_second_is_no_new_session():
 def test_a_clock_that_is_set_anew_is_known_again_two_seconds_later(jump_us: int):
     time, stamps = exposures(30.0, 0.0)
     stamps[time >= 1020.4] += jump_us
-    clock = CameraClock(ClockConfig(smallest_delay=DELAY))
+    clock = StampClock(ClockConfig(smallest_delay=DELAY))
     arrivals = time + DELAY + np.random.default_rng(1).uniform(0.0, 1e-3, len(time))
     observe(clock, stamps[time < 1023.0], arrivals[time < 1023.0])
     assert clock.quality().sessions == 2
@@ -119,7 +119,7 @@ def test_a_clock_that_is_set_anew_is_known_again_two_seconds_later(jump_us: int)
 
 
 def test_one_frame_places_a_stamp_and_none_does_not():
-    clock = CameraClock(ClockConfig(smallest_delay=DELAY))
+    clock = StampClock(ClockConfig(smallest_delay=DELAY))
     assert np.isnan(clock.station_time(5))
     clock.observe(1_000_000, 20.0)
     assert clock.station_time(1_500_000) == pytest.approx(20.5 - DELAY)
@@ -137,4 +137,4 @@ def test_one_frame_places_a_stamp_and_none_does_not():
 )
 def test_refuses_what_no_clock_can_be(change: dict, message: str):
     with pytest.raises(ValueError, match=f"camera clock: .*{message}"):
-        CameraClock(ClockConfig(**change))
+        StampClock(ClockConfig(**change))

@@ -210,7 +210,9 @@ def test_without_a_usable_sample_the_correction_is_held(law: str, kind: str):
 @pytest.mark.parametrize("law", CORRECTING)
 def test_the_correction_stops_at_its_limit(law: str):
     """A camera that is wrong by 100 mm can move the tip by 20 mm; pbvs is limited in its speed, too."""
-    config = LawConfig(correction_limit=0.02, correction_speed_limit_deg_s=2.0)
+    config = LAWS[law].Config(correction_limit=0.02)
+    if law == "pbvs":
+        config.correction_speed_limit_deg_s = 2.0
     rig = LawRig(law, ROBOT, standing(HOME), joints_at(HOME), config=config)
     false = pose(displaced(np.array([0.0, 0.0, 0.0, 0.1, 0.0, 0.0])))
     positions = [rig.q]

@@ -11,9 +11,8 @@ from systems.controller_model import ControllerModel
 from systems.guard.guard import GuardConfig
 from systems.reference.paths import ReferenceConfig, make_path
 from systems.reference.shapes import Circle
-from systems.servo import LawConfig
 from systems.servo.euler_correction import EulerCorrection
-from systems.servo.position_level import PositionLevel, RotationVectorCorrection
+from systems.servo.position_level import PositionLevel, PositionLevelConfig, RotationVectorCorrection
 from tests.systems.rigs import PERIOD, LawRig
 
 ROBOT = load_robot("irb1200")
@@ -36,7 +35,7 @@ def error_at_rest(beta_deg: float, angles: str = "rotation_vector") -> float:
     """The angle in rad that is left after ten time constants with a tool that is tilted by 7 degrees."""
     X = looking(beta_deg)
     q = InverseKinematics(ROBOT).nearest(X, np.zeros(6))
-    config = LawConfig(rotation=5.0, translation=5.0, angles=angles)
+    config = PositionLevelConfig(rotation=5.0, translation=5.0, angles=angles)
     rig = LawRig("position_level", ROBOT, lambda time: (X, np.zeros(6)), q, true=tilted_tool(), config=config)
     return float(np.linalg.norm(pose_error(X[None], rig.run(2.0))[-1, :3]))
 
@@ -85,7 +84,7 @@ def test_euler_angles_refuse_a_path_near_their_singular_orientation():
     def law(beta_deg: float, angles: str) -> None:
         circle = Circle(radius_mm=60.0, zyx_deg=np.array([0.0, beta_deg, 0.0]))
         path = make_path(ReferenceConfig(circle))
-        PositionLevel(ControllerModel(ROBOT), LawConfig(angles=angles), GuardConfig()).check_path(path)
+        PositionLevel(ControllerModel(ROBOT), PositionLevelConfig(angles=angles), GuardConfig()).check_path(path)
 
     law(70.0, "euler")
     law(90.0, "rotation_vector")

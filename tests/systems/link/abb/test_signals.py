@@ -10,9 +10,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from systems.link.abb.channel import UdpChannel
 from systems.link.abb.signal_client import SignalClient
 from systems.link.abb.signals import ControllerSignals, SignalCodec, SignalError, SignalLayout
+from systems.link.udp_channel import UdpChannel
 
 numbers = st.lists(st.floats(-100.0, 100.0), min_size=6, max_size=6).map(np.array)
 

@@ -1,11 +1,10 @@
-"""UDP sockets for EGM and for test signals: bound to one address, never blocking, read to the end."""
+"""UDP sockets: bound to one address, never blocking, read to the end."""
 
 import select
 import socket
-import time
 from enum import Enum
 
-from systems.link.abb.session import Address
+Address = tuple[str, int]
 
 _LARGEST_DATAGRAM = 65536
 _LARGEST_BATCH = 5000  # datagrams at once: whoever floods the port does not stop the loop
@@ -103,8 +102,3 @@ class UdpChannel:
 
     def __exit__(self, *_: object) -> None:
         self.close()
-
-
-def steady_time() -> float:
-    """The clock that arrivals are stamped with, in s."""
-    return time.perf_counter()

@@ -5,9 +5,9 @@
 
 import pytest
 
-from systems.link.abb.channel import Buffering, ChannelError, UdpChannel
 from systems.link.abb.client import EgmClient
 from systems.link.abb.messages import Command, Mode
+from systems.link.udp_channel import Buffering, ChannelError, UdpChannel
 from tests.systems.link.abb.reports import PERIOD, SPEED, report
 
 

@@ -1,0 +1,55 @@
+"""Externally Guided Motion of ABB: what a scenario says of it, and the parts that a station takes from it."""
+
+from collections.abc import Iterator
+from contextlib import ExitStack, contextmanager
+from dataclasses import dataclass, field
+
+from robots.description.model import RobotModel
+from systems.link.abb.client import EgmClient
+from systems.link.abb.controller import EgmRunConfig, VirtualController
+from systems.link.abb.motion import EgmMotion, EgmMotionConfig
+from systems.link.abb.robot_link import AbbRobotLink
+from systems.link.abb.signal_client import SignalClient
+from systems.link.abb.signals import SignalCodec, SignalLayout
+from systems.link.protocols import Wire
+
+
+@dataclass
+class EgmSettings:
+    """Of the controller and of its test signals; with `systems.link.config.LinkConfig` it is a link."""
+
+    motion: EgmMotionConfig = field(default_factory=EgmMotionConfig)
+    run: EgmRunConfig = field(default_factory=EgmRunConfig)
+    signals: SignalLayout = field(default_factory=SignalLayout)
+
+    def check(self) -> None:
+        """Refuses a layout of test signals that cannot be. Raises ValueError."""
+        SignalCodec(self.signals)
+
+    def planner(self, period: float, takes_position: bool) -> EgmMotion:
+        """What plans between commands and drives, as the controller does."""
+        return EgmMotion(self.motion, period, takes_position=takes_position)
+
+    def virtual_controller(self, robot: RobotModel) -> VirtualController:
+        """The controller's end of the wire, before a simulated robot."""
+        return VirtualController(robot, self.run, self.signals)
+
+    @contextmanager
+    def open(self, robot: RobotModel, wire: Wire) -> Iterator[AbbRobotLink]:
+        """The client's end of the wire, for as long as the block lasts.
+
+        Raises:
+            ChannelError: if it cannot listen there.
+            ValueError: if a part refuses its configuration.
+        """
+        with ExitStack() as stack:
+            host = wire.controller or None
+            client = stack.enter_context(
+                EgmClient(robot.speed, wire.port, wire.address, host, wire.break_after, period=wire.period)
+            )
+            listener = None
+            if wire.signal_port is not None:
+                listener = stack.enter_context(
+                    SignalClient(self.signals, wire.signal_port, wire.address, host)
+                )
+            yield AbbRobotLink(client, listener)

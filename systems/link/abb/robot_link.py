@@ -1,0 +1,90 @@
+"""A controller under EGM with its test signals, as any robot's link."""
+
+import numpy as np
+
+from robots.description.model import NUM_JOINTS
+from systems.link.abb.client import EgmClient
+from systems.link.abb.messages import Command, Mode, RobotReport
+from systems.link.abb.session import Link
+from systems.link.abb.signal_client import SignalClient
+
+_SIGNAL_AGE = 0.1  # s, beyond which signals and earlier messages say nothing of the present motion
+
+
+class AbbRobotLink:
+    """Fits `systems.link.protocols.RobotLink`."""
+
+    def __init__(self, client: EgmClient, signals: SignalClient | None = None) -> None:
+        """Takes over sockets that are open; signals of None where the controller sends none."""
+        self._client, self._signals = client, signals
+        self._last: RobotReport | None = None
+        self.velocity = self.effort = np.zeros(NUM_JOINTS)
+
+    @property
+    def arrived(self) -> float:
+        """Steady time at which the newest report came, in s."""
+        return self._client.arrived
+
+    @property
+    def place(self) -> str:
+        """Where the controller is waited for."""
+        address, port = self._client.channel.address
+        return f"UDP {address}:{port}"
+
+    @property
+    def ports(self) -> tuple[int, int]:
+        """Where reports and test signals come in; 0 for no signals."""
+        return self._client.channel.address[1], self._signals.channel.address[1] if self._signals else 0
+
+    @property
+    def epoch(self) -> int:
+        """Grows whenever commands must start anew."""
+        return self._client.session.epoch
+
+    def why_not_ready(self) -> str:
+        """What keeps the robot from following commands."""
+        if self._client.session.link is Link.WAITING:
+            return "no message of a controller came in"
+        return "the controller does not run EGM"
+
+    def poll(self, timeout: float = 0.0) -> RobotReport | None:
+        """The newest report that has come, waiting for at most ``timeout`` in s."""
+        report = self._client.poll(timeout)
+        if report is not None:
+            last, self._last = self._last, report
+            self._note_motion(last, report)
+        return report
+
+    def poll_aside(self) -> None:
+        """Takes in test signals."""
+        if self._signals is not None:
+            self._signals.poll()
+
+    def send(self, position: np.ndarray, velocity: np.ndarray, is_speed_only: bool = False) -> bool:
+        """Answers the newest report with positions (rad) and speeds (rad/s), or speeds alone."""
+        mode = Mode.JOINT_SPEED_ONLY if is_speed_only else Mode.JOINT_SPEED
+        return self._client.reply(mode, Command(position=position, velocity=velocity))
+
+    def warm_up(self) -> None:
+        """Reads the last report and writes the last command once more."""
+        self._client.warm_up()
+
+    def counters(self) -> dict[str, int]:
+        """What has come and gone, by name."""
+        return self._client.session.counters.as_dict()
+
+    def _note_motion(self, last: RobotReport | None, report: RobotReport) -> None:
+        """Speeds and torques: from test signals if there are new ones, else from the messages themselves."""
+        newest = self._signals.newest if self._signals else None
+        is_new = newest is not None and not newest.time < report.time - _SIGNAL_AGE
+        if newest is not None and is_new and newest.velocity is not None:
+            self.velocity = newest.velocity
+        elif last is not None and 0.0 < report.time - last.time < _SIGNAL_AGE:
+            self.velocity = (report.position - last.position) / (report.time - last.time)
+        else:
+            self.velocity = np.zeros(NUM_JOINTS)
+        if newest is not None and is_new and newest.torque is not None:
+            self.effort = newest.torque
+        else:
+            torques = list(report.message.torqueRef.joints)
+            self.effort = np.array(torques) if len(torques) == NUM_JOINTS else np.zeros(NUM_JOINTS)

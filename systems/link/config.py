@@ -1,0 +1,62 @@
+"""Where the controller and the camera of a real station are, and what a maker adds to it."""
+
+from contextlib import AbstractContextManager
+from dataclasses import dataclass, field
+from typing import ClassVar
+
+from pydrake.systems.framework import LeafSystem
+
+from robots.configuration.quantity import choice, quantity
+from robots.description.model import Placement, RobotModel
+from systems.link.protocols import RobotLink, VirtualController, Wire
+from systems.link.qualisys.maker import Qualisys
+
+
+@dataclass
+class LinkConfig:
+    """Addresses, and what to do when the other end falls silent; a maker's class extends it."""
+
+    kind: ClassVar[str]  # what scenarios and the command line call it
+    takes_torque: ClassVar[bool] = False  # whether commands may have a torque feedforward
+
+    address: str = "127.0.0.1"  # of this machine, to listen on for the controller
+    port: int = quantity(6510, 0, 65535)  # where the controller sends its messages
+    controller: str = ""  # its address; empty to take whoever speaks first
+    connect: float = quantity(10.0, 0.1, 3600.0, "s")  # to wait for controller and camera
+    # Silence after which the controller counts as gone
+    break_after: float = quantity(0.1, 0.01, 10.0, "s")
+    # What a run does then, or when the controller stops: end, or resume
+    on_break: str = choice("end", ("end", "resume"))
+    resume_within: float = quantity(10.0, 0.1, 3600.0, "s")  # in which it must be back
+    signal_port: int = quantity(0, 0, 65535)  # of this machine, where test signals arrive; 0 for none
+    has_camera: bool = True
+    camera: Qualisys = field(default_factory=Qualisys)
+    camera_frame: Placement = field(default_factory=Placement)  # of the camera system in the world
+    tool_frame: Placement = field(default_factory=Placement)  # of the tool in the body that the camera tracks
+
+    def wire(self, period: float, any_port: bool = False) -> Wire:
+        """Where to wait for the controller, whose cycle is ``period`` in s; if wanted, on any free port."""
+        signal_port = (0 if any_port else self.signal_port) if self.signal_port else None
+        return Wire(
+            self.address, 0 if any_port else self.port, self.controller, self.break_after, period, signal_port
+        )
+
+    def check(self) -> None:
+        """Refuses settings that contradict each other. Raises ValueError."""
+
+    def open(self, robot: RobotModel, wire: Wire) -> AbstractContextManager[RobotLink]:
+        """The client's end of the wire, for as long as a block lasts. Raises ValueError if it cannot be."""
+        raise NotImplementedError
+
+    def planner(self, period: float, takes_position: bool) -> LeafSystem:
+        """What plans between commands and drives, as the controller does; a `systems.link.protocols.Planner`.
+
+        Args:
+            period: s, its cycle.
+            takes_position: False where it follows speeds alone.
+        """
+        raise NotImplementedError
+
+    def virtual_controller(self, robot: RobotModel) -> VirtualController:
+        """The controller's end of the wire, before a simulated robot."""
+        raise NotImplementedError
