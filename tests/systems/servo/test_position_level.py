@@ -84,7 +84,9 @@ def test_euler_angles_refuse_a_path_near_their_singular_orientation():
     def law(beta_deg: float, angles: str) -> None:
         circle = Circle(radius_mm=60.0, zyx_deg=np.array([0.0, beta_deg, 0.0]))
         path = make_path(ReferenceConfig(circle))
-        PositionLevel(ControllerModel(ROBOT), PositionLevelConfig(angles=angles), GuardConfig()).check_path(path)
+        PositionLevel(ControllerModel(ROBOT), PositionLevelConfig(angles=angles), GuardConfig()).check_path(
+            path
+        )
 
     law(70.0, "euler")
     law(90.0, "rotation_vector")
