@@ -31,6 +31,7 @@ def run(
     robot: RobotModel | None = None,
     seed: int | None = None,
     progress: Callable[[float], None] | None = None,
+    plant: RobotModel | None = None,
 ) -> RunLog:
     """Runs one law through a scenario, from rest at the start of the path to the end of the dwell.
 
@@ -41,12 +42,13 @@ def run(
             calibrated one, the true robot is made from it too.
         seed: of the camera's noise; None for the scenario's.
         progress: is called now and then with the share that is done, 0 to 1.
+        plant: the robot in the station, if it is another one than the controller knows.
 
     Raises:
         ScenarioError: if the nominal robot cannot follow the path.
         ValueError: if a part refuses its configuration.
     """
-    experiment = Experiment(scenario, law, robot, seed)
+    experiment = Experiment(scenario, law, robot, seed, plant)
     experiment.advance(progress=progress)
     return experiment.log()
 
@@ -60,18 +62,19 @@ class Experiment:
         law: str | type[System] | System,
         robot: RobotModel | None = None,
         seed: int | None = None,
+        plant: RobotModel | None = None,
     ) -> None:
         """Builds the diagram and puts everything at rest at the start. Raises what `run` raises.
 
         Args:
-            scenario, robot, seed: as of `run`.
+            scenario, robot, seed, plant: as of `run`.
             law: a shipped law by name, ``FILE.py:CLASS``, a class, or any system with the ports of a law.
         """
         self.scenario, self.law = scenario, law_name(law)
         end = make_path(scenario.reference).duration
         check_events(scenario.station.events, end, scenario.station.drive.dead_time)
         self.seed = scenario.seed if seed is None else seed
-        drawn = nominal_robot(scenario, robot)
+        drawn = plant or nominal_robot(scenario, robot)
         robot = robot or drawn
         builder = DiagramBuilder()
         servo = Servo(robot, scenario, law)

@@ -25,11 +25,12 @@ from experiments.feedforward.plots import TABLE_HEAD, study_verdict, table_rows,
 from experiments.feedforward.study import (
     ANGLES_DEG,
     KINDS,
+    PLANTS,
     FeedforwardStudy,
     study_feedforward,
     study_json,
 )
-from robots.description.model import load_robot
+from robots.description.model import RobotFileError, RobotModel, load_robot
 from systems.feedforward import FeedforwardConfig
 
 PAGE = "feedforward.html"
@@ -39,6 +40,14 @@ def feedforward_command(
     robot: StudiedRobotOption = "kr16",
     payload: PayloadOption = None,
     grid: GridOption = 7,
+    plant: Annotated[
+        str,
+        typer.Option(
+            "--plant",
+            metavar="|".join(PLANTS),
+            help="What is driven: the robot of the models, or the one named after it with -realistic.",
+        ),
+    ] = "realistic",
     stiffness_error: Annotated[
         float,
         typer.Option(
@@ -53,7 +62,9 @@ def feedforward_command(
     human = human_console(json_file)
     with json_output(json_file) as output, refusing(ValueError, OSError), ExitStack() as stack:
         at_least("--jobs", 1, jobs)
-        model = load_robot(robot)
+        if plant not in PLANTS:
+            raise ValueError(f"--plant must be one of {', '.join(PLANTS)}, got '{plant}'")
+        model, realistic = load_robot(robot), realistic_robot(robot) if plant == "realistic" else None
         mass = model.payload.largest_mass if payload is None else payload
         page = stack.enter_context(staged_file(out / PAGE))
         stack.enter_context(output.staged())
@@ -62,7 +73,7 @@ def feedforward_command(
         label = f"{count(runs, 'run')} in {count(processes, 'process', 'processes')}"
         with progress_bar(label) as progress:
             config = FeedforwardConfig(stiffness_error=stiffness_error)
-            study = study_feedforward(model, mass, config, grid, processes, progress)
+            study = study_feedforward(model, mass, config, grid, processes, progress, realistic)
         write_study_page(page, study)
         output.write(study_json(study))
     human.print(_table(study))
@@ -70,8 +81,24 @@ def feedforward_command(
     print_files(human, out / PAGE)
 
 
+def realistic_robot(name: str) -> RobotModel:
+    """The realistic variant of a robot: the file that is named after it.
+
+    Raises:
+        RobotFileError: if there is none.
+    """
+    stem = name.removesuffix(".yaml").removesuffix(".yml")
+    try:
+        return load_robot(f"{stem}-realistic{name[len(stem) :]}")
+    except RobotFileError as error:
+        raise RobotFileError(f"--plant realistic: {error}; --plant exact needs no other file") from error
+
+
 def _table(study: FeedforwardStudy) -> Table:
-    title = f"{study.robot.name}, {study.payload:g} kg: deviation from a rectangle, relative to rigid"
+    title = (
+        f"{study.robot.name}, {study.payload:g} kg, {study.plant} plant: deviation from a rectangle, "
+        "relative to rigid"
+    )
     table = Table(box=box.SIMPLE_HEAD, title=escape(title), title_justify="left", title_style="italic")
     for name in TABLE_HEAD:
         table.add_column(name, justify="left" if name == TABLE_HEAD[0] else "right", no_wrap=True)

@@ -14,7 +14,7 @@ from systems.feedforward import FEEDFORWARDS
 
 COLORS = {kind: FEEDFORWARDS[kind].colour for kind in KINDS}
 LABELS = {kind: FEEDFORWARDS[kind].title for kind in KINDS}
-TABLE_HEAD = ("feedforward", "integral", "max", "max mm", "us a tick")
+TABLE_HEAD = ("feedforward", "integral", "max", "max mm", "sag mm", "dynamic mm", "us a tick")
 
 
 def criterion_figure(study: FeedforwardStudy, angle_deg: int) -> go.Figure:
@@ -77,6 +77,8 @@ def table_rows(study: FeedforwardStudy) -> list[list[str]]:
             f"{path.integral / rigid.integral:.4f}",
             f"{path.max / rigid.max:.4f}",
             f"{1e3 * path.max:.4f}",
+            f"{1e3 * path.sag:.4f}",
+            f"{1e3 * path.dynamic:.4f}",
             f"{1e6 * study.tick[kind]:.0f}",
         ]
         for kind, path in study.path.items()
@@ -103,6 +105,9 @@ def study_verdict(study: FeedforwardStudy) -> str:
 def _error_note(study: FeedforwardStudy) -> str:
     """How wrong the models were."""
     error = study.config.stiffness_error
+    if study.plant == "realistic":
+        also = f", all the models' springs {error:+.0%}" if error else ""
+        return f"; the plant has softer springs, friction, play and hysteresis that no model knows of{also}"
     if not error:
         return ", whose parameters are exact"
     return (
@@ -157,7 +162,7 @@ def write_study_page(path: Path, study: FeedforwardStudy) -> None:
             760,
         )
     )
-    title = f"Feedforward, {study.robot.name}, {study.payload:g} kg"
+    title = f"Feedforward, {study.robot.name}, {study.payload:g} kg, {study.plant} plant"
     write_plot_page(path, title, study_verdict(study), sections)
 
 

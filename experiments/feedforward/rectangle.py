@@ -31,6 +31,7 @@ class RectangleTrial:
     robot: RobotModel
     payload: float  # kg
     config: FeedforwardConfig
+    plant: RobotModel | None = None  # in the station, if it is another one than the model's
 
     def run(self, progress: Progress | None = None) -> "Deviation":
         """Simulates it with an elastic structure.
@@ -38,19 +39,33 @@ class RectangleTrial:
         Raises:
             ValueError: if the robot cannot follow the rectangle.
         """
-        log = run(rectangle_scenario(self), LAW, self.robot, progress=progress)
+        log = run(rectangle_scenario(self), LAW, self.robot, progress=progress, plant=self.plant)
         on_path = log.time >= log.path_start
         gap = log.X_WE_true[:, :3, 3] - log.X_WE_desired[:, :3, 3]
-        distance = np.linalg.norm(gap, axis=1)
-        return Deviation(log.time[on_path] - log.path_start, distance[on_path])
+        return Deviation(log.time[on_path] - log.path_start, gap[on_path])
 
 
 @dataclass(frozen=True)
 class Deviation:
     """Deviation of the tip from its desired position."""
 
-    time: np.ndarray  # (n,) s
-    distance: np.ndarray  # (n,) m
+    time: np.ndarray  # (n,) s, from the start of the path
+    gap: np.ndarray  # (n, 3) m
+
+    @property
+    def distance(self) -> np.ndarray:
+        """In m, shape (n,)."""
+        return np.linalg.norm(self.gap, axis=1)
+
+    @property
+    def sag(self) -> float:
+        """The distance in m at rest, before the path begins."""
+        return float(self.distance[0])
+
+    @property
+    def dynamic(self) -> float:
+        """How far the gap goes at most in m from what it was at rest."""
+        return float(np.linalg.norm(self.gap - self.gap[0], axis=1).max())
 
     @property
     def integral(self) -> float:

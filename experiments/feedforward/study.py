@@ -15,6 +15,7 @@ from systems.controller_model import ControllerModel
 from systems.feedforward import FEEDFORWARDS, FeedforwardConfig
 
 KINDS: tuple[str, ...] = ("rigid", "flexible_joint", "elastic_structure")
+PLANTS = ("exact", "realistic")
 ANGLES_DEG = (5, 20)  # of the motions
 
 
@@ -24,6 +25,7 @@ class FeedforwardStudy:
 
     robot: RobotModel
     payload: float  # kg
+    plant: str  # of `PLANTS`, what stands in the station
     config: FeedforwardConfig  # how wrong the models are
     axis_2: np.ndarray  # (n,) rad, where the motions begin
     axis_3: np.ndarray  # (n,) rad
@@ -44,16 +46,18 @@ def study_feedforward(
     grid: int,
     processes: int | None = None,
     progress: Callable[[float], None] | None = None,
+    realistic: RobotModel | None = None,
 ) -> FeedforwardStudy:
     """Simulates all of it.
 
     Args:
-        robot: which robot.
+        robot: which robot, as the models know it.
         payload: mass at the flange in kg.
         config: how wrong the models are; the kinds take turns.
         grid: positions of axis 2, and of axis 3, at least 2.
         processes: how many work at a time; None for one per core.
         progress: is called now and then with the share that is done, 0 to 1.
+        realistic: what stands in the station; None for the robot exactly as the models know it.
 
     Raises:
         ValueError: if the grid is too small, or the robot or a model refuses.
@@ -67,10 +71,14 @@ def study_feedforward(
     # From everywhere there is room for the largest motion.
     axis_2, axis_3 = np.linspace(robot.lower[1:3], robot.upper[1:3] - np.deg2rad(max(ANGLES_DEG)), grid).T
     starts = [np.array([0.0, q2, q3, 0.0, 0.0, 0.0]) for q2 in axis_2 for q3 in axis_3]
-    jobs: list[RectangleTrial | Trial] = [RectangleTrial(robot, payload, configs[kind]) for kind in KINDS]
+    jobs: list[RectangleTrial | Trial] = [
+        RectangleTrial(robot, payload, configs[kind], realistic) for kind in KINDS
+    ]
     for angle in ANGLES_DEG:
         for kind in KINDS:
-            jobs += [Trial(robot, payload, start, np.deg2rad(angle), configs[kind]) for start in starts]
+            jobs += [
+                Trial(robot, payload, start, np.deg2rad(angle), configs[kind], realistic) for start in starts
+            ]
     results = in_processes(_work, jobs, processes, progress)
     path: dict[str, Any] = dict(zip(KINDS, results[: len(KINDS)], strict=True))
     values = np.array(results[len(KINDS) :], dtype=float).reshape(len(ANGLES_DEG), len(KINDS), grid, grid)
@@ -80,7 +88,8 @@ def study_feedforward(
     }
     # Alone on a core, after the rest is done.
     tick = {kind: tick_time(RectangleTrial(robot, payload, configs[kind])) for kind in KINDS}
-    return FeedforwardStudy(robot, payload, config, axis_2, axis_3, criterion, path, tick)
+    plant = "realistic" if realistic else "exact"
+    return FeedforwardStudy(robot, payload, plant, config, axis_2, axis_3, criterion, path, tick)
 
 
 def _work(job: RectangleTrial | Trial, progress: Progress) -> Deviation | float:
@@ -96,12 +105,15 @@ def study_json(study: FeedforwardStudy) -> dict[str, Any]:
     return {
         "robot": study.robot.name,
         "payload_kg": study.payload,
+        "plant": study.plant,
         "stiffness_error": study.config.stiffness_error,
         "path": {
             "integral": {kind: one.integral / rigid.integral for kind, one in study.path.items()},
             "max": {kind: one.max / rigid.max for kind, one in study.path.items()},
             "max_mm": {kind: 1e3 * one.max for kind, one in study.path.items()},
         },
+        "sag": _part(study, "sag"),
+        "dynamic": _part(study, "dynamic"),
         "criterion": {
             str(angle): {
                 "median_ratio": float(np.median(study.ratio(angle))),
@@ -112,4 +124,13 @@ def study_json(study: FeedforwardStudy) -> dict[str, Any]:
             for angle in study.criterion
         },
         "tick_us": {kind: 1e6 * tick for kind, tick in study.tick.items()},
+    }
+
+
+def _part(study: FeedforwardStudy, name: str) -> dict[str, dict[str, float]]:
+    """Of the deviation from the rectangle a part, in mm and relative to the rigid model."""
+    values = {kind: getattr(one, name) for kind, one in study.path.items()}
+    return {
+        "mm": {kind: 1e3 * value for kind, value in values.items()},
+        "relative": {kind: value / values["rigid"] for kind, value in values.items()},
     }

@@ -36,6 +36,7 @@ class Trial:
     start: np.ndarray  # rad, shape (6,)
     angle: float  # rad, signed
     config: FeedforwardConfig
+    plant: RobotModel | None = None  # in the station, if it is another one than the model's
 
     def run(self, progress: Progress | None = None) -> float:
         """Simulates it with the drives of the station and an elastic structure; returns C of (6.1) in m/s."""
@@ -45,7 +46,7 @@ class Trial:
         told = commands(self, np.arange(0.0, stop + RINGING, period) + ahead, period)
         builder = DiagramBuilder()
         station = builder.AddNamedSystem(
-            "station", SimulatedStation(self.robot, config, "cascade", takes_torque=True)
+            "station", SimulatedStation(self.plant or self.robot, config, "cascade", takes_torque=True)
         )
         player = builder.AddNamedSystem("commands", CommandPlayer(told, period))
         for index in range(player.num_output_ports()):

@@ -23,6 +23,8 @@ from robots.drivetrain.ratio import FourierRatio
 from robots.drivetrain.stacked import stacked
 from robots.drivetrain.stiffness import CubicSpring, GearSpring, SpringRow
 
+_ACCELERATION_UNIT = 100.0  # rad/s^2
+
 Friction = SigmoidFriction | TanhFriction | StribeckFriction | PolynomialFriction | StickSlipFriction
 
 
@@ -69,8 +71,8 @@ class DriveTrains:
     and the soft branch. What they carry acts on the link, and on the motor times 1 + de/dtheta, so that an
     uneven ratio neither takes nor gives energy; efficiency and friction take it from the motor.
 
-    States, n each: torques of the motors (N m) if one of them lags, deflections of the damped springs (rad)
-    if there is a soft branch, deflections of the elements of the hysteresis (rad) if there is one.
+    States, n each: torques of the motors (in `torque_unit`) if one of them lags, deflections of the damped
+    springs (rad) if there is a soft branch, those of the elements of the hysteresis (rad) if there is one.
     """
 
     def __init__(self, trains: Sequence[JointTrain]) -> None:
@@ -84,6 +86,8 @@ class DriveTrains:
         self.inertia = np.array([train.inertia for train in trains])  # kg m^2, of the rotors
         lag = np.array([train.motor_lag for train in trains])
         self._lags, self._has_lag = lag > 0.0, bool(lag.any())
+        # An integrator takes the errors of all states for equally important.
+        self.torque_unit = _ACCELERATION_UNIT * self.inertia  # N m
         self._lag_time = np.where(self._lags, lag, 1.0)
         self._half_gap = 0.5 * np.array([train.gap for train in trains])
         self._lubricant = np.array([train.lubricant for train in trains])
@@ -149,8 +153,9 @@ class DriveTrains:
             on_motor = on_motor - self._efficiency.loss(-on_motor, speed)
         drive = command
         if self._has_lag:
-            drive = np.where(self._lags, state[of_motor], command)
-            state_rate[of_motor] = (command - state[of_motor]) / self._lag_time
+            late = self.torque_unit * state[of_motor]
+            drive = np.where(self._lags, late, command)
+            state_rate[of_motor] = (command - late) / (self._lag_time * self.torque_unit)
         on_motor = on_motor + drive
         for where, friction in self._frictions:
             if isinstance(friction, StickSlipFriction):
@@ -172,7 +177,7 @@ class DriveTrains:
         state = np.zeros(self.num_states)
         of_motor, of_soft, _ = self._places
         if self._has_lag:
-            state[of_motor] = -(1.0 + change) * load
+            state[of_motor] = -(1.0 + change) * load / self.torque_unit
         if self._soft is not None:
             state[of_soft] = self._soft.soft / np.maximum(self._soft.soft + self._soft.damped, 1e-300) * x
         return x + error, state

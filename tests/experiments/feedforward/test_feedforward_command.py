@@ -36,7 +36,7 @@ def run(folder: Path, *arguments: str) -> Result:
 
 @pytest.mark.slow
 def test_the_numbers_are_those_of_the_runs_and_the_page_opens(tmp_path: Path):
-    result = run(tmp_path, "--json", "-")
+    result = run(tmp_path, "--json", "-", "--plant=exact")
     assert result.exit_code == 0, result.output
     numbers = json.loads(result.stdout)
     config = FeedforwardConfig()
@@ -45,6 +45,10 @@ def test_the_numbers_are_those_of_the_runs_and_the_page_opens(tmp_path: Path):
     )
     assert numbers["path"]["integral"]["flexible_joint"] == pytest.approx(flexible.integral / rigid.integral)
     assert numbers["path"]["max"]["flexible_joint"] == pytest.approx(flexible.max / rigid.max)
+    assert numbers["plant"] == "exact"
+    assert numbers["sag"]["mm"]["rigid"] == pytest.approx(1e3 * rigid.distance[0])
+    moved = np.linalg.norm(flexible.gap - flexible.gap[0], axis=1)
+    assert numbers["dynamic"]["mm"]["flexible_joint"] == pytest.approx(1e3 * moved.max())
     for angle in ("5", "20"):
         found = numbers["criterion"][angle]
         assert found["positions"] == 4
@@ -69,6 +73,20 @@ def test_the_deviations_from_a_rectangle_are_those_of_table_6_1_or_less():
     # With all elastic parameters a fifth off, to either side.
     for error in (0.2, -0.2):
         assert relative("elastic_structure", error) <= min(0.45, flexible)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("name", "largest"), [("kr16", 0.25), ("kr210", 0.20)])
+def test_with_nominal_beliefs_a_realistic_robot_keeps_a_quarter_of_the_deviation(name: str, largest: float):
+    """Relative to the rigid model; the source measured 0.246 on a KR 16 with identified parameters."""
+    robot, plant = load_robot(name), load_robot(f"{name}-realistic")
+    rigid, elastic = (
+        RectangleTrial(robot, robot.payload.largest_mass, FeedforwardConfig(kind), plant).run()
+        for kind in ("rigid", "elastic_structure")
+    )
+    assert elastic.integral / rigid.integral <= largest
+    assert elastic.max / rigid.max <= largest
+    assert elastic.sag < 0.25 * rigid.sag
 
 
 @pytest.mark.slow
@@ -138,6 +156,8 @@ def test_every_robot_reaches_its_rectangle_with_the_tool_down(name: str):
 REFUSED = {
     "robot": ("--robot=kr211", "robot 'kr211': no file"),
     "payload": ("--payload=17", "payload of KUKA KR 16-2 must be between 0 and 16.0 kg, got 17.0 kg"),
+    "plant": ("--plant=worn", "--plant must be one of exact, realistic, got 'worn'"),
+    "variant": ("--robot=kr16-realistic", "no file"),
     "grid": ("--grid=1", "--grid must be at least 2, got 1"),
     "jobs": ("--jobs=0", "--jobs must be at least 1, got 0"),
     "error": ("--stiffness-error=-1", "stiffness_error must be above -1 and finite, got -1"),
