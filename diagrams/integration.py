@@ -60,6 +60,7 @@ class Integration:
         scheme = config.scheme
         if scheme == "auto":
             scheme = "runge_kutta3" if rate < _EXPLICIT_RATE_LIMIT else "radau3"
+        self.scheme = scheme
         accuracy, first_steps, steps = _MEASURED.get(scheme, _MEASURED["runge_kutta3"])
         self._first_step = config.max_step or _MARGIN * period / first_steps
         self._step = config.max_step or _MARGIN * period / steps

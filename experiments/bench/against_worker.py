@@ -61,6 +61,10 @@ class Worker:
         """Writes the true tips (n, 3) in m of a closed loop."""
         np.save(path, self._running[name].log().X_WE_true[:, :3, 3])
 
+    def scheme(self, name: str) -> str:
+        """Which integration scheme a closed loop has."""
+        return self._running[name].integration.scheme
+
     def drop(self, name: str) -> None:
         """Forgets one."""
         del self._running[name]
