@@ -15,7 +15,7 @@ _EXPLICIT_RATE_LIMIT = 4000.0  # 1/s
 # fewer after each tick and make them again. The loose accuracy of radau3 stops it only where it goes astray:
 # in a stiff loop its estimate of the error takes the camera's noise for one and would make steps ten times
 # too small.
-_MEASURED = {"runge_kutta3": (1e-3, 5, 5), "radau3": (5e-3, 2, 1)}
+_MEASURED = {"runge_kutta3": (1e-3, 5, 5), "radau3": (2e-3, 2, 1)}
 _PULLING_IN = 1.5  # s, in which a law brings the tip from centimetres away onto the path
 _MARGIN = 1.01  # so that two half steps in a tick leave no rest for a third
 
