@@ -11,6 +11,8 @@ LAWS = NamedClasses(
         "pbvs": "systems.servo.pbvs:Pbvs",
         "position_level": "systems.servo.position_level:PositionLevel",
         "compensation": "systems.servo.compensation:Compensation",
+        "disturbance_observer": "systems.servo.baselines.disturbance_observer:DisturbanceObserver",
+        "iterative_learning": "systems.servo.baselines.iterative_learning:IterativeLearning",
         "self_calibrating": "systems.servo.self_calibrating:SelfCalibrating",
     },
 )

@@ -1,0 +1,1 @@
+"""Laws to compare others with: what repetition, or observation, reaches without a better model."""

@@ -1,0 +1,53 @@
+"""A law that takes all that is wrong for a disturbance of the tip, observes it and leads the tip aside."""
+
+import numpy as np
+
+from robots.pose import error_of_rows
+from systems.controller_model import ControllerModel
+from systems.guard.guard import GuardConfig
+from systems.servo.law import LawInput, LawOutput, ServoLaw, integrate_twist
+from systems.servo.law_config import LawConfig
+
+_JOINTS = slice(0, 18)  # of the last tick
+_CORRECTION = slice(18, 24)  # rad and m, rotation first
+
+
+class DisturbanceObserver(ServoLaw):
+    """Commands the path, displaced by what the tip is observed to be off.
+
+    The tip is where it was commanded plus a disturbance. At an exposure the disturbance is the error that the
+    camera sees plus the correction that was in force then, as believed delays say; a filter of first order
+    with the gains as its bandwidths makes the correction from it. Were the delays and the robot as believed,
+    no bandwidth would be unstable; they are not. What changes is followed late by delays and filter.
+
+    The memory holds the joints of the last tick, the correction, and those of the ticks before until the one
+    that is in force.
+    """
+
+    title = "Disturbance observer"
+    colour = "#a16207"
+
+    def __init__(self, model: ControllerModel, config: LawConfig, guard: GuardConfig) -> None:
+        """Checks the configuration. Raises ValueError as `ServoLaw`."""
+        late = round((model.camera_delay + model.command_delay) / model.period)
+        self.memory_size = _CORRECTION.stop + 6 * (late + 1)
+        super().__init__(model, config, guard)
+
+    def initial_state(self, moment: LawInput) -> np.ndarray:
+        """At the measured positions, at rest, nothing observed."""
+        return np.concatenate([moment.position, np.zeros(self.memory_size - 6)])
+
+    def step(self, moment: LawInput, memory: np.ndarray) -> LawOutput:
+        """The joints for the displaced pose."""
+        correction, rate = memory[_CORRECTION], np.zeros(6)
+        if moment.measured is not None:
+            in_force = memory[-6:]
+            disturbance = np.array(error_of_rows(*moment.measured)) + in_force
+            wish = np.array(self.gains) * (disturbance - correction)
+            rate = np.array(self.within_limits(wish.tolist(), correction.tolist()))
+        correction = correction + self.period * rate
+        X = integrate_twist(np.array(moment.X_WD), correction)
+        joints = self.joints_at(X.tolist(), (np.array(moment.V_WD) + rate).tolist(), memory[_JOINTS])
+        past = memory[_CORRECTION.stop : -6]
+        memory = np.concatenate([joints, correction, correction, past])
+        return LawOutput(joints[:6], joints[6:12], correction, memory)
