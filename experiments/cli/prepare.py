@@ -63,6 +63,9 @@ def prepare(
     if robot is not None:
         if not model.calibration.of:  # a calibrated one is what the controller knows, not another machine
             scenario = replace(scenario, robot=robot)
+        # It is what the controller knows, whatever the scenario says.
+        belief = replace(scenario.servo.model, robot="")
+        scenario = replace(scenario, servo=replace(scenario.servo, model=belief))
         differences.append(f"robot={robot}")
     if is_quick:
         scenario, note = quick(scenario, settings)
