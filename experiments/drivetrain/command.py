@@ -13,6 +13,7 @@ from experiments.cli.options import JsonOption
 from experiments.cli.staging import PAGE, staged_file
 from experiments.drivetrain.figures import (
     PLAY_APPROXIMATIONS,
+    SMOOTH_INVERSES,
     THRESHOLDS,
     WEIGHTS,
     backlash_figure,
@@ -20,6 +21,7 @@ from experiments.drivetrain.figures import (
     friction_figure,
     hysteresis_figure,
     hysteresis_signal,
+    smoothly_compensated,
 )
 from experiments.report.plot_page import Section, html_table, write_plot_page
 from robots.drivetrain.hysteresis import PrandtlIshlinskii
@@ -34,10 +36,11 @@ def drivetrain_command(
 ) -> None:
     """Draw friction, efficiency, play and hysteresis as in Reiner (2010), figures 2.3 to 2.6."""
     human = human_console(json_file)
-    x, _ = hysteresis_signal()
+    x, step = hysteresis_signal()
     operator = PrandtlIshlinskii(WEIGHTS, THRESHOLDS)
     inverse, starts = operator.inverse()
     residual = float(np.abs(operator.response(inverse.response(x, starts)) - x).max())
+    smoothly = {name: float(np.abs(found - x).max()) for name, found in smoothly_compensated(x, step).items()}
     result = {
         "parts": {name: {"invertible": part.invertible} for name, part in PARTS.items()},
         "hysteresis": {
@@ -46,12 +49,17 @@ def drivetrain_command(
             "inverse_weights": list(inverse.weights),
             "inverse_thresholds": list(inverse.thresholds),
             "residual": residual,
+            "smooth_residual": smoothly,
         },
     }
     rows = [[name, "yes" if part.invertible else "no"] for name, part in PARTS.items()]
     parameters = [
         *([name, f"T = {T} s, psi = {psi}, n = {n}"] for name, (T, psi, n) in PLAY_APPROXIMATIONS.items()),
         ["hysteresis and its exact inverse", f"w = {WEIGHTS}, r = {THRESHOLDS}"],
+        *(
+            [f"smooth inverse, {name}", f"T = {T} s, psi = {psi}, n = {n}; it leaves {smoothly[name]:.3f}"]
+            for name, (T, psi, n) in SMOOTH_INVERSES.items()
+        ),
     ]
     with json_output(json_file) as output, refusing(OSError), ExitStack() as stack:
         page = stack.enter_context(staged_file(out, *PAGE))
@@ -82,7 +90,8 @@ def drivetrain_command(
                 "Hysteresis",
                 "Figure 2.6. On the left the play operator, which moves only when it is pushed, and three "
                 "smooth approximations of the table below. On the right a hysteresis, and what is left of it "
-                "behind its inverse: a straight line.",
+                "behind its exact inverse, a straight line, and behind the inverse of its smooth form: with "
+                "the parameters of table 2.1, and with sharper ones.",
                 hysteresis_figure(),
                 420,
             ),
@@ -93,7 +102,11 @@ def drivetrain_command(
             ),
             Section("Parts by their names in YAML", "", html_table(["kind", "can be inverted"], rows)),
         ]
-        verdict = f"The inverse operator compensates the hysteresis to {residual:.1e}."
+        left = smoothly["table 2.1"]
+        verdict = (
+            f"The inverse operator compensates the hysteresis to {residual:.1e}, the inverse of its smooth "
+            f"form with the parameters of table 2.1 to {left:.3f}."
+        )
         write_plot_page(page, "Drive trains", verdict, sections)
         output.write(result)
     print_files(human, out)

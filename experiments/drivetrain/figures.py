@@ -22,6 +22,8 @@ EFFICIENCY = SmoothEfficiency(
 # Table 2.1. The thresholds begin with zero and psi is meant where the table says s (errata).
 WEIGHTS = (0.2, 0.2, 0.2, 0.2, 0.2)
 THRESHOLDS = (0.0, 0.2, 0.3, 0.4, 0.5)
+# Of the smooth inverse: T in s, psi, n. The first is that of table 2.1, the second is sharper and faster.
+SMOOTH_INVERSES = {"table 2.1": (0.01, 25.0, 3), "sharper": (0.005, 100.0, 3)}
 PLAY_APPROXIMATIONS = {"P1": (0.01, 50.0, 6), "P2": (0.01, 25.0, 3), "P3": (0.1, 25.0, 3)}  # T, psi, n
 
 
@@ -99,6 +101,17 @@ def hysteresis_signal() -> tuple[np.ndarray, float]:
     return np.sin(2.0 * np.pi * 0.5 * times) * (1.0 - np.exp(-times)) * np.cos(0.5 * times), step
 
 
+def smoothly_compensated(x: np.ndarray, step: float) -> dict[str, np.ndarray]:
+    """The output of the hysteresis behind the inverse of its smooth form, for each of `SMOOTH_INVERSES`."""
+    operator = PrandtlIshlinskii(WEIGHTS, THRESHOLDS)
+    return {
+        name: operator.response(
+            SmoothPrandtlIshlinskii(operator, sharpness, delay, order).inverse_response(x, step)
+        )
+        for name, (delay, sharpness, order) in SMOOTH_INVERSES.items()
+    }
+
+
 def hysteresis_figure() -> go.Figure:
     """Figure 2.6: the play operator and its smooth forms; a hysteresis compensated by its inverse."""
     x, step = hysteresis_signal()
@@ -113,10 +126,6 @@ def hysteresis_figure() -> go.Figure:
     figure.add_trace(go.Scatter(x=x, y=operator.response(x), name="hysteresis"), 1, 2)
     compensated = operator.response(inverse.response(x, starts))
     figure.add_trace(go.Scatter(x=x, y=compensated, name="compensated, exactly"), 1, 2)
-    smooth_inverse = SmoothPrandtlIshlinskii(inverse, 100.0, 0.005, 3)
-    figure.add_trace(
-        go.Scatter(x=x, y=operator.response(smooth_inverse.response(x, step)), name="compensated, smoothly"),
-        1,
-        2,
-    )
+    for name, compensated in smoothly_compensated(x, step).items():
+        figure.add_trace(go.Scatter(x=x, y=compensated, name=f"compensated, smoothly, {name}"), 1, 2)
     return figure.update_xaxes(title="input")

@@ -11,7 +11,9 @@ from typing import Any, ClassVar
 
 import numpy as np
 from scipy.signal import cont2discrete, tf2ss
+from scipy.special import expit
 
+_NEWTON_STEPS, _SOLVED = 60, 1e-12
 _ROUNDING = 1e-12  # of the largest threshold
 
 
@@ -121,7 +123,6 @@ class SmoothPrandtlIshlinskii:
     delay: float  # s
     order: int  # of the Pade approximation
 
-    # As nearly as it is the operator: its inverse is the smooth form of the operator's inverse.
     invertible: ClassVar[bool] = True
 
     def __post_init__(self) -> None:
@@ -135,16 +136,68 @@ class SmoothPrandtlIshlinskii:
         least = -np.logaddexp(-psi * (x + threshold), -psi * before) / psi
         return np.logaddexp(psi * (x - threshold), psi * least) / psi
 
+    def play_slope(self, x: np.ndarray, before: np.ndarray, threshold: np.ndarray) -> np.ndarray:
+        """The derivative of the smooth play operator by its input, from 0 to 1."""
+        psi = self.sharpness
+        least = -np.logaddexp(-psi * (x + threshold), -psi * before) / psi
+        pulled, pushed = expit(psi * (before - x - threshold)), expit(psi * (x - threshold - least))
+        return pushed + (1.0 - pushed) * pulled
+
     def response(self, x: np.ndarray, step: float) -> np.ndarray:
         """The output along samples x, shape (n,), a time of ``step`` s apart and shorter than the delay."""
-        if not 0.0 < step < self.delay:
-            raise ValueError(f"SmoothPrandtlIshlinskii: step must be below the delay, got {step} s")
-        delay: Any = cont2discrete(tf2ss(*pade_delay(self.delay, self.order)), step, method="zoh")
-        A, B, C = (np.asarray(matrix) for matrix in delay[:3])
         weights, thresholds = np.array(self.exact.weights), np.array(self.exact.thresholds)
+        A, B, C = self._delay(step)
         states, out = np.zeros((len(A), len(weights))), np.empty(len(x))
         for k, sample in enumerate(x):
             y = self.play(sample, (C @ states)[0], thresholds)
             states = A @ states + B * y
             out[k] = weights @ y
         return out
+
+    def inverse_response(self, wanted: np.ndarray, step: float) -> np.ndarray:
+        """The input that leads to an output: sample by sample the equation of `response`, solved for x.
+
+        The smooth form of the operator's exact inverse is something else: its errors are those of the smooth
+        play of other thresholds and add up with the errors of this one.
+
+        Args:
+            wanted: samples of the output, shape (n,).
+            step: time between them in s, shorter than the delay.
+
+        Raises:
+            ValueError: if the operator is not increasing: all weights must be positive or zero.
+        """
+        weights, thresholds = np.array(self.exact.weights), np.array(self.exact.thresholds)
+        if (weights < 0.0).any():
+            raise ValueError(f"SmoothPrandtlIshlinskii: weights must not be negative, got {weights.tolist()}")
+        A, B, C = self._delay(step)
+        states, out, x = np.zeros((len(A), len(weights))), np.empty(len(wanted)), 0.0
+        for k, target in enumerate(wanted):
+            x = self._solved(x, float(target), (C @ states)[0], weights, thresholds)
+            states = A @ states + B * self.play(np.array(x), (C @ states)[0], thresholds)
+            out[k] = x
+        return out
+
+    def _solved(
+        self, x: float, target: float, before: np.ndarray, weights: np.ndarray, thresholds: np.ndarray
+    ) -> float:
+        """The input of one sample by Newton's method within a bracket."""
+        lower, upper = -np.inf, np.inf
+        for _ in range(_NEWTON_STEPS):
+            excess = float(weights @ self.play(np.array(x), before, thresholds)) - target
+            lower, upper = (x, upper) if excess < 0.0 else (lower, x)
+            step = excess / float(weights @ self.play_slope(np.array(x), before, thresholds))
+            if abs(step) < _SOLVED:
+                break
+            x -= step
+            if not lower < x < upper:
+                x = 0.5 * (lower + upper)
+        return x
+
+    def _delay(self, step: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """The Pade delay for steps of a time in s."""
+        if not 0.0 < step < self.delay:
+            raise ValueError(f"SmoothPrandtlIshlinskii: step must be below the delay, got {step} s")
+        delay: Any = cont2discrete(tf2ss(*pade_delay(self.delay, self.order)), step, method="zoh")
+        A, B, C = (np.asarray(matrix) for matrix in delay[:3])
+        return A, B, C

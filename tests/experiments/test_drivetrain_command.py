@@ -3,6 +3,8 @@
 import json
 from pathlib import Path
 
+import pytest
+
 from experiments.drivetrain.figures import efficiency_run
 from tests.experiments.browser import open_page
 from tests.experiments.commands import refusal, truetip
@@ -13,6 +15,9 @@ def test_the_pictures_open_and_the_inverse_compensates(tmp_path: Path):
     assert result.exit_code == 0, result.output
     numbers = json.loads(result.stdout)
     assert numbers["hysteresis"]["residual"] < 1e-12
+    # With the table's parameters, and with psi = 100 and T = 5 ms.
+    assert numbers["hysteresis"]["smooth_residual"]["table 2.1"] == pytest.approx(0.096, abs=1e-3)
+    assert numbers["hysteresis"]["smooth_residual"]["sharper"] == pytest.approx(0.024, abs=1e-3)
     assert numbers["parts"]["stick_slip_friction"] == {"invertible": False}
     opened = open_page(tmp_path / "page.html")
     assert opened.console == []

@@ -94,6 +94,15 @@ def test_the_smooth_operator_approaches_the_exact_one():
     assert gaps[1] < 0.4 * gaps[0] < 0.04
 
 
+def test_the_numerical_inverse_undoes_the_smooth_operator_to_rounding():
+    times = np.arange(0.0, 1.5, 2e-3)
+    x = np.sin(0.5 * np.pi * times) * np.sin(2.0 * np.pi * times)
+    smooth = SmoothPrandtlIshlinskii(OPERATOR, 50.0, 0.01, 3)
+    np.testing.assert_allclose(smooth.response(smooth.inverse_response(x, 2e-3), 2e-3), x, atol=1e-10)
+    with pytest.raises(ValueError, match="weights must not be negative"):
+        SmoothPrandtlIshlinskii(OPERATOR.inverse()[0], 50.0, 0.01, 3).inverse_response(x, 2e-3)
+
+
 DAHL = DahlHysteresis((300.0, 100.0), (5e-4, 2e-3))
 
 
