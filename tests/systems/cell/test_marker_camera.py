@@ -79,7 +79,7 @@ def test_samples_come_when_those_of_the_pose_camera_come(delay: float):
         return pose(X)
 
     ours = camera_samples(MarkerCamera(timed(config, EXACT)), config, times, tip)
-    theirs = camera_samples(PoseCamera(config), config, times, tip)
+    theirs = camera_samples(PoseCamera(PoseCameraConfig(**vars(config))), config, times, tip)
     assert [sample.time for sample in ours] == [sample.time for sample in theirs]
     assert [sample.valid for sample in ours] == [sample.valid for sample in theirs]
     for mine, other in zip(ours, theirs, strict=True):
