@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Annotated, Any
 
 import typer
+from rich.markup import escape
 
 from diagrams.record.log import RunLog
 from diagrams.scenario.scenario import Scenario
@@ -23,6 +24,7 @@ from experiments.calibration.calibrate import (
 )
 from experiments.calibration.noise_option import ESTIMATE, noise_option
 from experiments.calibration.report import calibration_json, print_calibration, write_calibration_page
+from experiments.calibration.urdf_option import urdf_robot, urdf_sag
 from experiments.cli.console import print_files, progress_bar, refusing
 from experiments.cli.json_output import human_console, json_output
 from experiments.cli.option_limits import at_least
@@ -86,6 +88,16 @@ def calibrate_command(
     urdf: Annotated[
         str | None, typer.Option(metavar="FILE.urdf", help="The calibrated robot as URDF.")
     ] = None,
+    urdf_payload: Annotated[
+        float | None,
+        typer.Option(metavar="KG", help="Bake into the URDF how far the joints yield under this load."),
+    ] = None,
+    urdf_pose: Annotated[
+        str | None,
+        typer.Option(
+            metavar="Q1,...,Q6", help="Joint positions in degrees for that.", show_default="all zero"
+        ),
+    ] = None,
     out: OutOption = Path("out/calibration"),
     json_file: JsonOption = None,
 ) -> None:
@@ -94,7 +106,9 @@ def calibrate_command(
     wanted = _Wanted(
         measurements, validation, count, criterion, noise, position_only, compliance, fixed or []
     )
+    note = ""
     with json_output(json_file) as output, refusing(ValueError, OSError), ExitStack() as stack:
+        baked = urdf_sag(urdf, urdf_payload, urdf_pose, compliance)
         wanted.check()
         prepared = prepare(scenario, settings or [], robot)
         if not measurements:  # of tables nothing but the kinematics is asked
@@ -112,8 +126,11 @@ def calibrate_command(
         if robot_file:
             write_text(robot_file, robot_text(study.calibrated))
         if urdf_file:
-            write_text(urdf_file, urdf_text(study.calibrated))
+            drawn, note = urdf_robot(study.calibrated, baked, study.sets.calibration)
+            write_text(urdf_file, urdf_text(drawn, note))
     print_calibration(human, study, path, measured.problems)
+    if note:
+        human.print(f"[yellow]{escape(note)}[/yellow]")
     print_files(human, out / "report.html", write, urdf)
 
 

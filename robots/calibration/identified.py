@@ -13,7 +13,7 @@ from robots.description.calibration import Calibration
 from robots.description.model import NUM_JOINTS, RobotModel
 from robots.pose import zyx_from_rotation
 
-_SHOWN = 0.5  # share of what is known that has to come from the data, for a compliance to be named
+_SHOWN = 0.9  # share of what is known that has to come from the data, for a compliance to be named
 
 
 @dataclass(frozen=True)

@@ -1,0 +1,85 @@
+"""truetip calibrate with tables of one's own: any robot, any instrument, and what is refused."""
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+from robots.calibration.measurement_file import measurement_text
+from robots.calibration.measurements import Measurements
+from robots.description.model import load_robot
+from robots.kinematics.forward import Kinematics
+from tests.experiments.commands import refusal, truetip
+from tests.robots.calibration.matrix_robot import MatrixRobot, homogeneous
+
+
+def tables(folder: Path, name: str, position_only: bool = False) -> MatrixRobot:
+    """Writes 60 and 20 rows of a robot that a tracker four metres away has seen without noise."""
+    rng, drawn = np.random.default_rng(0), MatrixRobot(name)
+    frame = homogeneous(Rotation.random(rng=rng), np.array([3.0, -2.0, 1.5]))
+    true = drawn.displaced(rng).seen_from(frame)
+    for file, count in (("measured.csv", 60), ("fresh.csv", 20)):
+        q = drawn.configurations(count, rng)
+        X_WE = true.forward(q)
+        table = Measurements(q, X_WE[:, :3, 3], None if position_only else X_WE[:, :3, :3])
+        (folder / file).write_text(measurement_text(table))
+    return true
+
+
+@pytest.mark.parametrize(("name", "position_only"), [("ur10", False), ("puma560", True)])
+def test_a_robot_without_analytic_inverse_is_calibrated_from_a_tracker(
+    name: str, position_only: bool, tmp_path: Path
+):
+    true = tables(tmp_path, name, position_only)
+    written, page = tmp_path / "robot.yaml", tmp_path / "out"
+    arguments = ["--measurements", tmp_path / "measured.csv", "--validation", tmp_path / "fresh.csv"]
+    result = truetip(
+        "calibrate", "--robot", name, *arguments, "--write", written, "--out", page, "--json", "-"
+    )
+    assert result.exit_code == 0, result.output
+    found = json.loads(result.stdout)
+    assert (found["rank"], found["converged"]) == (27 if position_only else 30, True)
+    assert np.linalg.norm(found["frame"]["translation"]) == pytest.approx(3.9, rel=0.1)  # of (3, -2, 1.5)
+    assert max(found["validation"]["after"]["max_mm"]) < 1e-9
+    assert "in a frame of its own" in " ".join(result.stderr.split())
+    q = MatrixRobot(name).configurations(50, np.random.default_rng(9))
+    robot = load_robot(str(written))
+    gap = (Kinematics(robot).forward(q) - true.forward(q))[:, :3, 3]
+    assert np.abs(gap).max() < 1e-12
+    assert robot.calibration.covariance_matrix.shape == (54, 54)
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        (["--count", "30"], "--count is for simulated measurements; with --measurements it has no effect"),
+        (["--urdf-payload", "3"], "--urdf-payload needs --urdf"),
+        (["--urdf", "x.urdf", "--urdf-payload", "3"], "--urdf-payload needs --compliance"),
+        (["--noise", "noise.yaml"], "--noise noise.yaml: position_mm must be positive, got 0"),
+        (["--validation", "empty.csv"], "measurements empty.csv: no row but the header"),
+        (["--validation", "heavy.csv"], "no usable row; payload_kg must not be negative, got -1"),
+    ],
+)
+def test_what_does_not_go_together_is_said_in_one_line(
+    options: list[str], message: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+):
+    monkeypatch.chdir(tmp_path)
+    tables(tmp_path, "irb1200")
+    (tmp_path / "noise.yaml").write_text("{joint_deg: 0.1, position_mm: 0, rotation_deg: 0.1}")
+    header = (tmp_path / "fresh.csv").read_text().splitlines()[0]
+    (tmp_path / "empty.csv").write_text(header)
+    (tmp_path / "heavy.csv").write_text(f"{header}\n0,0,0,0,0,0,0,0,0,1,0,0,0,-1")
+    assert message in refusal(truetip("calibrate", "--measurements", "measured.csv", *options))
+    assert not (tmp_path / "out").exists()
+
+
+def test_a_file_of_known_noise_is_believed(tmp_path: Path):
+    tables(tmp_path, "irb1200")
+    (tmp_path / "noise.yaml").write_text("{joint_deg: 0.01, position_mm: 0.1, rotation_deg: 0.05}")
+    arguments = ["--measurements", tmp_path / "measured.csv", "--noise", tmp_path / "noise.yaml"]
+    result = truetip("calibrate", *arguments, "--out", tmp_path / "out", "--json", "-")
+    assert result.exit_code == 0, result.output
+    known = {"estimated": False, "joint_deg": 0.01, "position_mm": 0.1, "rotation_deg": 0.05}
+    assert json.loads(result.stdout)["noise"] == pytest.approx(known)
