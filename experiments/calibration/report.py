@@ -16,6 +16,7 @@ from experiments.calibration.calibrate import CalibrationStudy
 from experiments.metrics.run_metrics import path_window, pose_errors
 from experiments.report.plot_page import Section, html_table, write_plot_page
 from experiments.report.robot_plot import tips_figure
+from robots.calibration.identifiability import completeness
 from robots.calibration.identified import Identified
 from robots.calibration.measurement_file import RowProblem
 from robots.calibration.repeatability import repeatability
@@ -27,6 +28,7 @@ _AXES = ("Δx mm", "Δy mm", "Δz mm", "ρx °", "ρy °", "ρz °")
 _COLORS = {"before": "#9aa5b4", "after": "#0f7cc0"}
 _WEAK = 0.5  # share of the data in what is known of a parameter, below which it is said
 _NO_NOISE_MM = 1e-6
+_LEAST_MM = 1e-13  # rounding, where it happens to be nothing
 _CONFIDENCE = 1.96  # standard deviations to either side hold 95 %
 
 
@@ -41,6 +43,7 @@ def calibration_json(study: CalibrationStudy, path: Mapping[str, Any] | None) ->
         zyx_deg = np.rad2deg(zyx_from_rotation(found.frame[:3, :3]))
         frame = {"translation": found.frame[:3, 3].tolist(), "zyx_deg": zyx_deg.tolist()}
     repeated = repeatability(found)
+    source_set = completeness(study.nominal, found.residuals.shape[1] == 3)
     return {
         "identifiable": found.rank,
         "design": design and {"b3": design.b3, "bound": design.bound, "seconds": study.design_seconds},
@@ -62,6 +65,7 @@ def calibration_json(study: CalibrationStudy, path: Mapping[str, Any] | None) ->
         "noise": noise_dict(found),
         "frame": frame,
         "repeatability": repeated and asdict(repeated),
+        "completeness_of_48": asdict(source_set),
         "validation": {
             name: errors_of and errors_of.as_dict()
             for name, errors_of in (
@@ -115,6 +119,9 @@ def print_calibration(
     if path:
         _print(console, "Path without a camera: true errors", _path_rows(path))
     console.print(escape(calibration_verdict(study, path)))
+    source_set = completeness(study.nominal, study.identified.residuals.shape[1] == 3)
+    if source_set.missed:
+        console.print(escape(source_set.sentence))
     console.print()
 
 
@@ -251,7 +258,12 @@ def _histogram(study: CalibrationStudy) -> go.Figure:
     figure = go.Figure()
     for name, robot in (("before", study.nominal), ("after", study.calibrated)):
         distance = np.linalg.norm(prediction_errors(robot, study.sets.validation)[:, -3:], axis=1)
-        trace = go.Histogram(x=np.log10(1e3 * distance), name=name, opacity=0.7, marker_color=_COLORS[name])
+        trace = go.Histogram(
+            x=np.log10(np.maximum(1e3 * distance, _LEAST_MM)),
+            name=name,
+            opacity=0.7,
+            marker_color=_COLORS[name],
+        )
         figure.add_trace(trace)
     ticks = list(range(-4, 3))
     axis = {"title": "error in mm", "tickvals": ticks, "ticktext": [f"{10.0**tick:g}" for tick in ticks]}

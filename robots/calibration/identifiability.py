@@ -4,6 +4,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from robots.calibration.error_model import ErrorModel
+from robots.calibration.prior import parameter_sizes
+from robots.calibration.reduction import TOLERANCE, independent_columns
 from robots.description.error_parameters import NUM_PARAMETERS, parameter_names
 from robots.description.model import RobotModel
 from robots.kinematics.error_kinematics import ErrorKinematics
@@ -121,3 +124,51 @@ def unseen_parameters(Theta: np.ndarray, names: list[str], tolerance: float = 1e
     unseen = Vt[s < tolerance * s[0]]
     involved = np.abs(unseen).max(axis=0, initial=0.0) > 1e-3
     return [name for name, is_involved in zip(names, involved, strict=True) if is_involved]
+
+
+@dataclass(frozen=True)
+class Completeness:
+    """How the 48 parameters of Probst (2024) compare with all small changes of a robot's geometry."""
+
+    rank: int  # directions that poses, or positions, show
+    covered: int  # of these by the 48 parameters
+    missed: tuple[str, ...]  # names in the complete model that take part in what is missed
+    effect_mm: float  # of what is missed at the tool, rms, for errors of the sizes that robots have
+
+    @property
+    def sentence(self) -> str:
+        """What a person should know of it."""
+        if self.covered == self.rank:
+            return f"The 48 parameters of Probst (2024) span all {self.rank} directions of this robot."
+        return (
+            f"The 48 parameters of Probst (2024) span {self.covered} of the {self.rank} directions of this "
+            f"robot as its frames are drawn; they would miss {', '.join(self.missed)}, some "
+            f"{self.effect_mm:.1f} mm."
+        )
+
+
+def completeness(robot: RobotModel, position_only: bool = False) -> Completeness:
+    """Compares the span of the 48 parameters with that of the complete error model, at zero errors.
+
+    Args:
+        robot: as drawn; the comparison depends on how its frames were chosen.
+        position_only: whether only the position of the tool is measured.
+    """
+    q = np.random.default_rng(0).uniform(robot.lower, robot.upper, (_CONFIGURATIONS, len(robot.lower)))
+    rows, complete = slice(3 if position_only else 0, 6), ErrorModel(robot)
+    theirs = ErrorKinematics(robot).regressor(q, np.zeros(NUM_PARAMETERS))[:, rows]
+    theirs = theirs.reshape(-1, NUM_PARAMETERS)
+    every = complete.forward_and_regressor(q, np.zeros(len(complete)))[1][:, rows]
+    every = every.reshape(-1, len(complete)) * parameter_sizes(complete.names)
+    U, s, _ = np.linalg.svd(theirs / np.maximum(np.linalg.norm(theirs, axis=0), 1e-300), full_matrices=False)
+    basis = U[:, s > TOLERANCE * s[0]]
+    rest = every - basis @ (basis.T @ every)
+    rest -= basis @ (basis.T @ rest)
+    rank = len(independent_columns(every))
+    lengths = np.linalg.norm(rest, axis=0) / np.sqrt(len(q))
+    missing = lengths > TOLERANCE * np.linalg.norm(every, axis=0).max()
+    missed = tuple(name for name, is_missed in zip(complete.names, missing, strict=True) if is_missed)
+    positions = rest.reshape(len(q), -1, len(complete))[:, -3:]
+    effect = 1e3 * float(np.sqrt(np.sum(positions**2) / len(q)))
+    covered = rank - (len(independent_columns(rest[:, missing])) if missed else 0)
+    return Completeness(rank, covered, missed, effect)

@@ -136,7 +136,12 @@ class Identified:
 
         Args:
             of: the robot that was calibrated, as `robots.description.model.load_robot` takes it.
+
+        Raises:
+            ValueError: if scales of encoders were identified, which have no place in a robot file.
         """
+        if len(self.model) > len(ErrorModel(self.robot)):
+            raise ValueError(f"calibration of {self.robot.name}: a robot file cannot hold scales of encoders")
         robot = self.model.robot_with_errors(self.x)
         number = len(self.model) + (NUM_JOINTS if len(self.parameters) > len(self.model) else 0)
         covariance = np.zeros((number, number))

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from robots.calibration.identifiability import identifiable_parameters, unseen_parameters
+from robots.calibration.identifiability import completeness, identifiable_parameters, unseen_parameters
 from robots.description.calibration import Calibration
 from robots.description.error_parameters import NUM_PARAMETERS, error_parameters, parameter_names
 from robots.description.model import Placement, RobotModel, load_robot
@@ -77,6 +77,24 @@ def test_dependent_columns_are_combinations_of_independent_ones_everywhere(
     Theta = ErrorKinematics(robot).regressor(q, np.zeros(NUM_PARAMETERS))[:, 3 if position_only else 0 :]
     made = Theta[..., found.independent] @ found.combination
     np.testing.assert_allclose(Theta[..., found.dependent], made, atol=1e-10)
+
+
+@pytest.mark.parametrize(("position_only", "rank"), [(False, 30), (True, 25)])
+def test_the_48_parameters_are_complete_for_the_robot_of_the_source(position_only: bool, rank: int):
+    found = completeness(plain(), position_only)
+    assert (found.rank, found.covered, found.missed) == (rank, rank, ())
+    assert f"span all {rank} directions" in found.sentence
+
+
+def test_frames_turned_about_their_axes_between_parallel_joints_lose_two_directions():
+    """The UR10 as its URDF draws it; the Puma 560, whose frames are all alike, is complete."""
+    robot = load_robot("ur10")
+    found = completeness(robot)
+    assert (found.rank, found.covered) == (30, 28)
+    assert found.missed == ("joint2_rz", "joint4_rz")
+    assert "span 28 of the 30 directions" in found.sentence
+    assert 5.0 < found.effect_mm < 50.0
+    assert completeness(load_robot("puma560")).missed == ()
 
 
 def test_base_parameters_move_the_tool_alike_to_first_order():

@@ -104,6 +104,8 @@ def test_scales_of_encoders_are_found_where_they_are_asked_for():
     X_WE = result.model.forward(fresh, result.x)
     assert np.abs(X_WE - true.forward(fresh)).max() <= 1e-12
     assert result.rank == 36
+    with pytest.raises(ValueError, match="cannot hold scales of encoders"):
+        result.calibrated_robot()
 
 
 def test_the_named_values_are_the_true_robot_and_as_exact_as_it():
