@@ -190,7 +190,7 @@ def nominal_robot(scenario: Scenario, robot: RobotModel | None) -> RobotModel:
 
     Args:
         scenario: names it.
-        robot: what the controller knows; a calibrated robot knows the errors, any other one is as drawn.
+        robot: what the controller knows; a calibrated robot knows the errors, any other one is nominal.
 
     Raises:
         ScenarioError: if the calibrated robot is not the scenario's.

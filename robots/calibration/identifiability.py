@@ -73,7 +73,7 @@ def identifiable_parameters(robot: RobotModel, position_only: bool = False) -> I
     """
     if robot.is_calibrated:
         raise ValueError(
-            f"error parameters of {robot.name}: it is calibrated already; start from the robot as drawn, "
+            f"error parameters of {robot.name}: it is calibrated already; start from the nominal robot, "
             f"{robot.calibration.of or 'the one that was calibrated'}"
         )
     model = ErrorKinematics(robot)

@@ -86,7 +86,7 @@ def identify(
     config = config or IdentificationConfig()
     if robot.is_calibrated:
         raise ValueError(
-            f"calibration of {robot.name}: it is calibrated already; start from the robot as drawn, "
+            f"calibration of {robot.name}: it is calibrated already; start from the nominal robot, "
             f"{robot.calibration.of or 'the one that was calibrated'}"
         )
     robot, frame = _in_frame_of_instrument(robot, measurements)

@@ -1,4 +1,4 @@
-"""What an identification has found: the robot, its parameters with names, and how far they can be trusted."""
+"""The result of an identification: the robot, its named parameters, and their uncertainties."""
 
 from dataclasses import dataclass, replace
 from functools import cached_property

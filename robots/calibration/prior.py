@@ -1,4 +1,4 @@
-"""How large errors of robots are: what is believed of the parameters before anything is measured.
+"""The prior of the error parameters: how large errors of robots usually are.
 
 Every parameter has its own unit here, so that a radian is not weighed as a metre, and a direction that the
 measurements do not show stays where a robot most probably is: near its drawing.

@@ -60,7 +60,7 @@ class ReducibleModel:
         return Theta[:, 3 if self._position_only else 0 :].reshape(-1, len(x)) * self._sizes
 
     def independent(self, x: np.ndarray) -> np.ndarray:
-        """Independent parameters at x: those of the robot as drawn, and what x adds, indices in order."""
+        """Independent parameters at x: those of the nominal robot, and what x adds, indices in order."""
         return np.sort(independent_columns(self.regressor(x), self._drawn))
 
     def reduce(self, x: np.ndarray, independent: np.ndarray | None = None) -> Reduction:
@@ -74,7 +74,7 @@ class ReducibleModel:
         return Reduction(chosen, combination * self._sizes[chosen, None] / self._sizes, values)
 
     def independent_with(self, first: np.ndarray) -> np.ndarray:
-        """Independent parameters of the robot as drawn, with certain ones before all others."""
+        """Independent parameters of the nominal robot, with certain ones before all others."""
         return np.sort(independent_columns(self.regressor(np.zeros(len(self._model))), first))
 
     def hidden(self, A: np.ndarray, columns: np.ndarray, x: np.ndarray) -> list[str]:

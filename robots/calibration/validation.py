@@ -1,4 +1,4 @@
-"""How well a model predicts poses that it has not been identified from."""
+"""Validation of a model on poses that were not used for its identification."""
 
 from dataclasses import asdict, dataclass
 

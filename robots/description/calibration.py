@@ -1,4 +1,4 @@
-"""What a calibration leaves in a robot file: what was found, and how well it is known."""
+"""The results of a calibration in a robot file, with their uncertainties."""
 
 from dataclasses import dataclass, field
 
@@ -11,7 +11,7 @@ _JOINTS = 6
 
 @dataclass
 class Calibration:
-    """What has been measured on one robot, in a file that a calibration wrote; empty for a robot as drawn.
+    """What has been measured on one robot, in a file that a calibration wrote; empty for a nominal robot.
 
     The placements of the file have the errors in them already. ``values`` says by which parameters of
     `robots.calibration.error_model` they differ from the robot that was calibrated, and how well these are

@@ -1,4 +1,4 @@
-"""How a true robot differs from its drawing: 48 geometric errors in the units of a scenario file.
+"""Deviations of the true robot from its nominal geometry: 48 errors in the units of a scenario file.
 
 The nominal model never changes; a true plant takes these errors into the placement of its frames.
 """

@@ -1,4 +1,4 @@
-"""A robot as URDF, for simulators and planners that read nothing else."""
+"""Writing a robot as URDF, for simulators and planners."""
 
 import math
 import xml.etree.ElementTree as ElementTree

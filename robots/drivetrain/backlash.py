@@ -1,4 +1,4 @@
-"""Play between the teeth of a gear, and a smooth substitute; rad, rad/s and N m on the side of the link."""
+"""Backlash of a gear, and a smooth substitute; rad, rad/s and N m on the side of the link."""
 
 from dataclasses import dataclass
 from typing import ClassVar

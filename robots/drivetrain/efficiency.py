@@ -1,4 +1,4 @@
-"""Losses of a gear that depend on the way the power flows; rad/s and N m, arrays of any shape."""
+"""Gear efficiency that depends on the direction of power flow; rad/s and N m, arrays of any shape."""
 
 from dataclasses import dataclass
 from typing import ClassVar

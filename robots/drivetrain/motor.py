@@ -1,4 +1,4 @@
-"""The torque of a motor that follows its current late."""
+"""First-order lag between current and torque of a motor."""
 
 from dataclasses import dataclass
 from typing import ClassVar

@@ -1,4 +1,4 @@
-"""A gear whose ratio is not quite constant: teeth and eccentric wheels as a Fourier series of its angle."""
+"""Ratio error of a gear (teeth, eccentricity) as a Fourier series of its angle."""
 
 from dataclasses import dataclass, field
 from typing import ClassVar

@@ -1,4 +1,4 @@
-"""What bends in a robot besides its gears: bearings that tilt, links that are beams, as sprung joints.
+"""The elastic structure of a robot: tilting bearings and bending links as sprung joints.
 
 All bodies of a link have their frames where the frame of the rigid link would be, as long as nothing is
 deformed. So centres of mass, hinges and the next joint are given in the frame of the link, whichever body

@@ -1,4 +1,4 @@
-"""Inverse kinematics of a robot that is not quite built as the analytic one needs it: Newton's method.
+"""Numeric inverse kinematics of a calibrated robot, for which the analytic solution is a first guess.
 
 A calibrated robot has axes that do not meet and are not parallel, by tenths of a millimetre and of a degree.
 The ideal robot next to it, with the small deviations left out, has an analytic solution; a few Newton steps

@@ -62,7 +62,7 @@ class ArmGeometry:
         """Sorts the columns by the link that carries them.
 
         Args:
-            robot: the robot as drawn.
+            robot: the nominal robot.
             chosen: indices of the g error parameters that get a column.
         """
         self._parameters = error_parameters(robot)

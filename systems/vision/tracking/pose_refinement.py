@@ -3,6 +3,9 @@
 Triangulation and singular value decomposition treat points as equally good in all directions. The pixels
 know better: their errors are alike, and the pose with the least squared errors in the images reaches the
 Cramer-Rao bound sigma^2 (J^T J)^-1.
+
+The steps are written here because a tracker makes two or three of them in every frame and needs the
+information matrix of the last one for its covariance; that they converged is checked.
 """
 
 from dataclasses import dataclass

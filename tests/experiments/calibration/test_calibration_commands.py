@@ -99,7 +99,7 @@ def test_bad_rows_are_named_and_do_no_harm(calibrated: Path, tmp_path: Path):
         "calibrate", "--measurements", str(tmp_path / "bad.csv"), "--out", str(tmp_path), "--json", "-"
     )
     assert result.exit_code == 0, result.output
-    assert "line 4: x_m is not finite" in " ".join(result.stderr.split())
+    assert "line 4: x_m is not a finite number" in " ".join(result.stderr.split())
     assert json.loads(result.stdout)["outliers"] == [7]
 
 

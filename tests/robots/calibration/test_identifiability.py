@@ -132,5 +132,5 @@ def test_the_units_of_the_parameters():
 def test_a_calibrated_robot_has_no_parameters_of_its_own():
     robot = plain()
     robot.calibration = Calibration("irb1200", source="a measurement")
-    with pytest.raises(ValueError, match="start from the robot as drawn, irb1200"):
+    with pytest.raises(ValueError, match="start from the nominal robot, irb1200"):
         identifiable_parameters(robot)

@@ -155,7 +155,7 @@ def test_a_calibrated_robot_is_not_calibrated_again():
     drawn, rng = MatrixRobot("irb1200"), np.random.default_rng(0)
     table = measured(drawn.displaced(rng), drawn.configurations(40, rng))
     robot = identify(load_robot("irb1200"), table).calibrated_robot("irb1200")
-    with pytest.raises(ValueError, match="start from the robot as drawn, irb1200"):
+    with pytest.raises(ValueError, match="start from the nominal robot, irb1200"):
         identify(robot, table)
 
 
