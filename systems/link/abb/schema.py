@@ -4,9 +4,9 @@ Any other package may register an ``egm.proto`` too; a private descriptor pool n
 and numbers are those of the ``egm.proto`` that comes with RobotWare; both generations, 6 and 7, are read.
 They differ in what lies in the measured force, which is therefore kept as bytes, see `measured_force`.
 
-They are a table here and not a compiled ``egm.proto``: compiled code works only with the protobuf runtimes that
-its compiler supports, and compiling at installation needs that compiler. In the tests, clients of other authors
-with compiled code of their own talk to this one.
+They are a table here and not a compiled ``egm.proto``: compiled code works only with the protobuf runtimes
+that its compiler supports, and compiling at installation needs that compiler. In the tests, clients of other
+authors with compiled code of their own talk to this one.
 """
 
 from typing import Any
