@@ -17,8 +17,8 @@ class HardwareStation(LeafSystem):
         out ``joint_sample``      JointSample
         out ``pose_sample``       PoseSample
 
-    It touches no socket. Whoever holds the wire puts in what was heard with `hear` and takes out what is to
-    be said with `command`.
+    It touches no socket. Whoever holds the wire puts in what was received with `receive` and takes out what
+    is to be sent with `command`.
     """
 
     def __init__(self) -> None:
@@ -29,7 +29,7 @@ class HardwareStation(LeafSystem):
         nothing = JointSample(), PoseSample()
         # One parameter for both samples: what depends on either is told once.
         index = AbstractParameterIndex(self.DeclareAbstractParameter(Value[object](nothing)))
-        self._heard = index
+        self._received = index
         for part, (name, empty) in enumerate(zip(("joint_sample", "pose_sample"), nothing, strict=True)):
             self.DeclareAbstractOutputPort(
                 name,
@@ -43,7 +43,7 @@ class HardwareStation(LeafSystem):
     def receive(self, root_context: Context, joints: JointSample, pose: PoseSample) -> None:
         """Makes these the newest samples."""
         context = self.GetMyMutableContextFromRoot(root_context)
-        context.get_mutable_abstract_parameter(self._heard).set_value((joints, pose))
+        context.get_mutable_abstract_parameter(self._received).set_value((joints, pose))
 
     def command(self, root_context: Context) -> tuple[np.ndarray, np.ndarray]:
         """The position (6,) in rad and velocity (6,) in rad/s that the servo commands now."""

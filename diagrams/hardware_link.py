@@ -20,7 +20,7 @@ _LONGEST_APPROACH = 60.0  # s
 _APPROACH_GAIN = 2.0  # 1/s, where only speeds are sent
 _PHASE_SHARE = 0.02  # of the distance between a stamp and its tick, by which the phase follows
 _SLICE = 8e-4  # s between two looks at the camera
-_REHEARSAL = 7e-4  # s before the next report is due
+_WARM_UP = 7e-4  # s before the next report is due
 _CLOSE = 3e-4  # s about the time at which it is due: a frame of the camera would delay the reply
 _WATCH = 1e-3  # s after it was due, until which one looks all the time: who sleeps wakes late and cold
 _CYCLE_TOLERANCE = 5e-3  # relative
@@ -31,7 +31,7 @@ class StationError(RuntimeError):
 
 
 class HardwareLink:
-    """Hears the controller and the camera, and answers the controller."""
+    """Receives from controller and camera, and answers the controller."""
 
     def __init__(
         self,
@@ -132,7 +132,7 @@ class HardwareLink:
     ) -> RobotReport | None:
         """The next report; None after a silence of ``wait``, by default the one that counts as a break.
 
-        The camera is heard while the controller is silent, so that its frames do not delay the reply.
+        The camera is polled while the controller is silent, so that its frames do not delay the reply.
 
         Args:
             wait: longest silence in s.
@@ -144,14 +144,14 @@ class HardwareLink:
         expected = self._client.arrived + self._period
         is_prepared = False
         self._learn_clock()
-        self._hear_camera()
+        self._poll_camera()
         while (report := self._client.poll(_pause(now, expected, deadline, is_prepared))) is None:
             now = self._now()
             if now >= deadline:
                 return None
             if not -_CLOSE < now - expected < _CLOSE:
-                self._hear_camera()
-            if warm_up is not None and now >= expected - _REHEARSAL:
+                self._poll_camera()
+            if warm_up is not None and now >= expected - _WARM_UP:
                 warm_up()
                 self._client.warm_up()
                 warm_up, is_prepared = None, True
@@ -222,7 +222,7 @@ class HardwareLink:
             self.robot_clock.observe(round(1e6 * stamp), arrived)
             self._unlearned = None
 
-    def _hear_camera(self) -> None:
+    def _poll_camera(self) -> None:
         self._client.poll_aside()
         if self._camera is not None:
             sample = self._camera.poll(self._now())
@@ -234,6 +234,6 @@ def _pause(now: float, expected: float, deadline: float, is_prepared: bool) -> f
     """How long to sleep for a report at most, in s; not at all once everything is prepared for it."""
     if is_prepared and now < expected + _WATCH:
         return 0.0
-    until_rehearsal = expected - _REHEARSAL - now
-    longest = until_rehearsal if 0.0 < until_rehearsal < _SLICE else _SLICE
+    until_warm_up = expected - _WARM_UP - now
+    longest = until_warm_up if 0.0 < until_warm_up < _SLICE else _SLICE
     return min(longest, max(0.0, deadline - now))

@@ -69,7 +69,7 @@ def measure_latency(
     progress: Callable[[float], None] | None = None,
     now: Callable[[], float] = steady_time,
 ) -> LatencyRecord:
-    """Shakes a station where it stands.
+    """Moves a joint of a station where it stands, and measures its delays.
 
     Args:
         scenario: which station.

@@ -140,7 +140,7 @@ class RealTimeRun:
         last: RobotReport | None = None  # the first message of the path is its tick 0
         wire.start_path()
         while tick < end:
-            report = wire.next_report(warm_up=self._rehearse)
+            report = wire.next_report(warm_up=self._warm_up_next)
             if report is None or not report.is_ready or wire.epoch != epoch:
                 if self.scenario.station.link.on_break == "end":
                     return "the controller fell silent" if report is None else "the controller stopped"
@@ -208,7 +208,7 @@ class RealTimeRun:
             self.station.command(context)
             self.diagram.ForcedPublish(context)
 
-    def _rehearse(self) -> None:
+    def _warm_up_next(self) -> None:
         """Computes the next tick beforehand with the last samples, and forgets it.
 
         What it needs is then in the caches of the processor, and what depends on time alone in those of the

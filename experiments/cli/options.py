@@ -67,7 +67,7 @@ FeedforwardOption = Annotated[
     typer.Option(
         "--feedforward",
         metavar="NAME",
-        help=f"An inverse model beside the law: none, {', '.join(FEEDFORWARDS)}.",
+        help=f"An inverse model beside the law: none, {', '.join(FEEDFORWARDS)}, or my_model.py:MyModel.",
         show_default="the scenario's",
     ),
 ]

@@ -164,7 +164,7 @@ class NewtonInverse:
             if q is None:
                 q = self._newton(X_WE, self._ideal.nearest(X_WE, q_near), np.inf)
             if q is not None:
-                return self._within_limits(q)
+                return self._wrap_into_limits(q)
         except (UnreachableError, JointLimitError) as error:
             refusal = error
         q = self._nearest_of_all(X_WE, q_near)
@@ -172,7 +172,7 @@ class NewtonInverse:
             raise refusal
         return q
 
-    def _within_limits(self, q: np.ndarray) -> np.ndarray:
+    def _wrap_into_limits(self, q: np.ndarray) -> np.ndarray:
         """The joint positions within the limits, by full turns where that helps."""
         for i, (angle, lower, upper) in enumerate(zip(q.tolist(), self._lower, self._upper, strict=True)):
             turned = turned_into(angle, lower, upper)
@@ -199,7 +199,7 @@ class NewtonInverse:
             for q in found:
                 if q is not None:
                     with suppress(JointLimitError):
-                        solutions.append(self._within_limits(q))
+                        solutions.append(self._wrap_into_limits(q))
             if solutions:
                 return min(solutions, key=lambda q: float(np.sum((q - q_near) ** 2)))
         return None

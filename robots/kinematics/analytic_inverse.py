@@ -126,7 +126,7 @@ class InverseKinematics:
         X = (X_1E @ self._X_EH).tolist()
         q = self._solve(X, near, *self._branch_of(near))
         if q is not None:
-            fitted, squared = self._within_limits(q, near)
+            fitted, squared = self._wrap_into_limits(q, near)
             # Another shoulder turns q1 by pi, another wrist q4 by pi, another elbow q3 by this much. No other
             # branch can be nearer than a solution closer than half of the smallest of these.
             elbow = 2.0 * abs(q[2] * self._signs[2] - self._angle23 + self._angle35)
@@ -209,7 +209,7 @@ class InverseKinematics:
         s1, s2, s3, s4, s5, s6 = self._signs
         return [s1 * q1, s2 * q2, s3 * q3, s4 * q4, s5 * q5, s6 * q6]
 
-    def _within_limits(self, q: list[float], near: list[float]) -> tuple[list[float] | None, float]:
+    def _wrap_into_limits(self, q: list[float], near: list[float]) -> tuple[list[float] | None, float]:
         """The turns of q nearest to ``near`` within the limits, or None, and the squared distance."""
         fitted, squared = [], 0.0
         for angle, wanted, lower, upper in zip(q, near, self._lower, self._upper, strict=True):
@@ -228,7 +228,7 @@ class InverseKinematics:
             raise UnreachableError(self._reach_message(X))
         best, smallest = None, math.inf
         for q in solutions:
-            fitted, squared = self._within_limits(q, near)
+            fitted, squared = self._wrap_into_limits(q, near)
             if fitted is not None and squared < smallest:
                 best, smallest = fitted, squared
         if best is None:

@@ -318,11 +318,11 @@ def followed_branch(inverse: InverseSolver, X_WE: np.ndarray, q_near: np.ndarray
         JointLimitError: if a joint limit is in the way.
     """
     q = inverse.nearest(X_WE, q_near)
-    refuse_jump(q - q_near)
+    check_branch_continuity(q - q_near)
     return q
 
 
-def refuse_jump(step: np.ndarray) -> None:
+def check_branch_continuity(step: np.ndarray) -> None:
     """Lets only steps of the joint positions (rad, shape (6,)) pass that a path can take in one tick.
 
     Raises:

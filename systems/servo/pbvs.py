@@ -8,7 +8,7 @@ import numpy as np
 from robots.configuration.quantity import quantity
 from robots.kinematics.forward import robust_solve
 from robots.pose import Rows, angular_velocity, error_of_rows, euler_difference, zyx_angles
-from systems.servo.law import LawInput, LawOutput, ServoLaw, refuse_jump
+from systems.servo.law import LawInput, LawOutput, ServoLaw, check_branch_continuity
 from systems.servo.law_config import LawConfig
 
 
@@ -41,7 +41,7 @@ class Pbvs(ServoLaw):
         rows, J = self.kinematics.rows_and_jacobian(memory)
         # Columns that LAPACK need not copy.
         rates = robust_solve(J, np.array((error_of_rows(moment.X_WD, rows), moment.V_WD)).T)
-        refuse_jump(rates[:, 0])
+        check_branch_continuity(rates[:, 0])
         velocity = rates[:, 1]
         q_d = memory + rates[:, 0] + self.period * velocity
         rows, J = self.kinematics.rows_and_jacobian(moment.position)

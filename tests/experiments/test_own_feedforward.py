@@ -1,0 +1,50 @@
+"""An inverse model of one's own: a file, named where a shipped one is named."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from diagrams.runs.simulation import run
+from diagrams.scenario.scenario import ScenarioError, load_scenario
+from systems.feedforward import FEEDFORWARDS
+from tests.experiments.commands import SHORT
+
+SETTINGS = [setting.removeprefix("--set=") for setting in SHORT]
+OWN = """
+import numpy as np
+from systems.feedforward.feedforward import Feedforward
+from systems.feedforward.joint_motion import Drive
+
+class Mine(Feedforward):
+    title, colour = "mine", "#7a5195"
+
+    def drive_under(self, reference, load, memory):
+        torque = self.motor_torque(reference.velocity, reference.acceleration, load)
+        return Drive(np.zeros(6), np.zeros(6), torque, memory)
+"""
+
+
+def test_the_same_model_in_a_file_of_ones_own_does_the_same_bit_for_bit(tmp_path: Path):
+    (tmp_path / "own.py").write_text(OWN)
+    kinds = {"rigid": "rigid", "own": f"{tmp_path / 'own.py'}:Mine"}
+    logs = {
+        name: run(load_scenario("misaligned", [*SETTINGS, f"servo.feedforward.kind={kind}"]), "open_loop")
+        for name, kind in kinds.items()
+    }
+    assert np.array_equal(logs["own"].position_command, logs["rigid"].position_command)
+    assert np.array_equal(logs["own"].X_WE_true, logs["rigid"].X_WE_true)
+
+
+def test_one_that_is_not_there_is_refused_in_one_line():
+    with pytest.raises(
+        ScenarioError, match=r"feedforward must be one of rigid, .* FILE\.py:CLASS, got 'magic'"
+    ):
+        load_scenario("misaligned", ["servo.feedforward.kind=magic"])
+
+
+def test_every_shipped_model_says_what_it_is():
+    for name, model in FEEDFORWARDS.items():
+        assert FEEDFORWARDS.name_of(model) == name
+        assert model.title == name.replace("_", " ")
+        assert model.colour.startswith("#")
