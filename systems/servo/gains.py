@@ -35,3 +35,4 @@ else:
         [(name, law.Config, field(default_factory=law.Config)) for name, law in LAWS.items()],
         bases=(_ByName,),
     )
+    LawGains.__module__ = __name__  # so that a scenario can travel to other processes

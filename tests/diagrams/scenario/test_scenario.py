@@ -1,5 +1,6 @@
 """Scenario files: the shipped ones, inheritance, settings, and one line for every mistake."""
 
+import pickle
 from pathlib import Path
 
 import numpy as np
@@ -305,3 +306,8 @@ def test_a_path_out_of_reach_is_refused_before_anything_moves(settings: list[str
         Experiment(load_scenario("nominal", settings), "pbvs")
     for word in words:
         assert word in str(caught.value)
+
+
+def test_a_scenario_travels_to_another_process():
+    scenario = load_scenario("misaligned")
+    assert scenario_text(pickle.loads(pickle.dumps(scenario))) == scenario_text(scenario)
