@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
@@ -64,6 +65,7 @@ def read_nodes(path: Path, label: str) -> Node:
     return parse(text, label)
 
 
+@lru_cache(maxsize=64)  # robots are loaded again and again; nodes are never changed
 def parse(text: str, label: str, has_lines: bool = True) -> Node:
     """The nodes of a YAML text; see `read_nodes`."""
     loader = yaml.SafeLoader(text)
