@@ -27,6 +27,7 @@ Problems = Sequence[tuple[str, RowProblem]]
 _AXES = ("Δx mm", "Δy mm", "Δz mm", "ρx °", "ρy °", "ρz °")
 _COLORS = {"before": "#9aa5b4", "after": "#0f7cc0"}
 _WEAK = 0.5  # share of the data in what is known of a parameter, below which it is said
+_MISFIT = 1.3  # of residuals, in units of the known noise, from which it is said
 _NO_NOISE_MM = 1e-6
 _LEAST_MM = 1e-13  # rounding, where it happens to be nothing
 _CONFIDENCE = 1.96  # standard deviations to either side hold 95 %
@@ -170,7 +171,13 @@ def noise_sentence(found: Identified) -> str:
     values += [f"{noise['position_mm']:.2g} mm"]
     values += [f"{noise['rotation_deg']:.2g} degrees" if found.residuals.shape[1] == 6 else ""]
     how = "Estimated" if noise["estimated"] else "Known"
-    return f" {how} noise: {', '.join(filter(None, values))}."
+    text = f" {how} noise: {', '.join(filter(None, values))}."
+    if not noise["estimated"] and found.misfit > _MISFIT:
+        text += (
+            f" Residuals are {found.misfit:.1f} times as large as this noise makes them: it is larger than "
+            "believed, or the model lacks something, and the intervals are too small."
+        )
+    return text
 
 
 def _print(console: Console, title: str, rows: Sequence[Sequence[str]]) -> None:
@@ -258,12 +265,8 @@ def _histogram(study: CalibrationStudy) -> go.Figure:
     figure = go.Figure()
     for name, robot in (("before", study.nominal), ("after", study.calibrated)):
         distance = np.linalg.norm(prediction_errors(robot, study.sets.validation)[:, -3:], axis=1)
-        trace = go.Histogram(
-            x=np.log10(np.maximum(1e3 * distance, _LEAST_MM)),
-            name=name,
-            opacity=0.7,
-            marker_color=_COLORS[name],
-        )
+        size = np.log10(np.maximum(1e3 * distance, _LEAST_MM))
+        trace = go.Histogram(x=size, name=name, opacity=0.7, marker_color=_COLORS[name])
         figure.add_trace(trace)
     ticks = list(range(-4, 3))
     axis = {"title": "error in mm", "tickvals": ticks, "ticktext": [f"{10.0**tick:g}" for tick in ticks]}

@@ -190,6 +190,7 @@ class _Search:
             residuals=fit.at.residuals,
             noise=noise.as_noise(),
             is_noise_known=self._is_known,
+            misfit=self._misfit(fit, noise, kept),
             design=self._design(fit, noise, kept),
             outliers=tuple(map(int, problem.measurements.rows[~clean])),
             kept=kept,
@@ -317,6 +318,11 @@ class _Search:
         at, rows = _selected(fit.at, kept), noise.select(kept)
         A = (rows.whitening(at.J) @ at.A).reshape(-1, at.A.shape[2])
         return np.asarray(np.linalg.qr(A, mode="r"))
+
+    def _misfit(self, fit: Fit, noise: NoiseModel, kept: np.ndarray) -> float:
+        at = _selected(fit.at, kept)
+        whitened = np.einsum("nij,nj->ni", noise.select(kept).whitening(at.J), at.residuals)
+        return float(np.sqrt(np.sum(whitened**2) / max(whitened.size - _REDUNDANCY_OF_A_POSE, 1)))
 
     def _refuse_the_implausible(self, fit: Fit, kept: np.ndarray) -> None:
         distance = float(np.median(np.linalg.norm(fit.at.residuals[kept, -3:], axis=1)))

@@ -34,6 +34,7 @@ class Identified:
     residuals: np.ndarray  # (n, 6 or 3) measured less predicted pose: rad, m; rotation first
     noise: MeasurementNoise  # known or estimated
     is_noise_known: bool
+    misfit: float  # size of the residuals in units of the noise: about one where the noise explains them
     design: np.ndarray  # triangle of the whitened derivatives by the free parameters in units of the prior
     outliers: tuple[int, ...]  # the numbers of rows with gross errors
     kept: np.ndarray  # (n,) bool, the rows that were used

@@ -13,6 +13,7 @@ from robots.calibration.solver.problem import Linearised, Problem
 
 _NEGLIGIBLE = 1e-14  # singular values below this share of the largest are rounding
 _LARGEST_DAMPING = 1e14
+_FLAT = 1e-12  # of the cost: what a full step would gain where the prior alone still moves along a valley
 _STILL = 1e-13  # of a step in units of the prior
 _ROUNDING = 1e-9  # steps below this may raise the cost by rounding
 _FRACTIONS = {"rough": 0.3, "usual": 1e-3, "exact": 1e-4}  # of the noise that a last step may have
@@ -55,6 +56,8 @@ def minimise(
         cost = float(y @ y)
         U, s, Vt = np.linalg.svd(S, full_matrices=False)
         c, keep = U.T @ y, s > _NEGLIGIBLE * s[0]
+        if float(c @ c) <= _FLAT * cost:
+            return Fit(u, at, True, iteration)
         while True:
             step = Vt.T @ (np.where(keep, s / (s * s + damping), 0.0) * c)
             largest = float(np.abs(step).max())

@@ -1,22 +1,55 @@
-"""An independent implementation, figaroh on pinocchio, identifies the same robot from the same data.
+"""Independent implementations identify the same robot from the same data.
 
-Where it is not installed (``pip install -e ".[agreement]"``) this test is skipped.
+One is MINPACK's Levenberg-Marquardt on a product of matrices, with derivatives by differences; the other is
+figaroh on pinocchio, and where it is not installed (``pip install -e ".[agreement]"``) its test is skipped.
 """
 
 import numpy as np
 import pytest
 from scipy.optimize import least_squares
+from scipy.spatial.transform import Rotation
 
-from robots.calibration.identification import identify
-from robots.calibration.measurements import SOURCE_NOISE, Measurements
+from robots.calibration.identification import IdentificationConfig, identify
+from robots.calibration.measurements import SOURCE_NOISE, MeasurementNoise, Measurements
 from robots.description.error_parameters import NUM_PARAMETERS
 from robots.description.model import Placement, load_robot
 from robots.description.urdf import urdf_text
 from robots.kinematics.error_kinematics import ErrorKinematics
 from robots.kinematics.forward import Kinematics
+from tests.robots.calibration.matrix_robot import MatrixRobot, homogeneous
 
-tools = pytest.importorskip("figaroh.calibration.calibration_tools", reason="figaroh is not installed")
-pinocchio = pytest.importorskip("pinocchio", reason="pinocchio is not installed")
+# Noise so small that the prior weighs nothing, the same for all rows: then we make plain least squares too.
+PLAIN = IdentificationConfig(noise=MeasurementNoise(0.0, 1e-9, 1e-9), leave_out_outliers=False)
+
+
+def test_an_unreduced_search_on_54_parameters_finds_the_same_robot():
+    """Noisy positions have one minimum, however redundant the parameters; differences find it."""
+    drawn, rng = MatrixRobot("irb1200"), np.random.default_rng(0)
+    drawn = drawn.with_tool(np.array([0.03, -0.05, 0.21]))
+    robot = load_robot("irb1200")
+    drawn.apply_to(robot)
+    q = drawn.configurations(60, rng)
+    X_WE = drawn.displaced(rng).forward(q)
+    table = Measurements(q, X_WE[:, :3, 3], X_WE[:, :3, :3]).noisy(SOURCE_NOISE, rng).without_rotation()
+    ours = identify(robot, table, PLAIN)
+
+    def moved(x: np.ndarray) -> MatrixRobot:
+        other = drawn.seen_from(np.eye(4))
+        moves = homogeneous(Rotation.from_rotvec(x[24:48].reshape(8, 3)), x[:24].reshape(8, 3))
+        other.placements = other.placements @ moves
+        zeros = homogeneous(Rotation.from_rotvec(x[48:, None] * other.axes), np.zeros((6, 3)))
+        other.placements[1:7] = other.placements[1:7] @ zeros
+        return other
+
+    def residuals(x: np.ndarray) -> np.ndarray:
+        return (moved(x).forward(table.q)[:, :3, 3] - table.position).ravel()
+
+    theirs = least_squares(residuals, np.zeros(54), method="lm", jac="3-point", xtol=1e-15, ftol=1e-15)
+    assert theirs.success
+    fresh = drawn.configurations(100, rng)
+    position = Kinematics(ours.calibrated_robot()).forward(fresh)[:, :3, 3]
+    assert np.abs(moved(theirs.x).forward(fresh)[:, :3, 3] - position).max() < 1e-9  # m
+    assert np.abs(drawn.forward(fresh)[:, :3, 3] - position).max() > 1e-3  # there was an error to find
 
 
 def test_predictions_of_both_agree_on_noisy_positions():
@@ -25,13 +58,15 @@ def test_predictions_of_both_agree_on_noisy_positions():
     figaroh moves the six placements and the marker, 39 numbers, by finite differences; both stop within
     1e-11 m of the minimum.
     """
+    tools = pytest.importorskip("figaroh.calibration.calibration_tools", reason="figaroh is not installed")
+    pinocchio = pytest.importorskip("pinocchio", reason="pinocchio is not installed")
     robot = load_robot("irb1200")
     robot.tool = Placement(np.array([0.03, -0.05, 0.21]), np.array([-75.0, 40.0, 12.0]))
     rng = np.random.default_rng(0)
     q = rng.uniform(0.9 * robot.lower, 0.9 * robot.upper, (60, 6))
     X_WE = ErrorKinematics(robot).forward(q, 5e-3 * rng.normal(size=NUM_PARAMETERS))
     table = Measurements(q, X_WE[:, :3, 3], X_WE[:, :3, :3]).noisy(SOURCE_NOISE, rng).without_rotation()
-    ours = identify(robot, table)
+    ours = identify(robot, table, PLAIN)
 
     model = pinocchio.buildModelFromXML(urdf_text(robot))
     data = model.createData()

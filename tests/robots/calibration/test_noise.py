@@ -98,6 +98,13 @@ def test_rows_that_say_how_noisy_they_are_are_weighed_so():
     assert np.mean(gaps["told"]) < 0.9 * np.mean(gaps["not told"])
 
 
+def test_noise_that_is_believed_too_small_shows_in_the_misfit():
+    table, _ = table_of(0)
+    assert identify(NOMINAL, table, KNOWN).misfit == pytest.approx(1.0, abs=0.15)
+    tenth = MeasurementNoise(*(0.1 * sigma for sigma in vars(SOURCE_NOISE).values()))
+    assert identify(NOMINAL, table, IdentificationConfig(noise=tenth)).misfit == pytest.approx(10.0, abs=1.5)
+
+
 def test_a_radian_is_not_weighed_as_a_metre():
     """Orientations thirty times worse than in the source do no harm: positions alone are no better."""
     bad = replace(SOURCE_NOISE, rotation_sigma=30 * SOURCE_NOISE.rotation_sigma)
