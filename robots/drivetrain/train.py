@@ -106,7 +106,8 @@ class DriveTrains:
         elements = 0 if self._hysteresis is None else np.shape(self._hysteresis.width)[-1]
         ends = np.cumsum([n if self._has_lag else 0, n if self._soft else 0, elements * n]).tolist()
         self._places = [slice(a, b) for a, b in zip([0, *ends], ends, strict=False)]
-        self._elements = (n, elements)
+        self._elements, self.num_elements = (n, elements), elements * n
+        self.motor_lag = lag  # s, (n,)
         self.num_states = ends[-1]
 
     def torques(
@@ -181,6 +182,42 @@ class DriveTrains:
         if self._soft is not None:
             state[of_soft] = self._soft.soft / np.maximum(self._soft.soft + self._soft.damped, 1e-300) * x
         return x + error, state
+
+    @property
+    def half_gap(self) -> np.ndarray:
+        """Half of the play in rad, shape (n,)."""
+        return self._half_gap
+
+    def losses(self, load: np.ndarray, speed: np.ndarray) -> np.ndarray:
+        """What a motor gives in N m beyond a load in N m and its inertia, at a speed in rad/s; (n,) each.
+
+        Friction that holds is taken for one that changes smoothly with the speed, since at rest it says
+        nothing of the torque.
+        """
+        found = np.zeros(self.size)
+        for where, part in self._frictions:
+            if isinstance(part, StickSlipFriction):
+                v = speed[where]
+                found[where] += part.viscous * v + part.coulomb * np.tanh(v / part.stribeck_velocity)
+            else:
+                found[where] += part.torque(speed[where])
+        return found if self._efficiency is None else found + self._efficiency.loss(load, speed)
+
+    def ratio_error(self, theta: np.ndarray) -> np.ndarray:
+        """By how much the outputs of the gears are ahead in rad, motors at theta in rad, shape (n,) each."""
+        return np.zeros(self.size) if self._ratio is None else self._ratio.position_error(theta)[0]
+
+    def hysteresis(self, states: np.ndarray) -> np.ndarray:
+        """What the elements of the hysteresis carry in N m, (n,), at their states in rad, (num_elements,)."""
+        if self._hysteresis is None:
+            return np.zeros(self.size)
+        return self._hysteresis.torque(states.reshape(self._elements))
+
+    def hysteresis_moved(self, states: np.ndarray, turn: np.ndarray) -> np.ndarray:
+        """The states of these elements after deflections have turned by some rad in one direction, (n,)."""
+        if self._hysteresis is None:
+            return states
+        return self._hysteresis.moved(states.reshape(self._elements), turn).ravel()
 
     def _static(self, load: np.ndarray) -> np.ndarray:
         springs: GearSpring = self._spring

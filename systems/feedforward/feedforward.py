@@ -89,6 +89,8 @@ class Feedforward(LeafSystem):
         self._damping = (1.0 + config.stiffness_error) * robot.joint_damping
         self._rotor, self._viscous = robot.reflected_inertia, robot.joint_viscous_friction
         self._coulomb, self._coulomb_velocity = robot.joint_coulomb_friction, robot.coulomb_velocity
+        # Beyond these, what a robot file says of its drive trains; friction is in them then.
+        self._trains = robot.drive_trains
         self._kinematics = Kinematics(robot)
         self._filter = None
         if config.prefilter.kind != "none":
@@ -233,5 +235,7 @@ class Feedforward(LeafSystem):
 
     def motor_torque(self, velocity: np.ndarray, acceleration: np.ndarray, load: np.ndarray) -> np.ndarray:
         """Torque of motors that carry a load: rotor inertia, viscous and Coulomb friction (2.63), (2.64)."""
+        if self._trains is not None:
+            return self._rotor * acceleration + load + self._trains.losses(load, velocity)
         friction = self._viscous * velocity + self._coulomb * np.tanh(velocity / self._coulomb_velocity)
         return self._rotor * acceleration + friction + load

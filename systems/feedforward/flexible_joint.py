@@ -7,6 +7,7 @@ from systems.controller_model import ControllerModel
 from systems.feedforward.backward_differences import HISTORY, BackwardDifferences, at_rest, with_newest
 from systems.feedforward.config import FeedforwardConfig
 from systems.feedforward.feedforward import Feedforward
+from systems.feedforward.gear_parts import GearParts
 from systems.feedforward.joint_motion import Drive, JointReference
 from systems.feedforward.sprung_deflection import SprungDeflection
 
@@ -19,7 +20,11 @@ class FlexibleJointFeedforward(Feedforward):
     motors' acceleration depends on the third derivative of the reference. They move by theta = q - delta and
     carry J theta'' + friction + tau.
 
-    The memory holds the load of the last tick and the deflections of the last three.
+    Where the robot's drive trains have further parts, their play, hysteresis, uneven ratio and losses are
+    inverted, and a motor that lags gets what its torque will change by ahead of time.
+
+    The memory holds the load of the last tick and the deflections of the last three; with further parts also
+    the torque of the last tick and what `GearParts` remembers.
     """
 
     title = "flexible joint"
@@ -34,15 +39,21 @@ class FlexibleJointFeedforward(Feedforward):
         extra_memory: int = 0,
     ) -> None:
         """Builds the model; arguments and errors as of `Feedforward`."""
+        trains = model.robot.drive_trains
+        of_parts = NUM_JOINTS * 3 + trains.num_elements if trains else 0
+        self.memory_size = type(self).memory_size + of_parts
         super().__init__(model, config, extra_memory)
         springs = model.robot.stiffening_gears
         if springs is not None:
             springs = springs.scaled(1.0 + config.stiffness_error)
         self._gears = SprungDeflection(self._stiffness, self._damping, model.period, springs)
+        self._gear_parts = GearParts(trains, self._gears) if trains else None
         self._differences = BackwardDifferences(model.period)
 
     def drive_under(self, reference: JointReference, load: np.ndarray, memory: np.ndarray) -> Drive:
         """Motors that turn ahead by what the load deflects."""
+        if self._gear_parts is not None:
+            return self._drive_with_parts(self._gear_parts, reference, load, memory)
         if np.isnan(memory[0]):
             deflection = self._gears.at_rest(load)
             history = at_rest(deflection)
@@ -54,3 +65,23 @@ class FlexibleJointFeedforward(Feedforward):
         torque = self.motor_torque(velocity, reference.acceleration - acceleration, load)
         history = with_newest(deflection, history)
         return Drive(deflection, rate, torque, np.concatenate([load, history.ravel()]))
+
+    def _drive_with_parts(
+        self, parts: GearParts, reference: JointReference, load: np.ndarray, memory: np.ndarray
+    ) -> Drive:
+        base, own = memory[: type(self).memory_size], memory[type(self).memory_size :]
+        last_torque, of_parts = own[:NUM_JOINTS], own[NUM_JOINTS:]
+        is_first = np.isnan(base[0])
+        if is_first:
+            deflection, of_parts = parts.at_rest(load, reference.position)
+            history = at_rest(deflection)
+        else:
+            history = base[NUM_JOINTS:].reshape(HISTORY, NUM_JOINTS)
+            deflection, of_parts = parts.step(of_parts, base[:NUM_JOINTS], load, reference.position)
+        rate, acceleration = self._differences.derivatives(deflection, history)
+        torque = self.motor_torque(reference.velocity - rate, reference.acceleration - acceleration, load)
+        told = torque
+        if not is_first and self._trains is not None:
+            told = torque + self._trains.motor_lag / self._period * (torque - last_torque)
+        history = with_newest(deflection, history)
+        return Drive(deflection, rate, told, np.concatenate([load, history.ravel(), torque, of_parts]))
