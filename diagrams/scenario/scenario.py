@@ -3,7 +3,7 @@
 from dataclasses import dataclass, field
 
 import numpy as np
-from pydrake.common.yaml import yaml_dump_typed
+from pydrake.common.yaml import yaml_dump, yaml_dump_typed, yaml_load
 
 from diagrams.integration import IntegratorConfig
 from diagrams.scenario.scenario_file import ScenarioError, read_scenario_nodes, shipped_scenarios
@@ -121,7 +121,15 @@ def load_scenario(name: str, settings: list[str] | None = None) -> Scenario:
 
 def scenario_text(scenario: Scenario) -> str:
     """The whole scenario as YAML that `load_scenario` reads back."""
-    return str(yaml_dump_typed(scenario))
+    text = str(yaml_dump_typed(scenario))
+    events = scenario.station.events
+    if not events:
+        return text
+    # Drake leaves out the tag of the first kind; an event must always say what it is.
+    tree = yaml_load(data=text)
+    for entry, event in zip(tree["station"]["events"], events, strict=True):
+        entry["_tag"] = f"!{type(event).__name__}"
+    return str(yaml_dump(tree))
 
 
 def _contradiction(scenario: Scenario) -> tuple[list[str | int], str] | None:

@@ -208,7 +208,17 @@ def _checked_list(node: Node, schema: Any, declared: Declaration, path: str) -> 
         hint = " with decimal points" if isinstance(wrong.value, str) and "," in wrong.value else ""
         wanted = f"{sizes} numbers".lstrip()
         raise wrong.refuse(f"{path} must be {wanted}{hint}, got {node.plain!r}")
+    for i, each in enumerate(value):
+        _require_choice(each, item, f"{path}[{i}]")
     return [_checked(each, item, Declaration(), f"{path}[{i}]") for i, each in enumerate(value)]
+
+
+def _require_choice(node: Node, schema: Any, path: str) -> None:
+    """Refuses an entry of a list that does not say of which kind it is: there no kind is the usual one."""
+    members = union_members(schema)
+    if members and selected(members, node, path) is None:
+        names = ", ".join(f"!{member.__name__}" for member in members)
+        raise node.refuse(f"{path} must begin with one of {names}, got {node.plain!r}")
 
 
 def _checked_scalar(node: Node, schema: Any, declared: Declaration, path: str) -> Any:

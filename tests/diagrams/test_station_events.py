@@ -98,6 +98,11 @@ def test_warm_links_carry_the_tip_outwards():
     assert 0.5 < growth[-1] / (1e-3 * cold.time[-1] * reach) < 1.5
 
 
+def test_an_event_must_say_what_it_is():
+    with pytest.raises(ValueError, match=r"events\[0\] must begin with one of !PayloadChange, !ToolShift"):
+        scenario("misaligned", event("{at: 1}"))
+
+
 @pytest.mark.parametrize(
     ("text", "message"),
     [
