@@ -1,7 +1,7 @@
 """The spring that carries part of the arm's weight at axis 2, as two pivots on the robot.
 
-Reiner (2010), section 2.5, without the spring's own mass. A spring beside the middle of the axis also pulls
-the structure sideways, which the pivots say and the torque about the axis does not.
+Reiner (2010), section 2.5, without the spring's own mass. A spring beside the middle of the axis, or one that
+leans along it, also pulls the structure sideways, which the plant feels.
 """
 
 from dataclasses import dataclass, field
@@ -11,17 +11,14 @@ from pydrake.math import RigidTransform
 
 from robots.drivetrain.counterbalance import Counterbalance
 
-# m between the pivots along axis 2. The torque of a spring in the plane is then wrong by a thousandth at
-# most, and a calibrated robot, whose axis 2 leans a little, is not refused.
-_LATERAL_TOLERANCE = 0.02
-
 
 @dataclass
 class CounterbalanceSpring:
-    """A tension spring from link 1 to link 2."""
+    """A tension spring from link 1 to link 2, with a damper along it."""
 
     stiffness: float = 0.0  # N / m
     preload: float = 0.0  # N where it is shortest
+    damping: float = 0.0  # N s / m
     base_pivot: np.ndarray = field(default_factory=lambda: np.zeros(3))  # m, in the frame of link 1
     arm_pivot: np.ndarray = field(default_factory=lambda: np.zeros(3))  # m, in the frame of link 2
     source: str = ""
@@ -37,12 +34,8 @@ class CounterbalanceSpring:
             ValueError: if the pivots or the spring are impossible.
         """
         p_base, p_arm = X_1S.inverse().multiply(self.base_pivot), self.arm_pivot
-        lateral = float(axis @ (p_base - p_arm))
-        if abs(lateral) > _LATERAL_TOLERANCE:
-            raise ValueError(
-                "counterbalance: both pivots must lie in one plane across axis 2, "
-                f"got {1e3 * lateral:.3f} mm between them"
-            )
+        if not self.damping >= 0.0:
+            raise ValueError(f"counterbalance: damping must not be negative, got {self.damping} N s/m")
         base, arm = p_base - axis * (axis @ p_base), p_arm - axis * (axis @ p_arm)
         dead_centre = np.arctan2(axis @ np.cross(arm, base), arm @ base)
         part = Counterbalance(
@@ -51,16 +44,17 @@ class CounterbalanceSpring:
             float(np.linalg.norm(base)),
             float(np.linalg.norm(arm)),
             float(np.rad2deg(dead_centre)),
+            abs(float(axis @ (p_base - p_arm))),
+            self.damping,
         )
         if not free_length(part) > 0.0:
-            shortest = abs(part.base_radius - part.arm_radius)
             raise ValueError(
                 f"counterbalance: preload must be below stiffness times the shortest length, "
-                f"{self.stiffness * shortest:g} N, got {self.preload:g} N"
+                f"{self.stiffness * part.shortest:g} N, got {self.preload:g} N"
             )
         return part
 
 
 def free_length(part: Counterbalance) -> float:
     """The length in m at which the spring would pull no more."""
-    return abs(part.base_radius - part.arm_radius) - part.preload / part.stiffness
+    return part.shortest - part.preload / part.stiffness

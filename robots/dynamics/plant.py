@@ -300,7 +300,13 @@ def _add_counterbalance(plant: MultibodyPlant, robot: RobotModel, base: RigidBod
     assert part is not None
     plant.AddForceElement(
         LinearSpringDamper(
-            base, spring.base_pivot, arm, spring.arm_pivot, free_length(part), spring.stiffness, 0.0
+            base,
+            spring.base_pivot,
+            arm,
+            spring.arm_pivot,
+            free_length(part),
+            spring.stiffness,
+            spring.damping,
         )
     )
 

@@ -141,14 +141,17 @@ def test_a_motor_follows_its_current_with_one_time_constant():
     ) == pytest.approx(3.0)
 
 
-def test_a_counterbalance_pulls_back_to_its_dead_centre_and_stores_what_it_takes():
-    spring = Counterbalance(2e5, 5e3, 0.6, 0.2, dead_centre_deg=-90.0)
+@pytest.mark.parametrize("lateral", [0.0, 0.15])
+def test_a_counterbalance_pulls_back_to_its_dead_centre_and_stores_what_it_takes(lateral: float):
+    spring = Counterbalance(2e5, 5e3, 0.6, 0.2, -90.0, lateral, damping=300.0)
     q = np.linspace(-np.pi, 0.4, 200)
     h = 1e-6
     difference = -(spring.energy(q + h) - spring.energy(q - h)) / (2.0 * h)
     np.testing.assert_allclose(spring.torque(q), difference, rtol=1e-5, atol=1e-2)
     assert spring.torque(np.array(-np.pi / 2.0)) == pytest.approx(0.0, abs=1e-9)
     assert spring.torque(np.array(0.0)) < 0.0 < spring.torque(np.array(-np.pi))
+    for velocity in (-2.0, 2.0):  # the damper only takes
+        assert ((spring.torque(q, velocity) - spring.torque(q)) * velocity <= 1e-9).all()
 
 
 def test_every_part_has_a_name_in_yaml_and_says_whether_it_can_be_inverted():

@@ -223,8 +223,15 @@ def test_without_data_the_structure_is_stiff():
 
 @pytest.mark.parametrize("elasticity", ["rigid", "structure"])
 @pytest.mark.parametrize("q2", [-135.0, -90.0, -45.0, -5.0])
-def test_the_counterbalance_turns_axis_2_as_its_formula_says(elasticity: str, q2: float):
+@pytest.mark.parametrize(("lateral", "damping"), [(0.0, 0.0), (0.2, 3e4)])
+def test_the_counterbalance_turns_axis_2_as_its_formula_says(
+    elasticity: str, q2: float, lateral: float, damping: float
+):
+    """Also beside the plane of the arm and with a damper, at 0.3 rad/s."""
     robot = load_robot("kr210")
+    assert robot.counterbalance is not None
+    robot.counterbalance.base_pivot += [0.0, lateral, 0.0]
+    robot.counterbalance.damping = damping
     spring = robot.counterbalance_at_axis_2
     assert spring is not None
     parts, context = build(robot, elasticity)
@@ -232,9 +239,10 @@ def test_the_counterbalance_turns_axis_2_as_its_formula_says(elasticity: str, q2
     positions = np.zeros(parts.plant.num_positions())
     positions[motors[1]] = np.deg2rad(q2)
     parts.plant.SetPositions(context, positions)
+    parts.plant.SetVelocities(context, np.where(positions != 0.0, 0.3, 0.0))
     other = parts.load(context) - parts.plant.CalcGravityGeneralizedForces(context)
     expected = np.zeros(6)
-    expected[1] = spring.torque(np.deg2rad(q2))
+    expected[1] = spring.torque(np.deg2rad(q2), 0.3)
     np.testing.assert_allclose(other[motors], expected, atol=1e-8)  # of 7e3 N m
 
 
@@ -262,7 +270,7 @@ REFUSED: dict[str, tuple] = {
     "base": (("base_link", "beam", BEAM_ON_BASE), "base_link: stands still and takes no beam"),
     "spring": (("counterbalance", "stiffness", 0.0), "Counterbalance: stiffness must be positive, got 0.0"),
     "preload": (("counterbalance", "preload", 1e5), "counterbalance: preload must be below stiffness times"),
-    "pivots": (("counterbalance", "arm_pivot", [0, 0.1, 0.2]), "both pivots must lie in one plane across"),
+    "damper": (("counterbalance", "damping", -1.0), "damping must not be negative, got -1"),
 }  # fmt: skip
 
 
