@@ -3,8 +3,11 @@
 import numpy as np
 import pytest
 
+from robots.description.model import load_robot
+from robots.kinematics.error_kinematics import ErrorKinematics
 from robots.pose import pose_error
-from systems.estimation.tip_model import moved
+from systems.controller_model import ControllerModel
+from systems.estimation.tip_model import Spread, TipModel, moved
 from tests.systems.estimation.arms import MovingArm, tip_model, true_unknowns
 
 
@@ -54,3 +57,18 @@ def test_moved_turns_by_the_angle(angle):
     X = np.eye(4)[None]
     step = np.array([[0.6 * angle, -0.8 * angle, 0.0, 1e-3, 2e-3, 3e-3]])
     np.testing.assert_allclose(pose_error(moved(X, step), X), step, rtol=angle**2, atol=1e-15)
+
+
+def test_of_a_calibrated_robot_more_is_known_and_the_same_can_be_seen():
+    drawn = tip_model()
+    robot = load_robot("irb1200")
+    errors = np.random.default_rng(3).uniform(-1.0, 1.0, 48) * 5e-3
+    calibrated = ErrorKinematics(robot).robot_with_errors(errors)
+    calibrated.calibration.of, calibrated.calibration.source = "irb1200", "measured"
+    belief = ControllerModel(calibrated, 7.0, elasticity="structure")
+    model = TipModel(belief, Spread())
+    assert np.array_equal(model.chosen, drawn.chosen)
+    assert (model.sigma[model.G] < 0.1 * drawn.sigma[drawn.G]).all()
+    q = np.random.default_rng(4).uniform(-1.0, 1.0, (3, 6))
+    found = model.forward(model.constants(model.mean), model.mean, q)[0]
+    np.testing.assert_allclose(found, ErrorKinematics(robot).forward(q, errors), atol=1e-12)
