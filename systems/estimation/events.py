@@ -19,6 +19,9 @@ _PAUSE = 50  # samples after an event before the next one
 _EXPLAINED = 0.15  # what a cause leaves of the mean error if it is the cause
 
 
+TOOL_DISPLACED, LOAD_CHANGED = "tool displaced", "load changed"
+
+
 class Verdict(NamedTuple):
     """What a sample says."""
 
@@ -107,5 +110,5 @@ class Innovations:
         # The running mean has seen the change for a part of its window only.
         size = float(np.linalg.norm(error[3:]))
         if left @ left < _EXPLAINED * (whitened @ whitened):
-            return Event("load changed", float(change[0] * model.sigma[model.M][0]), size)
-        return Event("tool displaced", size, size)
+            return Event(LOAD_CHANGED, float(change[0] * model.sigma[model.M][0]), size)
+        return Event(TOOL_DISPLACED, size, size)

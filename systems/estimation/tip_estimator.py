@@ -9,12 +9,14 @@ from scipy.linalg import get_lapack_funcs
 
 from robots.pose import pose_error
 from systems.estimation.arm_geometry import Constants
-from systems.estimation.events import Event, Innovations
+from systems.estimation.events import LOAD_CHANGED, Event, Innovations
 from systems.estimation.keyframes import Keyframes, keyframe_row
 from systems.estimation.memory import Layout
 from systems.estimation.tip_model import Prediction, Spread, TipModel, moved
 
 (_POSV,) = get_lapack_funcs(("posv",), dtype=np.float64)  # symmetric positive definite equations
+_AGAIN = 500  # samples, in which a second event says that the first was explained wrongly
+_OF_THE_LOAD = 0.1  # of its spread, when a tool was displaced
 _CLOSE_AT = (5, 20, 60)  # samples: the first linearisations are poor
 
 
@@ -62,6 +64,7 @@ class TipEstimator:
             xi=(n,),
             x_geometry=(n,),  # the value that the constants are for
             count=(1,),
+            event_at=(1,),  # the count at the last event
             A_open=(n, n),
             b_open=(n,),
             samples=(1,),
@@ -78,6 +81,7 @@ class TipEstimator:
     def start(self, memory: SimpleNamespace) -> None:
         """Writes what is known before the first sample."""
         memory.x_geometry[:] = self.model.mean
+        memory.event_at[0] = -np.inf
         self._keyframes.reset(memory.keyframes, np.eye(self.model.size), np.zeros(self.model.size))
 
     def x(self, memory: SimpleNamespace) -> np.ndarray:
@@ -125,7 +129,7 @@ class TipEstimator:
                 return None
             if verdict.has_jumped and weight > 0.2:
                 event = self._innovations.explain(innovations, H, self.model)
-                self._widen(memory)
+                self._widen(memory, event)
         y = r + H @ memory.xi
         weighted = (weight * self._weights)[:, None] * H
         memory.A_open += H.T @ weighted
@@ -184,14 +188,20 @@ class TipEstimator:
     def _solve_columns(self, memory: SimpleNamespace, H: np.ndarray) -> np.ndarray:
         return np.linalg.solve(memory.keyframes.A + memory.A_open, H.T)
 
-    def _widen(self, memory: SimpleNamespace) -> None:
-        """Something happened: what was known stays, but for the tool and the load."""
+    def _widen(self, memory: SimpleNamespace, event: Event) -> None:
+        """Something happened: what was known stays, but for the tool and the load.
+
+        A displaced tool leaves the load alone, unless that has not explained what came soon after it.
+        """
+        again = memory.count[0] - memory.event_at[0] < _AGAIN
+        memory.event_at[0] = memory.count[0]
+        share = 1.0 if again or event.kind == LOAD_CHANGED else _OF_THE_LOAD
         model = self.model
         P = self.covariance(memory)
         tool = model.tool_directions()
         P = P + tool @ tool.T
         load = np.zeros(model.size)
-        load[model.M] = np.array([4.0, 0.3, 0.3, 0.3]) / model.sigma[model.M]
+        load[model.M] = share * np.array([4.0, 0.3, 0.3, 0.3]) / model.sigma[model.M]
         A = np.linalg.inv(P + np.diag(load**2))
         A = 0.5 * (A + A.T)
         self._keyframes.reset(memory.keyframes, A, A @ memory.xi)

@@ -11,6 +11,7 @@ from robots.description.model import NUM_JOINTS
 from systems.controller_model import ControllerModel
 from systems.estimation.command_delay import CommandDelay
 from systems.estimation.drive_model import DEAD_TIME, DriveModel
+from systems.estimation.events import LOAD_CHANGED, TOOL_DISPLACED, Event
 from systems.estimation.findings import findings
 from systems.estimation.memory import History, Layout
 from systems.estimation.parameter_lead import ParameterLead
@@ -30,6 +31,7 @@ _UPSET_PAUSE = 0.3  # s without learning after it, so that the drives come to re
 _UNREST = 0.5  # m/s^2, while the robot is led onto its plan, or the plan is not where motors are
 _STARTING = 1.5  # s
 _LOOK_EVERY = 5  # ticks, between two searches for the dead time
+_KINDS = (TOOL_DISPLACED, LOAD_CHANGED)
 _GIVE_UP = 1.6  # s after the start: what is believed of the dead time has to do
 
 # A row of the plan: motors, loads, links, tip, unrest, columns and correction of the drive model.
@@ -110,6 +112,8 @@ class SelfCalibrating(LeafSystem):
             planned=(1,),  # the last instant of the plan
             compared=(1,),  # how many planned instants encoders have been compared at
             paused_until=(1,),
+            events=(8, 4),
+            num_events=(1,),
             amplitude=(6,),
         )
         self._reference = self.DeclareAbstractInputPort("reference", Value[object]())
@@ -143,12 +147,13 @@ class SelfCalibrating(LeafSystem):
         return self._layout.view(context.get_discrete_state(self._memory).value())
 
     def learnt(self, context: Context) -> dict[str, Any]:
-        """What it has found out until now: `findings`, and ``dead_time_s`` from a command to its motion."""
+        """What it has found out: `findings`, ``dead_time_s`` from command to motion, the last ``events``."""
         memory = self.memory(context)
         late = float(memory.drives.beta[DEAD_TIME])
         return {
             "dead_time_s": float(memory.delay.delay[0]) + late,
             **findings(self.estimator, memory.estimator),
+            "events": self._events(memory),
         }
 
     def _tick(self, context: Context, discrete_state: DiscreteValues) -> None:
@@ -168,7 +173,9 @@ class SelfCalibrating(LeafSystem):
             pair = self._pair(memory, sample)
             measurement[2] = sample.time
             if pair is not None:
-                self.estimator.add(memory.estimator, pair)
+                event = self.estimator.add(memory.estimator, pair)
+                if event is not None:
+                    self._note(memory, time, event)
                 measurement[0] = time
         self.estimator.work(memory.estimator)
         if not joints.running:
@@ -181,6 +188,20 @@ class SelfCalibrating(LeafSystem):
             discrete_state.set_value(int(state), command)
         learnt = memory.lead.x - self.tip_model.mean
         discrete_state.set_value(int(self._outputs[3]), memory.columns @ learnt)
+
+    def _note(self, memory: SimpleNamespace, time: float, event: Event) -> None:
+        """Keeps an event for whoever asks what happened; the last eight."""
+        count = int(memory.num_events[0])
+        memory.events[count % len(memory.events)] = time, _KINDS.index(event.kind), event.size, event.error
+        memory.num_events[0] = count + 1
+
+    def _events(self, memory: SimpleNamespace) -> list[dict[str, Any]]:
+        count, length = int(memory.num_events[0]), len(memory.events)
+        rows = [memory.events[k % length].tolist() for k in range(max(0, count - length), count)]
+        return [
+            {"time_s": time, "kind": _KINDS[int(kind)], "size": size, "tip_error_m": error}
+            for time, kind, size, error in rows
+        ]
 
     def _command(
         self, memory: SimpleNamespace, reference: PathAhead, time: float, position: np.ndarray
