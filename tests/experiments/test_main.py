@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from diagrams.scenario.scenario import shipped_scenarios
+from diagrams.scenario.scenario import load_scenario, shipped_scenarios
 from experiments import main
 from experiments.cli.prepare import check, prepare
 from robots.description.model import shipped_robots
@@ -140,8 +140,14 @@ def test_the_pace_of_a_run_can_be_set(tmp_path):
 
 def test_what_the_readme_shows_can_be_run(tmp_path):
     readme = (Path(main.__file__).parents[1] / "README.md").read_text()
-    (scenario,) = re.findall(r"^```yaml\n(.*?)^```", readme, re.M | re.S)
-    (tmp_path / "mine.yaml").write_text(scenario)
+    # Of a robot file only one joint is shown.
+    shown = [
+        text for text in re.findall(r"^```yaml\n(.*?)^```", readme, re.M | re.S) if "joints:" not in text
+    ]
+    (tmp_path / "mine.yaml").write_text(shown[0])
+    for number, text in enumerate(shown):
+        (tmp_path / f"{number}.yaml").write_text(text)
+        load_scenario(str(tmp_path / f"{number}.yaml"))
     commands = re.findall(r"^truetip (?:compare|run) .*", readme, re.M)
     assert "truetip compare --scenario mine.yaml" in commands
     for command in commands:
