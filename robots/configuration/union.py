@@ -24,7 +24,7 @@ def short_name(member: type) -> str:
     return str(getattr(member, _SELECTOR, "")) or re.sub(r"(?<!^)(?=[A-Z])", "_", name).lower()
 
 
-def tags(member: type) -> tuple[str, str]:
+def tags(member: Any) -> tuple[str, str]:
     """How a tag may name a class: with and without ``Config`` at its end."""
     return member.__name__, member.__name__.removesuffix("Config")
 

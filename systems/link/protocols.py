@@ -42,7 +42,10 @@ class RobotReport(Protocol):
 class RobotLink(Protocol):
     """Any controller that reports its joints in a cycle and takes a command in reply to each report."""
 
-    arrived: float  # steady time at which the newest report came, s
+    @property
+    def arrived(self) -> float:
+        """Steady time at which the newest report came, in s."""
+        ...
 
     @property
     def place(self) -> str:

@@ -33,6 +33,7 @@ class Pbvs(ServoLaw):
     title = "PBVS"
     colour = "#d55e00"
     Config = PbvsConfig
+    config: PbvsConfig
     commands_motors = True
     is_compared = True
 

@@ -11,6 +11,7 @@ import socket
 import threading
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
+from typing import Self
 
 import numpy as np
 from pydrake.math import RigidTransform
@@ -102,7 +103,7 @@ class VirtualCameraServer:
         with self._lock:
             return sum(client.session.left_out for client in self._clients)
 
-    def __enter__(self) -> "VirtualCameraServer":
+    def __enter__(self) -> Self:
         self._thread.start()
         return self
 

@@ -1,7 +1,7 @@
 """A path and a camera of one's own: one class each, which a scenario takes as it takes the shipped ones."""
 
 from dataclasses import dataclass, field, replace
-from typing import ClassVar
+from typing import Any, ClassVar, cast
 
 import numpy as np
 
@@ -49,12 +49,12 @@ class Own:
 
 def test_a_path_and_a_camera_of_ones_own_are_read_checked_and_run():
     own = typed(parse("path: !Slope {rise_mm: 80}\ncamera: !SlowCamera {period: 0.008}", "own"), Own)
-    path = make_path(ReferenceConfig(own.path))
+    path = make_path(ReferenceConfig(cast(Any, own.path)))
     rise = path.sample(path.duration)[0][:3, 3] - path.sample(0.0)[0][:3, 3]
     np.testing.assert_allclose(rise, [0.0, 0.08, 0.08], atol=1e-12)
     scenario = load_scenario("nominal", ["station.elasticity=rigid"])
     station = replace(scenario.station, camera=own.camera)
-    scenario = replace(scenario, station=station, reference=ReferenceConfig(own.path))
+    scenario = replace(scenario, station=station, reference=ReferenceConfig(cast(Any, own.path)))
     experiment = Experiment(scenario, "numerical_ik")
     experiment.advance(0.1)
     sample = experiment.station.GetOutputPort("pose_sample").Eval(

@@ -9,6 +9,7 @@ import pytest
 from diagrams.runs.simulation import Experiment
 from diagrams.scenario.scenario import ScenarioError, load_scenario, scenario_text, shipped_scenarios
 from systems.cell.events.station_events import PayloadChange, ToolShift
+from systems.cell.pose_camera import PoseCameraConfig
 from systems.reference.shapes import Circle, FigureEight, Points, Shape
 
 
@@ -71,6 +72,7 @@ def test_a_file_extends_a_shipped_scenario_or_one_beside_it(tmp_path: Path):
     scenario = load_scenario(name)
     assert scenario.station.payload == 3.0
     assert scenario.station.camera.delay == 0.02
+    assert isinstance(scenario.station.camera, PoseCameraConfig)
     assert scenario.station.camera.position_sigma == 50e-6  # of the one at the bottom
     assert scenario.servo.laws["pbvs"].translation == 5.0
 
@@ -115,6 +117,7 @@ def test_a_law_takes_its_own_gains_alone():
 def test_a_small_number_may_be_written_with_an_exponent_and_no_point():
     """YAML 1.1 takes 50e-6 for a text; whoever sets a spread does not."""
     scenario = load_scenario("nominal", ["station.camera.position_sigma=50e-6"])
+    assert isinstance(scenario.station.camera, PoseCameraConfig)
     assert scenario.station.camera.position_sigma == 50e-6
 
 
