@@ -7,6 +7,7 @@ these alone, exactly: those that are left out move into the others until every p
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from scipy.linalg import qr
@@ -49,10 +50,14 @@ class ReducibleModel:
         robot = model.robot
         lower, upper = np.maximum(robot.lower, -np.pi), np.minimum(robot.upper, np.pi)
         self._q = np.random.default_rng(0).uniform(lower, upper, (_CONFIGURATIONS, len(lower)))
-        drawn = self.regressor(np.zeros(len(model)))
+
+    @cached_property
+    def _drawn(self) -> np.ndarray:
+        """Independent parameters of the robot as drawn, indices."""
+        drawn = self.regressor(np.zeros(len(self._model)))
         # Zeros of joints first, as far as they are independent: a controller can take them.
-        zeros = np.arange(len(model))[ZEROS][independent_columns(drawn[:, ZEROS])]
-        self._drawn = independent_columns(drawn, zeros)
+        zeros = np.arange(len(self._model))[ZEROS][independent_columns(drawn[:, ZEROS])]
+        return independent_columns(drawn, zeros)
 
     def regressor(self, x: np.ndarray) -> np.ndarray:
         """Rows of all configurations, columns in units of the prior, (rows, m)."""
