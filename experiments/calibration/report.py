@@ -19,6 +19,7 @@ from experiments.report.robot_plot import tips_figure
 from robots.calibration.identifiability import completeness
 from robots.calibration.identified import Identified
 from robots.calibration.measurement_file import RowProblem
+from robots.calibration.prior import CENTRE_OF_MASS, MASS
 from robots.calibration.repeatability import repeatability
 from robots.calibration.validation import ErrorStatistics, prediction_errors
 from robots.pose import zyx_from_rotation
@@ -246,6 +247,8 @@ def write_calibration_page(
         "With 95 % confidence. Placements are displaced along (x, y, z) and turned about (rx, ry, rz) the "
         "axes of their frame; zero is the zero point of a joint. A dependent parameter is zero, its effect "
         "is in the ones shown."
+        f" Intervals of compliances contain masses known to {100.0 * MASS:.0f} % and centres known to "
+        f"{1e3 * CENTRE_OF_MASS:.0f} mm."
     )
     sections.append(Section("Parameters", note, html_table(*_parameter_table(study))))
     q, rows = study.sets.calibration.q, study.sets.calibration.rows
