@@ -87,26 +87,27 @@ def _print(console: Console, scenario: str, results: list[dict[str, Any]]) -> No
         title_justify="left",
         title_style="italic",
     )
-    for name in ("case", "law", "lap", "mm", "°", "at rest mm", "recovered mm", "worst", "guard"):
-        table.add_column(name, justify="left" if name in ("case", "law", "worst") else "right", no_wrap=True)
+    has_events = any("recovered_mm" in result for result in results)
+    table.add_column("case, law", overflow="fold")
+    for name in ("lap", "mm", "°", "at rest mm", *(["mm after event"] if has_events else [])):
+        table.add_column(name, justify="right", no_wrap=name != "mm after event")
     for result in results:
-        label = escape(result["case"]), escape(law_title(result["law"]))
+        label = f"{escape(result['case'])}, {escape(law_title(result['law']))}"
         laps = result.get("laps", [])
         for number, lap in enumerate(laps, 1):
             is_last = number == len(laps)
-            table.add_row(
-                *(label if number == 1 else ("", "")),
-                str(number),
-                _pair(lap["max_norm_mm"], 3),
-                _pair(lap["max_angle_deg"], 4),
-                _pair(result["static_mm"], 4) if is_last else "",
-                _pair(result["recovered_mm"], 3) if is_last and "recovered_mm" in result else "",
-                f"seed {result['worst_seed']}, {result['worst_path']}" if is_last else "",
-                str(result["guard"]) if is_last else "",
-            )
-        for failure in result["failures"]:
-            table.add_row(*label, "", "", "", "", "", f"[red]{escape(failure)}[/red]", "")
+            cells = [str(number), _pair(lap["max_norm_mm"], 3), _pair(lap["max_angle_deg"], 3)]
+            cells.append(_pair(result["static_mm"], 4) if is_last else "")
+            if has_events:
+                cells.append(_pair(result["recovered_mm"], 3) if is_last and "recovered_mm" in result else "")
+            table.add_row(label if number == 1 else "", *cells)
     console.print(table)
+    for result in results:
+        label = f"{escape(result['case'])}, {escape(law_title(result['law']))}"
+        if result.get("guard"):
+            console.print(f"{label}: the guard intervened in {result['guard']} ticks")
+        for failure in result["failures"]:
+            console.print(f"[red]{label}: {escape(failure)}[/red]")
 
 
 def _pair(pair: tuple[float, float], digits: int) -> str:
