@@ -1,5 +1,6 @@
 """``truetip robustness``: laws on many random robots, worst and median."""
 
+from dataclasses import replace
 from typing import Annotated, Any
 
 import typer
@@ -77,7 +78,7 @@ def robustness_command(
 def _case(name: str, settings: list[str]) -> Case:
     if name not in CASES:
         raise ValueError(f"--cases: must be of {', '.join(CASES)}, got '{name}'")
-    return Case(name, (*CASES[name].settings, *settings))
+    return replace(CASES[name], settings=(*CASES[name].settings, *settings))
 
 
 def _print(console: Console, scenario: str, results: list[dict[str, Any]]) -> None:

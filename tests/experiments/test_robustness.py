@@ -68,6 +68,16 @@ def test_the_command_prints_a_row_of_each_law_and_writes_the_numbers(tmp_path: P
     assert worst > median > 5.0  # millimetres, of robots that are off by some
 
 
+def test_what_is_left_after_an_event_is_told(tmp_path: Path):
+    file = tmp_path / "numbers.json"
+    settings = [part for setting in ["reference.settle=5.8", *QUICK[1:]] for part in ("--set", setting)]
+    options = ["--scenario", "everything", "--paths", "circle", "--seeds", 1, "--jobs", 1, "--json", file]
+    result = truetip("robustness", "--laws", "open_loop", "--cases", "tool-displaced", *options, *settings)
+    assert result.exit_code == 0, result.output
+    (judged_case,) = json.loads(file.read_text())["results"]
+    assert judged_case["recovered_mm"][0] > 5.0
+
+
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
