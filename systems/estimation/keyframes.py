@@ -13,6 +13,7 @@ from systems.estimation.tip_model import TipModel
 # the pose that was seen, and its weight in samples.
 _THETA, _GEARS, _MOTION, _TWIST = slice(0, 6), slice(6, 12), slice(12, 24), slice(24, 30)
 _POSE, _WEIGHT, _ROW = slice(30, 42), 42, 43
+_MANY = 60  # keyframes, some two seconds of motion
 
 
 class Keyframes:
@@ -70,6 +71,16 @@ class Keyframes:
         memory.end[0] = end + 1
         memory.A += A
         memory.b += b
+
+    def is_settled(self, memory: SimpleNamespace, xi: np.ndarray, tolerance: float) -> bool:
+        """Whether many configurations have been seen, or the sum is linear where the parameters (m, rad) are.
+
+        What a linearisation far off leaves looks like a change of the robot as long as little has been seen.
+        """
+        if memory.end[0] >= _MANY:
+            return True
+        change = np.abs((xi - memory.xi_pass) * self._model.sigma)[self._model.G]
+        return bool(memory.position[0] < 0.0 and change.max() <= tolerance)
 
     def work(self, memory: SimpleNamespace, constants: Constants, xi: np.ndarray, tolerance: float) -> bool:
         """Goes on with a pass, or begins one if a parameter has moved by more than the tolerance (m, rad).

@@ -127,7 +127,8 @@ class TipEstimator:
             verdict = self._innovations.judge(innovations, r, H, lambda: self._solve_columns(memory, H))
             if verdict.is_outlier:
                 return None
-            if verdict.has_jumped and weight > 0.2:
+            is_settled = self._keyframes.is_settled(memory.keyframes, memory.xi, config.relinearise)
+            if verdict.has_jumped and weight > 0.2 and is_settled:
                 event = self._innovations.explain(innovations, H, self.model)
                 self._widen(memory, event)
         y = r + H @ memory.xi

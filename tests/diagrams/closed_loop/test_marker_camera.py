@@ -51,7 +51,7 @@ def test_the_arm_hides_markers_of_the_true_station():
     scenario = load_scenario("misaligned", ["station.camera.kind=features"])
     station = Experiment(scenario, "open_loop").station
     camera = station.GetSubsystemByName("camera")
-    motors = station.GetSubsystemByName("motor_state")
+    motors = station.GetSubsystemByName("motor_signals")
     wires = station.connection_map()
     assert wires[camera, camera.GetInputPort("motor_state").get_index()] == (motors, 0)
 

@@ -14,7 +14,7 @@ from experiments.cli.prepare import prepare
 
 @cache
 def setup() -> SweepSetup:
-    return study_setup(prepare("misaligned"))
+    return study_setup(prepare("misaligned", ["station.camera=images"]))
 
 
 def swept(name: str, *values: float) -> list[SweepPoint]:

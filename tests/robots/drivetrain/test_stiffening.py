@@ -94,6 +94,6 @@ def test_at_rest_the_stiffened_gear_carries_its_load_and_swings_with_its_tangent
 def test_an_impossible_gear_is_refused_in_one_line(tmp_path: Path, stiffening: Stiffening, message: str):
     path = tmp_path / "robot.yaml"
     path.write_text(robot_text(stiffening_robot(stiffening)))
-    with pytest.raises(RobotFileError, match=f"robot.yaml: joint 3: .*{message}") as refused:
+    with pytest.raises(RobotFileError, match=rf"robot.yaml, line \d+: joint 3: .*{message}") as refused:
         load_robot(str(path))
     assert "\n" not in str(refused.value)

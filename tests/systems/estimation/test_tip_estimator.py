@@ -62,13 +62,15 @@ def test_the_error_is_what_the_covariance_says():
         assert r @ np.linalg.solve(P, r) < 35.0  # chi squared of six, one in 200000
 
 
-def test_seconds_at_rest_do_not_freeze_what_was_linearised_far_off():
-    kept, frozen = Session(2), Session(2, relinearise=np.inf)
+@pytest.mark.parametrize("seed", [2, 3, 4])
+def test_seconds_at_rest_do_not_freeze_what_was_linearised_far_off(seed: int):
+    kept, frozen = Session(seed), Session(seed, relinearise=np.inf)
     for session in (kept, frozen):
         session.learn(2.0, size=0.0)
-        session.learn(2.0)
-    assert kept.error() < 0.5e-3
-    assert frozen.error() > 2.0 * kept.error()
+        session.learn(4.0)
+    assert not kept.events
+    assert kept.error() < 0.8e-3  # at configurations where it has not been
+    assert frozen.error() > 1.5 * kept.error()
 
 
 @pytest.mark.parametrize("shift", [0.5e-3, 3e-3])
