@@ -1,5 +1,6 @@
 """How far ahead commands have to be: believed, checked with the first motion, and corrected smoothly."""
 
+import math
 from types import SimpleNamespace
 
 import numpy as np
@@ -7,10 +8,11 @@ import numpy as np
 from systems.estimation.dead_time import DeadTime, DeadTimeConfig
 from systems.estimation.memory import Layout
 
-_RATE = 0.5  # s/s, at which the plan runs ahead or waits while the delay is corrected
+_RATE = 0.5  # s/s, at most, at which the plan runs ahead or waits while the delay is corrected
+_BEND = 10.0  # s/s^2, at most, by which that rate changes
 _AGREE = 2e-3  # s, two searches in a row that differ less are believed
 _WRONG = 1.5  # periods: what is less is left to the model of the drives
-_CLEARER = 4.0  # times: by how much the plan has to fit better when it is shifted
+_CLEARER = 4.0  # times: by how much commands have to fit better when they are shifted
 
 
 class CommandDelay:
@@ -23,9 +25,10 @@ class CommandDelay:
         self.layout = Layout(
             search=self.search.layout,
             delay=(1,),
+            rate=(1,),  # of the delay while it is corrected
             target=(1,),
             known=(1,),
-            last=(1,),  # lag of the last search, NaN if it found none
+            last=(1,),  # what the last search found in s, NaN if it found nothing
             settled=(1,),  # the planned instant up to which the delay was wrong
         )
 
@@ -38,8 +41,17 @@ class CommandDelay:
         """The delay for this tick in s; ``planned`` is the instant that was planned last, in s."""
         way = float(memory.target[0] - memory.delay[0])
         if way != 0.0:
-            most = _RATE * self._period
-            memory.delay[0] += min(max(way, -most), most)
+            most = _BEND * self._period
+            # As fast as it can still be stopped from in whole periods.
+            stopping = math.sqrt(0.25 * most**2 + 2.0 * _BEND * abs(way)) - 0.5 * most
+            fastest = min(_RATE, stopping, abs(way) / self._period)
+            wanted = math.copysign(fastest, way)
+            rate = float(memory.rate[0])
+            rate += min(max(wanted - rate, -most), most)
+            memory.delay[0] += rate * self._period
+            memory.rate[0] = rate
+            if abs(memory.target[0] - memory.delay[0]) < 1e-6:
+                memory.delay[0], memory.rate[0] = memory.target[0], 0.0
             memory.settled[0] = planned + self._period
         return float(memory.delay[0])
 
@@ -49,19 +61,18 @@ class CommandDelay:
 
     def look(self, memory: SimpleNamespace) -> float:
         """Searches; returns by how much the delay is corrected from now on in s, 0 if it is not."""
-        if memory.delay[0] != memory.target[0]:
-            return 0.0
-        found = self.search.search(memory.search)
+        target = float(memory.target[0])
+        found = self.search.search(memory.search, target, is_working=bool(memory.known[0]))
         if found is None or not self.search.found(found):
             memory.last[0] = np.nan
             return 0.0
-        agrees = abs(found.lag - memory.last[0]) < _AGREE
-        memory.last[0] = found.lag
+        agrees = abs(found.delay - memory.last[0]) < _AGREE
+        memory.last[0] = found.delay
         if not agrees:
             return 0.0
-        memory.known[0], memory.last[0] = 1.0, np.nan
-        is_clear = found.residual_at_zero > _CLEARER * found.residual
-        if abs(found.lag) < _WRONG * self._period or not is_clear:
+        memory.known[0] = 1.0
+        is_clear = found.residual_believed > _CLEARER * found.residual
+        if abs(found.delay - target) < _WRONG * self._period or not is_clear:
             return 0.0
-        memory.target[0] = max(self._period, memory.delay[0] + found.lag)
-        return float(memory.target[0] - memory.delay[0])
+        memory.target[0] = max(self._period, found.delay)
+        return float(memory.target[0] - target)

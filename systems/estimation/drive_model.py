@@ -165,9 +165,9 @@ class DriveModel:
         memory.P[:] = 0.5 * (P + P.T)
 
     def widen(self, memory: SimpleNamespace) -> None:
-        """The load has changed: constants and mass are open again."""
+        """Load or dead time have changed: constants, mass and dead time are open again."""
         extra = np.zeros(SIZE)
-        extra[31:37], extra[MASS] = 3e-5, 5.0
+        extra[31:37], extra[MASS], extra[DEAD_TIME] = 3e-5, 5.0, 1e-3
         memory.P[_DIAGONAL, _DIAGONAL] += extra**2
 
 

@@ -19,7 +19,7 @@ _PAUSE = 50  # samples after an event before the next one
 _EXPLAINED = 0.15  # what a cause leaves of the mean error if it is the cause
 
 
-TOOL_DISPLACED, LOAD_CHANGED = "tool displaced", "load changed"
+TOOL_DISPLACED, LOAD_CHANGED, DEAD_TIME_CHANGED = "tool displaced", "load changed", "dead time changed"
 
 
 class Verdict(NamedTuple):
@@ -32,9 +32,9 @@ class Verdict(NamedTuple):
 class Event(NamedTuple):
     """What happened to the robot."""
 
-    kind: str  # "tool displaced" or "load changed"
-    size: float  # m, or kg
-    error: float  # m, of the tip
+    kind: str  # "tool displaced", "load changed" or "dead time changed"
+    size: float  # m, kg or s
+    error: float  # m, of the tip where it is known
 
 
 class Innovations:

@@ -11,7 +11,7 @@ from robots.description.model import NUM_JOINTS
 from systems.controller_model import ControllerModel
 from systems.estimation.command_delay import CommandDelay
 from systems.estimation.drive_model import DEAD_TIME, DriveModel
-from systems.estimation.events import LOAD_CHANGED, TOOL_DISPLACED, Event
+from systems.estimation.events import DEAD_TIME_CHANGED, LOAD_CHANGED, TOOL_DISPLACED, Event
 from systems.estimation.findings import findings
 from systems.estimation.memory import History, Layout
 from systems.estimation.parameter_lead import ParameterLead
@@ -26,12 +26,16 @@ from systems.servo.self_calibrating_config import SelfCalibratingConfig
 
 _REACH = 0.1  # s, how far back plans and encoders are remembered, beyond the delays
 _FIRST_LEARNT = 0.4  # s after the start: before that the robot is led onto its plan
-_UPSET = 3e-4  # rad, a following error that no drive makes on its own: the load has changed
+_UPSET = 3e-4  # rad, a following error that no drive makes on its own: load or dead time have changed
 _UPSET_PAUSE = 0.3  # s without learning after it, so that the drives come to rest
+_LONGEST_PAUSE = 0.6  # s, after which what is left has to be learnt
+_CALM_AGAIN = 1.0  # s after an upset before there can be another one
+_SETTLING = 0.2  # s that the drives take to come to rest after a dead time was corrected
+_ASTRAY = 3e-3  # rad, by which motors may miss their plan before its loads are not those of the robot
 _UNREST = 0.5  # m/s^2, while the robot is led onto its plan, or the plan is not where motors are
 _STARTING = 1.5  # s
 _LOOK_EVERY = 5  # ticks, between two searches for the dead time
-_KINDS = (TOOL_DISPLACED, LOAD_CHANGED)
+_KINDS = (TOOL_DISPLACED, LOAD_CHANGED, DEAD_TIME_CHANGED)
 _GIVE_UP = 1.6  # s after the start: what is believed of the dead time has to do
 
 # A row of the plan: motors, loads, links, tip, unrest, columns and correction of the drive model.
@@ -111,6 +115,7 @@ class SelfCalibrating(LeafSystem):
             first=(1,),  # the first planned instant
             planned=(1,),  # the last instant of the plan
             compared=(1,),  # how many planned instants encoders have been compared at
+            upset_at=(1,),
             paused_until=(1,),
             events=(8, 4),
             num_events=(1,),
@@ -138,7 +143,7 @@ class SelfCalibrating(LeafSystem):
         self.estimator.start(memory.estimator)
         self._drives.start(memory.drives)
         memory.lead.x[:] = self.tip_model.mean
-        memory.paused_until[0] = -np.inf
+        memory.upset_at[0] = memory.paused_until[0] = -np.inf
         self._delay.start(memory.delay, self._model.command_delay)
         return vector
 
@@ -244,9 +249,10 @@ class SelfCalibrating(LeafSystem):
             )
         )
         self._plan.append(memory.plan, instant, row)
-        self._delay.search.plan(memory.delay.search, instant, plan.theta)
+        self._delay.search.command(memory.delay.search, time, plan.theta)
         memory.planned[0] = instant
-        return command.position, command.velocity, command.torque
+        # While the delay is corrected the path is sent faster or slower than it is to be travelled.
+        return command.position, (1.0 + memory.delay.rate[0]) * command.velocity, command.torque
 
     def _pair(self, memory: SimpleNamespace, sample: PoseSample) -> Pair | None:
         """The encoders and the plan at the instant of an exposure."""
@@ -260,10 +266,14 @@ class SelfCalibrating(LeafSystem):
         if encoders is None or loaded is None or planned is None:
             return None
         then, now = _PLAN.view(loaded), _PLAN.view(planned)
+        if memory.delay.known[0] and np.abs(now.theta - encoders).max() > _ASTRAY:
+            return None
         X_WE = sample.X_WE.GetAsMatrix4()
         # As it would have been seen had the clock been right: the column stands for all of the offset.
         X_WE = moved(X_WE[None], ((exposure - sample.time) * now.twist)[None])[0]
-        return Pair(encoders, then.loads, then.motion, now.twist, X_WE, float(now.unrest[0]))
+        is_settling = exposure < memory.delay.settled[0] + _SETTLING
+        unrest = _UNREST if is_settling else float(now.unrest[0])
+        return Pair(encoders, then.loads, then.motion, now.twist, X_WE, unrest)
 
     def _encoders_at(self, memory: SimpleNamespace, time: float) -> np.ndarray | None:
         """Positions between two samples, a cubic through positions and velocities, rad, (6,)."""
@@ -293,7 +303,11 @@ class SelfCalibrating(LeafSystem):
         if memory.delay.known[0] and not is_upset:
             return
         if round(time / self.period) % _LOOK_EVERY == 0:
-            self._delay.look(memory.delay)
+            was_known = bool(memory.delay.known[0])
+            change = self._delay.look(memory.delay)
+            if was_known and change:
+                self._note(memory, time, Event(DEAD_TIME_CHANGED, change, 0.0))
+                memory.upset_at[0] = time
         if since_start > _GIVE_UP:
             memory.delay.known[0] = 1.0
 
@@ -319,7 +333,9 @@ class SelfCalibrating(LeafSystem):
         instant, Phi, y = sample
         drives = memory.drives
         if on_path and np.abs(y - Phi @ drives.beta).max() > _UPSET:
-            memory.paused_until[0] = instant + _UPSET_PAUSE
+            if instant > memory.upset_at[0] + _CALM_AGAIN:
+                memory.upset_at[0] = instant
+            memory.paused_until[0] = min(instant + _UPSET_PAUSE, memory.upset_at[0] + _LONGEST_PAUSE)
         if instant <= memory.paused_until[0]:
             return
         if np.isfinite(memory.paused_until[0]):

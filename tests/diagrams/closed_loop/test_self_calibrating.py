@@ -75,3 +75,27 @@ def test_a_lap_from_a_nominal_robot(name, settings, moving):
     assert on_path.max() < moving
     assert at_rest.mean() < 0.005e-3
     assert not any(log.guard_counts.values())
+
+
+@pytest.mark.slow
+def test_a_dead_time_that_changes_on_the_path_is_learnt_while_the_tip_stays_on_its_track():
+    settings = ["station.events=[!DeadTimeChange {at: 6, dead_time: 0.033}]", "seed=1001"]
+    experiment = Experiment(load_scenario("everything", settings), "self_calibrating")
+    experiment.advance(until=8.0)
+    log = experiment.log()
+    errors = np.linalg.norm(pose_error(log.X_WE_desired, log.X_WE_true)[:, 3:], axis=1)
+    late = errors[(log.time >= 6.0) & (log.time < 6.5)].max()
+    assert late > 1e-3  # 30 ms of its way
+    assert errors[log.time >= 6.5].max() < 0.2 * late
+    assert errors[log.time >= 7.5].max() < 0.1e-3
+    # All joints are late alike: the tip is late too, but where it has to pass.
+    on_track = log.time >= 6.0
+    track = log.X_WE_desired[:, :3, 3]
+    aside = [
+        np.linalg.norm(track - p, axis=1).min() for p in log.X_WE_true[on_track][:125:5, :3, 3]
+    ]  # to the nearest of points 4 ms apart
+    assert max(aside) < 0.25 * late
+    assert log.learnt is not None
+    assert [event["kind"] for event in log.learnt["events"]] == ["dead time changed"]
+    assert log.learnt["dead_time_s"] == pytest.approx(0.037, abs=0.2e-3)
+    assert not any(log.guard_counts.values())
