@@ -55,13 +55,13 @@ from experiments.metrics.run_metrics import timing, with_timing
 from experiments.modes.command import modes_command
 from experiments.replay.live import LiveView, advance_live
 from experiments.report.report import verdict
+from experiments.robots.command import robots_app
 from experiments.robustness.command import robustness_command
 from experiments.station.cell_command import cell_command
 from experiments.station.guided_command import ask_before_moving, guide, on_station
 from experiments.station.latency_command import latency_command
 from experiments.zeros.command import zeros_command
 from robots.configuration.described import described
-from robots.description.model import load_robot, shipped_robots
 from systems.servo import LAWS
 
 app = typer.Typer(
@@ -263,6 +263,7 @@ app.command("frame")(frame_command)
 app.command("chain")(chain_command)
 app.command("tool")(tool_command)
 app.command("align")(align_command)
+app.add_typer(robots_app, name="robots")
 
 
 @app.command("scenarios")
@@ -277,12 +278,6 @@ def scenarios_command(
             print(f"{row.path:<58} {row.default or '-':<24} {row.allowed}")
         return
     print_list((name, load_scenario(name).description) for name in shipped_scenarios())
-
-
-@app.command("robots")
-def robots_command() -> None:
-    """List the robots that come with truetip."""
-    print_list((name, load_robot(name).name) for name in shipped_robots())
 
 
 def _settings(

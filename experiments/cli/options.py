@@ -51,7 +51,7 @@ RobotOption = Annotated[
 ]
 # Of a study that takes a robot and no scenario.
 StudiedRobotOption = Annotated[
-    str, typer.Option("--robot", metavar="NAME|FILE", help="A shipped robot or a YAML file.")
+    str, typer.Option("--robot", metavar="NAME|FILE", help="A shipped robot, a YAML file or a URDF.")
 ]
 PayloadOption = Annotated[
     float | None,

@@ -6,6 +6,7 @@ from pathlib import Path
 
 from diagrams.runs.simulation import Experiment, nominal_robot
 from diagrams.scenario.scenario import Scenario, ScenarioError, load_scenario, scenario_text
+from robots.description.foreign_sources import foreign_sources_note
 from robots.description.model import RobotModel, load_robot
 
 QUICK_SPEEDUP = 4.0  # of the acceleration along the path
@@ -34,7 +35,7 @@ class Prepared:
                 f"the feedforward compensates an elastic structure that the robot does not have with "
                 f"station.elasticity={true}"
             )
-        return ""
+        return foreign_sources_note(self.robot)
 
     @property
     def text(self) -> str:

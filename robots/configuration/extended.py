@@ -21,12 +21,14 @@ class FileKind:
             file that says so.
         merges_lists: whether lists of groups of the same length are merged entry by entry, else replaced.
         renamed: puts what a file says under former names in its present place.
+        read: gives the nodes of a file by its path and label.
     """
 
     schema: Any
     find: Callable[[str, Path], tuple[Path, str]]
     merges_lists: bool = False
     renamed: Callable[[Node], Node] = lambda node: node
+    read: Callable[[Path, str], Node] = read_nodes
 
 
 def read_extended(name: str, kind: FileKind, beside: Path | None = None, depth: int = 0) -> Node:
@@ -38,7 +40,7 @@ def read_extended(name: str, kind: FileKind, beside: Path | None = None, depth: 
     path, label = kind.find(name, beside or Path())
     if depth > _DEEPEST:
         raise ConfigurationError(f"{label}: 'extends' runs in a circle")
-    node = read_nodes(path, label)
+    node = kind.read(path, label)
     if not isinstance(node.value, dict):
         raise ConfigurationError(f"{label}: must be a mapping of keys to values")
     own = Node({key: entry for key, entry in node.value.items() if key != "extends"}, node.place)

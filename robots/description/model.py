@@ -16,40 +16,26 @@ from importlib.resources import files
 from pathlib import Path
 
 import numpy as np
-from pydrake.math import RigidTransform, RotationMatrix
 
 from robots.configuration.extended import FileKind, read_extended
-from robots.configuration.nodes import ConfigurationError
+from robots.configuration.nodes import ConfigurationError, Node, read_nodes
 from robots.configuration.quantity import numbers, positive, quantity
 from robots.configuration.typed import typed
 from robots.description.beam import Beam, beam_surrogate
 from robots.description.calibration import Calibration
 from robots.description.counterbalance_spring import CounterbalanceSpring
 from robots.description.drive_train import DriveTrain, drive_trains
+from robots.description.placement import Picture, Placement
+from robots.description.urdf_in.reader import is_urdf, read_urdf
 from robots.drivetrain.counterbalance import Counterbalance
 from robots.drivetrain.stiffness import SpringRow
 from robots.drivetrain.train import DriveTrains
-from robots.pose import rotation_from_zyx
 
 NUM_JOINTS = 6
 
 
 class RobotFileError(ConfigurationError):
     """A robot file is missing, cannot be parsed, or describes an impossible robot."""
-
-
-@dataclass
-class Placement:
-    """A frame in its parent: translation in m, ZYX Euler angles (alpha, beta, gamma) in degrees."""
-
-    translation: np.ndarray = field(default_factory=lambda: np.zeros(3))
-    zyx_deg: np.ndarray = field(default_factory=lambda: np.zeros(3))
-    source: str = ""
-
-    def pose(self) -> RigidTransform:
-        """The placement as a transform, child in parent."""
-        R = RotationMatrix(rotation_from_zyx(np.deg2rad(self.zyx_deg)))
-        return RigidTransform(R, self.translation)
 
 
 @dataclass
@@ -88,16 +74,24 @@ class Joint:
 
 @dataclass
 class Link:
-    """A body, rigid without a ``beam``; ``inertia`` holds the principal moments about the centre of mass."""
+    """A body, rigid without a ``beam``; its inertia is that about the centre of mass."""
 
     mass: float = positive(0.0, "kg")
-    inertia: np.ndarray = field(default_factory=lambda: np.zeros(3))  # kg m^2, along x, y, z
+    inertia: np.ndarray = field(default_factory=lambda: np.zeros(3))  # kg m^2, about x, y, z
+    products: np.ndarray = field(default_factory=lambda: np.zeros(3))  # kg m^2, entries xy, xz, yz
     source: str = ""
     center_of_mass: np.ndarray = field(default_factory=lambda: np.zeros(3))  # m, in the link frame
     center_of_mass_source: str = ""
     radius: float = positive(0.05, "m")  # of the capsules that picture the link
     radius_source: str = ""
     beam: Beam | None = None
+    pictures: list[Picture] = field(default_factory=list)  # in place of the capsule
+
+    @property
+    def inertia_matrix(self) -> np.ndarray:
+        """About the centre of mass in the axes of the link's frame in kg m^2, shape (3, 3)."""
+        (xx, yy, zz), (xy, xz, yz) = self.inertia, self.products
+        return np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
 
 
 @dataclass
@@ -225,32 +219,45 @@ def shipped_robots() -> list[str]:
 
 
 def load_robot(name: str) -> RobotModel:
-    """Reads a shipped robot by name (``"irb1200"``) or any robot file by its path.
+    """Reads a shipped robot by name (``"irb1200"``) or any robot file or URDF by its path.
 
     Raises:
         RobotFileError: if there is no such robot, or its file is not a valid robot.
     """
     try:
-        node = read_extended(name, FileKind(RobotModel, _find, merges_lists=True))
-        robot = typed(node, RobotModel)
-        keys, problem = _problem(robot)
-        if problem:
-            raise node.at(keys).refuse(problem)
+        node = read_extended(name, FileKind(RobotModel, _find, merges_lists=True, read=_read))
+        return robot_of(node)
     except RobotFileError:
         raise
     except ConfigurationError as error:
         raise RobotFileError(str(error)) from error
+
+
+def robot_of(node: Node) -> RobotModel:
+    """The robot that the nodes of a file describe.
+
+    Raises:
+        ConfigurationError: if they describe none, or an impossible one.
+    """
+    robot = typed(node, RobotModel)
+    keys, problem = _problem(robot)
+    if problem:
+        raise node.at(keys).refuse(problem)
     return robot
+
+
+def _read(path: Path, label: str) -> Node:
+    return read_urdf(path, label).nodes if is_urdf(path.name) else read_nodes(path, label)
 
 
 def _find(name: str, beside: Path) -> tuple[Path, str]:
     """Path and label of a robot file."""
-    is_file = name.endswith((".yaml", ".yml"))
+    is_file = name.endswith((".yaml", ".yml")) or is_urdf(name)
     path = beside / name if is_file else Path(str(_data_folder() / f"{name}.yaml"))
     if not path.is_file():
         raise RobotFileError(
             f"robot '{name}': no file {path}; "
-            f"give the path of a YAML file or one of {', '.join(shipped_robots())}"
+            f"give the path of a YAML file or a URDF, or one of {', '.join(shipped_robots())}"
         )
     return path, f"robot file {path}"
 
@@ -275,13 +282,18 @@ def _problem(robot: RobotModel) -> tuple[_Keys, str]:
     bodies: list[tuple[_Keys, str, Link]] = [(("base_link",), "base_link", robot.base_link)]
     bodies += [(("links", index), f"link {index + 1}", link) for index, link in enumerate(robot.links)]
     for keys, label, link in bodies:
-        problems.append(((*keys, "inertia"), _inertia_problem(label, link.inertia)))
+        problems.append(((*keys, "inertia"), _inertia_problem(label, link)))
         problems.append(((*keys, "beam"), _beam_problem(label, link)))
+        reasons = (picture.problem() for picture in link.pictures)
+        problems += [
+            ((*keys, "pictures", k), reason and f"{label}: {reason}") for k, reason in enumerate(reasons)
+        ]
     if not any(problem for _, problem in problems):
         problems.append((("counterbalance",), _refusal(lambda: robot.counterbalance_at_axis_2)))
     problems.append((("calibration",), robot.calibration.problem()))
     if robot.payload.largest_mass > 0.0:
-        problems.append((("payload", "inertia"), _inertia_problem("payload", robot.payload.inertia)))
+        carried = Link(inertia=robot.payload.inertia)
+        problems.append((("payload", "inertia"), _inertia_problem("payload", carried)))
     return next((each for each in problems if each[1]), ((), ""))
 
 
@@ -326,6 +338,8 @@ def _beam_problem(where: str, link: Link) -> str:
     beam = link.beam
     if beam is None:
         return ""
+    if link.products.any():
+        return f"{where}: a beam takes no products of inertia, got {link.products.tolist()}"
     problem = _refusal(lambda: beam_surrogate(beam, link.mass, link.center_of_mass, link.inertia))
     return problem and f"{where}: {problem}"
 
@@ -345,11 +359,12 @@ def _not_positive(where: str, values: dict[str, float]) -> str:
     return ""
 
 
-def _inertia_problem(where: str, inertia: np.ndarray) -> str:
+def _inertia_problem(where: str, body: Link) -> str:
     # No body has a principal moment larger than the sum of the two others; Drake refuses it as well, later.
-    if inertia.min() > 0.0 and 2.0 * inertia.max() <= inertia.sum() * (1.0 + 1e-9):
+    moments = np.linalg.eigvalsh(body.inertia_matrix) if body.products.any() else body.inertia
+    if moments.min() > 0.0 and 2.0 * moments.max() <= moments.sum() * (1.0 + 1e-9):
         return ""
     return (
         f"{where}: inertia must be three positive moments, none above the sum of the others, "
-        f"got {inertia.tolist()}"
+        f"got {np.asarray(moments).tolist()}"
     )

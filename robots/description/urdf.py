@@ -113,7 +113,8 @@ def _add_link(root: ElementTree.Element, name: str, link: Link) -> None:
     ElementTree.SubElement(inertial, "origin", xyz=_numbers(link.center_of_mass), rpy="0 0 0")
     ElementTree.SubElement(inertial, "mass", value=repr(float(link.mass)))
     xx, yy, zz = (repr(float(moment)) for moment in link.inertia)
-    ElementTree.SubElement(inertial, "inertia", ixx=xx, iyy=yy, izz=zz, ixy="0", ixz="0", iyz="0")
+    xy, xz, yz = (repr(float(product)) for product in link.products)
+    ElementTree.SubElement(inertial, "inertia", ixx=xx, iyy=yy, izz=zz, ixy=xy, ixz=xz, iyz=yz)
 
 
 def _add_joint(

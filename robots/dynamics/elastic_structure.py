@@ -5,6 +5,7 @@ deformed. So centres of mass, hinges and the next joint are given in the frame o
 they belong to.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -154,7 +155,7 @@ def add_beam_link(
 
 def link_inertia(link: Link) -> SpatialInertia:
     """The inertia of a rigid link about its frame's origin."""
-    return _central(link.mass, link.center_of_mass, link.inertia)
+    return _central(link.mass, link.center_of_mass, [*link.inertia, *link.products])
 
 
 def massless() -> SpatialInertia:
@@ -162,7 +163,10 @@ def massless() -> SpatialInertia:
     return SpatialInertia(0.0, np.zeros(3), UnitInertia(0.0, 0.0, 0.0), skip_validity_check=True)
 
 
-def _central(mass: float, center_of_mass: np.ndarray, inertia: np.ndarray) -> SpatialInertia:
+def _central(
+    mass: float, center_of_mass: np.ndarray, inertia: Sequence[float] | np.ndarray
+) -> SpatialInertia:
+    """From the three moments about the centre of mass, with the products xy, xz, yz if there are any."""
     return SpatialInertia.MakeFromCentralInertia(
         mass, center_of_mass, RotationalInertia(*map(float, inertia))
     )

@@ -45,6 +45,7 @@ from robots.dynamics.elastic_structure import (
     link_inertia,
     massless,
 )
+from robots.dynamics.link_pictures import add_pictures
 from robots.kinematics.error_kinematics import ErrorKinematics
 
 ELASTICITIES = ("rigid", "joints", "structure")
@@ -245,8 +246,8 @@ def add_robot(
             name = f"joint_{i + 1}"
             motors.append(plant.AddJoint(RevoluteJoint(name, socket, driven.body_frame(), joint.axis)))
             plant.AddJointActuator(name, motors[-1])
-        if i + 1 < NUM_JOINTS:
-            _picture_link(plant, bodies[-1], link, robot.joints[i + 1].placement.translation)
+        following = robot.joints[i + 1].placement.translation if i + 1 < NUM_JOINTS else np.zeros(3)
+        _picture_link(plant, bodies[-1], link, following)
     if robot.counterbalance is not None:
         _add_counterbalance(plant, robot, bodies[0][1], bodies[1][0])
     tool = plant.AddFrame(FixedOffsetFrame("tool", before, robot.tool.pose()))
@@ -266,9 +267,8 @@ def add_robot(
 def _add_base(plant: MultibodyPlant, robot: RobotModel) -> RigidBody:
     base = plant.AddRigidBody("base", link_inertia(robot.base_link))
     plant.WeldFrames(plant.world_frame(), base.body_frame(), robot.base.pose())
-    _add_capsule(
-        plant, base, np.zeros(3), robot.joints[0].placement.translation, robot.base_link.radius, _BASE_COLOR
-    )
+    tip = robot.joints[0].placement.translation
+    _picture_link(plant, (base, base), robot.base_link, tip, _BASE_COLOR)
     return base
 
 
@@ -319,23 +319,27 @@ def _payload_inertia(robot: RobotModel, mass: float) -> SpatialInertia:
 
 
 def _picture_link(
-    plant: MultibodyPlant, bodies: tuple[RigidBody, RigidBody], link: Link, tip: np.ndarray
+    plant: MultibodyPlant,
+    bodies: tuple[RigidBody, RigidBody],
+    link: Link,
+    tip: np.ndarray,
+    color: Rgba = _LINK_COLOR,
 ) -> None:
-    """Draws a link from its joint to the next one, the halves of a beam apart so that one sees it bend."""
-    first, last = bodies
-    if first is last:
-        _add_capsule(plant, first, np.zeros(3), tip, link.radius, _LINK_COLOR)
+    """Draws a link by its pictures or as a capsule, the halves of a beam apart so that one sees it bend."""
+    if not plant.geometry_source_is_registered():
         return
-    _add_capsule(plant, first, np.zeros(3), 0.5 * tip, link.radius, _LINK_COLOR)
-    _add_capsule(plant, last, 0.5 * tip, tip, link.radius, _LINK_COLOR)
+    first, last = bodies
+    if first is not last:
+        _add_capsule(plant, first, np.zeros(3), 0.5 * tip, link.radius, color)
+        _add_capsule(plant, last, 0.5 * tip, tip, link.radius, color)
+    elif not add_pictures(plant, first, link, color):
+        _add_capsule(plant, first, np.zeros(3), tip, link.radius, color)
 
 
 def _add_capsule(
     plant: MultibodyPlant, body: RigidBody, start: np.ndarray, end: np.ndarray, radius: float, color: Rgba
 ) -> None:
-    """Pictures a stretch of a link; does nothing in a plant without a SceneGraph."""
-    if not plant.geometry_source_is_registered():
-        return
+    """Pictures a stretch of a link."""
     direction = np.asarray(end) - start
     length = float(np.linalg.norm(direction))
     if length < 1e-6:

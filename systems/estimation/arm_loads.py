@@ -25,7 +25,7 @@ class ArmLoads:
         centres = [link.center_of_mass for link in links] + [payload.center_of_mass]
         self._centres = np.array(centres, dtype=float)
         share = 1.0 / payload.largest_mass if payload.largest_mass > 0.0 else 0.0
-        inertia = [link.inertia for link in links] + [share * np.asarray(payload.inertia)]
+        inertia = [link.inertia_matrix for link in links] + [np.diag(share * np.asarray(payload.inertia))]
         self._inertia = np.array(inertia, dtype=float)
         axes = [
             [axis, *tilting_axes(joint.axis)] for axis, joint in zip(robot.axes, robot.joints, strict=True)
@@ -66,7 +66,7 @@ class ArmLoads:
         # Euler's equation in the axes of the link, where the inertia is constant.
         spins = np.stack([w, alpha], -1)[:, _SHARED]
         spins = R7.swapaxes(-1, -2) @ spins
-        momentum = self._inertia[..., None] * spins
+        momentum = self._inertia @ spins
         couple = momentum[..., 1:] + skew(spins[..., 0]) @ momentum[..., :1]
         couple = (R7 @ couple)[..., 0]
         arm = origin[:, _SHARED] + centre

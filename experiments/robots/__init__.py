@@ -1,0 +1,1 @@
+"""``truetip robots``: which there are, and robots from URDF."""

@@ -1,0 +1,94 @@
+"""``truetip robots``: lists those that come with it, and makes a robot file of a URDF."""
+
+from contextlib import ExitStack
+from pathlib import Path
+from typing import Annotated
+
+import numpy as np
+import typer
+from rich.console import Console
+from rich.markup import escape
+
+from experiments.cli.console import print_list, print_note, refusing
+from experiments.cli.staging import YAML, staged_file
+from experiments.report.files import write_text
+from robots.configuration.nodes import ConfigurationError
+from robots.description.model import RobotModel, load_robot, robot_of, shipped_robots
+from robots.description.robot_file import robot_text
+from robots.description.urdf_in.reader import UrdfRobot, is_urdf, read_urdf
+
+robots_app = typer.Typer(help="List the robots that come with truetip, or make a robot file of a URDF.")
+
+
+@robots_app.callback(invoke_without_command=True)
+def robots_command(context: typer.Context) -> None:
+    """List the robots that come with truetip, or make a robot file of a URDF."""
+    if context.invoked_subcommand is None:
+        print_list((name, load_robot(name).name) for name in shipped_robots())
+
+
+@robots_app.command("import")
+def import_command(
+    urdf: Annotated[str, typer.Argument(metavar="FILE.urdf", help="A URDF, macros expanded.")],
+    base: Annotated[
+        str,
+        typer.Option(metavar="LINK", help="Its frame is the world.", show_default="the one that carries all"),
+    ] = "",
+    tip: Annotated[
+        str, typer.Option(metavar="LINK", help="Its frame is the tool.", show_default="tool0, or the end")
+    ] = "",
+    package: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="NAME=DIR",
+            help="Where the meshes of a package are; repeatable. Others are looked for above the file.",
+        ),
+    ] = None,
+    write: Annotated[str | None, typer.Option(metavar="FILE.yaml", help="The robot file to write.")] = None,
+) -> None:
+    """Make a robot file of a URDF, and say what is assumed in it."""
+    console = Console()
+    with refusing(ValueError, OSError), ExitStack() as stack:
+        target = stack.enter_context(staged_file(write, *YAML)) if write else None
+        if not is_urdf(urdf):
+            raise ConfigurationError(f"'{urdf}' is no URDF: its name must end in .urdf or .xacro")
+        found = read_urdf(Path(urdf), f"URDF {urdf}", base, tip, _folders(package or []))
+        robot = robot_of(found.nodes)
+        if target:
+            write_text(target, robot_text(robot))
+    _describe(console, robot, found)
+    if write:
+        console.print(escape(write), soft_wrap=True)
+
+
+def _folders(options: list[str]) -> dict[str, Path]:
+    folders = {}
+    for option in options:
+        name, separator, folder = option.partition("=")
+        if not separator or not name or not Path(folder).is_dir():
+            raise ConfigurationError(f"--package must be NAME=DIR with a folder that exists, got '{option}'")
+        folders[name] = Path(folder)
+    return folders
+
+
+def _describe(console: Console, robot: RobotModel, found: UrdfRobot) -> None:
+    limits = np.rad2deg(np.stack([robot.lower, robot.upper], -1))
+    rows = [("robot", robot.name), ("world and tool", f"{found.chain.base}, {found.chain.tip}")]
+    rows += [
+        (f"joint {number}", f"{joint.name}: {lower:.0f} to {upper:.0f} deg, moves {link.mass:.3g} kg")
+        for number, (joint, (lower, upper), link) in enumerate(
+            zip(found.chain.joints, limits, robot.links, strict=True), 1
+        )
+    ]
+    rows.append(("pictures", str(sum(len(link.pictures) for link in [robot.base_link, *robot.links]))))
+    rows.append(("assumed", ", ".join(found.assumed)))
+    print_list(rows)
+    if found.chain.held:
+        names = ", ".join(joint.name for joint in found.chain.held)
+        print_note(console, f"these joints are taken as fixed at zero: {names}")
+    if found.missing_meshes:
+        print_note(
+            console,
+            f"{len(found.missing_meshes)} meshes were not found, for example {found.missing_meshes[0]}; "
+            "name their folder with --package NAME=DIR",
+        )

@@ -1,0 +1,248 @@
+"""Reads a URDF as what a robot file would say of the same robot.
+
+Drake's parser reads frames, limits, masses and inertias. It is given the six joints alone: others that could
+move are fixed, shapes are left out, because Drake refuses packages that it does not find. What URDF does not
+hold is `assumed`.
+"""
+
+import copy
+import math
+import xml.etree.ElementTree as ElementTree
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from itertools import pairwise
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from pydrake.math import RigidTransform
+from pydrake.multibody.parsing import Parser
+from pydrake.multibody.plant import MultibodyPlant
+from pydrake.multibody.tree import JacobianWrtVariable, RevoluteJoint, RigidBody
+from pydrake.systems.framework import Context
+
+from robots.configuration.nodes import ConfigurationError, Node
+from robots.description.placement import placement_entry
+from robots.description.urdf_in.assumed import (
+    assumed_drive_trains,
+    assumed_payload,
+    assumed_radius,
+    assumed_tilting,
+)
+from robots.description.urdf_in.chain import NUM_AXES, Chain, UrdfText
+from robots.description.urdf_in.pictures import Pictures
+
+SUFFIXES = (".urdf", ".xacro")
+_LEFT_OUT = {"link": ("visual", "collision"), "joint": ("mimic", "safety_controller", "dynamics")}
+_DROPPED = ("gazebo", "transmission", "material", "ros2_control")
+_SAMPLES = 200  # configurations among which the largest inertia is looked for
+_FULL_TURN = 360.0  # deg, either way, of a joint without limits
+_SPEED = 180.0  # deg/s, of a joint that does not say it
+_NO_MASS = 1e-9  # kg
+
+
+@dataclass(frozen=True)
+class UrdfRobot:
+    """A robot that was read from a URDF."""
+
+    nodes: Node  # what a robot file would say
+    chain: Chain
+    assumed: list[str] = field(default_factory=list)  # what the URDF does not say
+    missing_meshes: list[str] = field(default_factory=list)
+
+
+def is_urdf(name: str) -> bool:
+    """Whether a name is that of a URDF."""
+    return name.lower().endswith(SUFFIXES)
+
+
+def read_urdf(
+    path: Path, label: str, base: str = "", tip: str = "", packages: Mapping[str, Path] | None = None
+) -> UrdfRobot:
+    """Reads six revolute joints in a row, of any geometry.
+
+    Args:
+        path: of the URDF, or of a xacro file whose macros are expanded.
+        label: how messages call it.
+        base, tip: links whose frames are the world and the tool, see `UrdfText.chain`.
+        packages: folders of packages, for meshes; others are looked for above the file.
+
+    Raises:
+        ConfigurationError: if it is no such robot, or a link that moves has no mass or inertia.
+    """
+    text = UrdfText(path, label)
+    chain = text.chain(base, tip)
+    arm = _Arm(text, chain)
+    pictures = Pictures(text, packages or {})
+    tree = arm.entries(pictures)
+    assumed = ["gears, motors and friction", "bearings", "payload", *arm.assumed]
+    return UrdfRobot(_node(tree, label), chain, assumed, pictures.missing)
+
+
+class _Arm:
+    """Drake's plant of the six joints."""
+
+    def __init__(self, text: UrdfText, chain: Chain) -> None:
+        self._text, self._chain = text, chain
+        self.assumed: list[str] = []
+        plant = MultibodyPlant(0.0)
+        try:
+            Parser(plant).AddModelsFromString(_for_drake(text, chain), "urdf")
+            root = plant.GetBodyByName(text.root_link)
+            if root.index() != plant.world_body().index():
+                plant.WeldFrames(plant.world_frame(), root.body_frame())
+            plant.Finalize()
+        except RuntimeError as error:
+            reason = " ".join(str(error).split())
+            raise ConfigurationError(f"{text.label}: Drake cannot read it: {reason}") from error
+        self._plant: MultibodyPlant = plant
+        self._context = plant.CreateDefaultContext()
+        plant.SetPositions(self._context, np.zeros(NUM_AXES))
+        self._joints: list[RevoluteJoint] = [plant.GetJointByName(joint.name) for joint in chain.joints]
+        # Of the base and of the six links: the frames, and what is fixed to them.
+        names = [chain.joints[0].parent, *(joint.child for joint in chain.joints)]
+        self._bodies: list[RigidBody] = [plant.GetBodyByName(name) for name in names]
+
+    def entries(self, pictures: Pictures) -> dict[str, Any]:
+        """What a robot file says of it."""
+        plant, chain = self._plant, self._chain
+        tip = plant.GetBodyByName(chain.tip)
+        X_FE = self._between(self._bodies[-1], tip)
+        reach = self._reach()
+        source = f"URDF {self._text.path.name}"
+        links = [self._link(number, source, reach, pictures) for number in range(NUM_AXES + 1)]
+        payload = assumed_payload([link["mass"] for link in links[1:]], X_FE.translation())
+        trains = assumed_drive_trains(self._largest_inertia(payload["largest_mass"], tip))
+        joints = []
+        for number, (joint, train) in enumerate(zip(self._joints, trains, strict=True), 1):
+            X = self._between(*self._bodies[number - 1 : number + 1])
+            joints.append(
+                {
+                    "axis": [float(each) for each in joint.revolute_axis()],
+                    "placement": placement_entry(X, source),
+                    "limits": self._limits(joint, source),
+                    "drive_train": train,
+                    "tilting": assumed_tilting(train),
+                }
+            )
+        base = self._between(plant.GetBodyByName(chain.base), self._bodies[0])
+        return {
+            "name": self._text.root.get("name") or self._text.path.stem,
+            "base": placement_entry(base, source),
+            "joints": joints,
+            "tool": placement_entry(X_FE, f"{source}, link {chain.tip}"),
+            "base_link": links[0],
+            "links": links[1:],
+            "payload": payload,
+        }
+
+    def _between(self, a: RigidBody, b: RigidBody) -> RigidTransform:
+        """The frame of b in that of a, with all joints at zero."""
+        return self._plant.CalcRelativeTransform(self._context, a.body_frame(), b.body_frame())
+
+    def _limits(self, joint: RevoluteJoint, source: str) -> dict:
+        limits = [float(np.rad2deg(v)) for v in (joint.position_lower_limit(), joint.position_upper_limit())]
+        assumed = []
+        if not all(map(math.isfinite, limits)):
+            limits = [-_FULL_TURN, _FULL_TURN]
+            assumed.append("range")
+        if not limits[0] < limits[1]:
+            raise self._text.refuse(
+                f"joint '{joint.name()}': has no range, its limits are {limits[0]:g} and {limits[1]:g} deg",
+                joint.name(),
+            )
+        speed = float(np.rad2deg(joint.velocity_upper_limit()))
+        if not (math.isfinite(speed) and speed > 0.0):
+            speed = _SPEED
+            assumed.append("speed")
+        self.assumed += [f"{what} of {joint.name()}" for what in assumed]
+        source += "".join(f"; {what} assumed" for what in assumed)
+        return {"lower_deg": limits[0], "upper_deg": limits[1], "speed_deg_s": speed, "source": source}
+
+    def _link(self, number: int, source: str, reach: float, pictures: Pictures) -> dict:
+        """Mass, inertia and pictures of a link with all that is fixed to it; number 0 is the base."""
+        body = self._bodies[number]
+        welded = self._plant.GetBodiesWeldedTo(body)
+        X_of = {each.name(): self._between(body, each) for each in welded}
+        # A link named world is Drake's own world, which has no shapes or mass here.
+        shapes = [
+            entry for name, X in X_of.items() if name in self._text.links for entry in pictures.of(name, X)
+        ]
+        indices = [each.index() for each in welded if each.index() != self._plant.world_body().index()]
+        M = self._plant.CalcSpatialInertia(self._context, body.body_frame(), indices)
+        if not M.get_mass() > _NO_MASS:
+            if number:
+                raise self._text.refuse(
+                    f"link '{body.name()}' moves and has no mass or inertia; a simulation needs both",
+                    body.name(),
+                )
+            self.assumed.append("mass of the base")
+            entry = {"mass": 1.0, "inertia": [0.01] * 3, "source": "assumed", "center_of_mass": [0.0] * 3}
+            return entry | {"radius": 0.05 * reach, "radius_source": "assumed", "pictures": shapes}
+        p = M.get_com()
+        about_center = M.Shift(p).CalcRotationalInertia()
+        moments, products = about_center.get_moments(), about_center.get_products()
+        principal = np.linalg.eigvalsh(about_center.CopyToFullMatrix3())
+        if not principal.min() > 0.0:
+            raise self._text.refuse(f"link '{body.name()}' has a mass and no inertia", body.name())
+        return {
+            "mass": M.get_mass(),
+            "inertia": moments.tolist(),
+            "products": products.tolist(),
+            "source": source,
+            "center_of_mass": p.tolist(),
+            "center_of_mass_source": source,
+            "radius": assumed_radius(M.get_mass(), principal, reach),
+            "radius_source": "assumed: a solid cylinder of this inertia",
+            "pictures": shapes,
+        }
+
+    def _reach(self) -> float:
+        """The sum of the distances from joint to joint and to the tool, from the second joint on, in m."""
+        bodies = [*self._bodies[2:], self._plant.GetBodyByName(self._chain.tip)]
+        steps = (self._between(*pair).translation() for pair in pairwise(bodies))
+        return max(sum(float(np.linalg.norm(step)) for step in steps), 1e-3)
+
+    def _largest_inertia(self, payload: float, tip: RigidBody) -> np.ndarray:
+        """The largest inertia that each joint moves, the payload a point at the tool, (6,) in kg m^2."""
+        plant, context = self._plant, self._plant.CreateDefaultContext()
+        columns = [joint.velocity_start() for joint in self._joints]
+        rng, largest = np.random.default_rng(0), np.zeros(NUM_AXES)
+        for q in rng.uniform(-np.pi, np.pi, (_SAMPLES, NUM_AXES)):
+            plant.SetPositions(context, q)
+            arm = np.diag(plant.CalcMassMatrix(context))[columns]
+            largest = np.maximum(largest, arm + payload * self._lever(context, tip)[columns] ** 2)
+        return largest
+
+    def _lever(self, context: Context, tip: RigidBody) -> np.ndarray:
+        """How far the tool moves in m for each radian of a joint."""
+        world = self._plant.world_frame()
+        J = self._plant.CalcJacobianTranslationalVelocity(
+            context, JacobianWrtVariable.kV, tip.body_frame(), np.zeros(3), world, world
+        )
+        return np.linalg.norm(J, axis=0)
+
+
+def _for_drake(text: UrdfText, chain: Chain) -> str:
+    """The same robot without shapes, and with all joints but the six fixed."""
+    root = copy.deepcopy(text.root)
+    for tag in _DROPPED:
+        for element in root.findall(tag):
+            root.remove(element)
+    held = {joint.name for joint in chain.held}
+    for tag, parts in _LEFT_OUT.items():
+        for element in root.findall(tag):
+            for part in (found for name in parts for found in element.findall(name)):
+                element.remove(part)
+            if tag == "joint" and element.get("name") in held:
+                element.set("type", "fixed")
+    return ElementTree.tostring(root, encoding="unicode")
+
+
+def _node(value: Any, label: str) -> Node:
+    """Nodes of a tree, all in one place: what was read from a URDF has no lines of its own."""
+    if isinstance(value, dict):
+        return Node({key: _node(each, label) for key, each in value.items()}, label)
+    if isinstance(value, list):
+        return Node([_node(each, label) for each in value], label)
+    return Node(value, label)

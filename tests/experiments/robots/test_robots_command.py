@@ -1,0 +1,55 @@
+"""``truetip robots``: the list, a robot file of a URDF, and what is refused."""
+
+from pathlib import Path
+
+import pytest
+
+from robots.description.model import load_robot
+from tests.experiments.commands import files, refusal, truetip
+from tests.robots.urdfs import arm, joint, link, published
+
+
+@pytest.fixture(autouse=True)
+def _wide_terminal_in_an_empty_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv("COLUMNS", "200")
+
+
+def test_without_more_the_shipped_robots_are_listed():
+    result = truetip("robots")
+    assert result.exit_code == 0
+    assert "Universal Robots UR10" in result.stdout
+
+
+def test_a_urdf_becomes_a_robot_file_and_the_assumptions_are_said(tmp_path: Path):
+    result = truetip("robots", "import", published("ur10_robot.urdf"), "--write=my.yaml")
+    assert result.exit_code == 0, result.output
+    assert "gears, motors and friction" in result.stdout
+    assert "wrist_3_joint" in result.stdout
+    assert load_robot("my.yaml").name == "ur10"
+
+
+def test_held_joints_and_lost_meshes_are_named():
+    mesh = '<visual><geometry><mesh filename="package://lost/tool.obj"/></geometry></visual>'
+    finger = link("finger", shape=mesh) + joint("slide", "l6", "finger", "prismatic")
+    Path("arm.urdf").write_text(arm(more=finger))
+    result = truetip("robots", "import", "arm.urdf")
+    assert "taken as fixed at zero: slide" in result.stdout
+    assert "1 meshes were not found, for example package://lost/tool.obj" in result.stdout
+
+
+REFUSED = {
+    "no file": (["nope.urdf"], "nope.urdf"),
+    "seven axes": (["seven.urdf"], "needs six revolute joints in a row, got 7"),
+    "no URDF": (["seven.yaml"], "is no URDF: its name must end in .urdf or .xacro"),
+    "no link": (["seven.urdf", "--tip=hand"], "--tip must be one of l0, l1"),
+    "no folder": (["seven.urdf", "--package=mine=nowhere"], "--package must be NAME=DIR"),
+    "no YAML": (["seven.urdf", "--base=l1", "--write=my.txt"], "its name must end in .yaml or .yml"),
+}
+
+
+@pytest.mark.parametrize(("arguments", "reason"), REFUSED.values(), ids=REFUSED)
+def test_what_cannot_be_imported_is_refused_in_one_line(arguments, reason, tmp_path: Path):
+    Path("seven.urdf").write_text(arm(7))
+    assert reason in refusal(truetip("robots", "import", *arguments))
+    assert files(tmp_path) == {"seven.urdf"}
