@@ -1,27 +1,45 @@
 """The Cartesian reference: where the tool shall be now, and a little later."""
 
-import math
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from functools import lru_cache
+from typing import NamedTuple
 
 import numpy as np
 from pydrake.common.value import AbstractValue, Value
 from pydrake.math import RigidTransform
 from pydrake.systems.framework import BasicVector, Context, LeafSystem
 
+from robots.pose import Rows
 from systems.reference.paths import CartesianPath, ReferenceConfig, make_path
 
-_Moment = tuple[RigidTransform, np.ndarray, np.ndarray]  # pose, twist, acceleration
+_BLOCK = 256  # ticks that are computed at once: far quicker than one by one
+_EPSILON = 1e-9  # s, by which rounding may miss a tick
+
+
+class PathMoment(NamedTuple):
+    """The path at one time, in plain floats: with so few numbers Python is quicker than numpy."""
+
+    X_WE: Rows  # the first three rows of the pose
+    V_WE: Sequence[float]  # the spatial velocity, rad/s and m/s
+    A_WE: Sequence[float]  # the spatial acceleration, rad/s^2 and m/s^2
 
 
 @dataclass(frozen=True)
 class PathAhead:
-    """The path and its timing, for a law that looks further ahead than the preview.
+    """The path and its timing, to be asked for any time.
 
     Slowing down, for whatever reason, changes the path time and never the path.
     """
 
     path: CartesianPath
+    period: float = 4e-3  # s, of whose multiples `moment` is asked mostly
+    preview: float = 0.0  # s, and of times that are so much later
+    _block: Callable[[float, int], list[PathMoment]] = field(init=False, repr=False, compare=False)
+
+    def __post_init__(self) -> None:
+        """Makes room for blocks of ticks; they are computed when they are needed first."""
+        object.__setattr__(self, "_block", lru_cache(maxsize=16)(self._computed))
 
     def path_time(self, t: float) -> float:
         """The time on the path in s that belongs to a time of the station in s, as planned now."""
@@ -38,6 +56,18 @@ class PathAhead:
         """
         return self.path.sample(t)
 
+    def moment(self, t: float) -> PathMoment:
+        """Where the tool shall be at a time of the station in s; quick at ticks and a preview after them."""
+        for phase in (0.0, self.preview):
+            tick = round((t - phase) / self.period)
+            if abs(t - phase - tick * self.period) < _EPSILON:
+                return self._block(phase, tick // _BLOCK)[tick % _BLOCK]
+        return _moments(self.path, np.array([t]))[0]
+
+    def _computed(self, phase: float, block: int) -> list[PathMoment]:
+        ticks = np.arange(block * _BLOCK, (block + 1) * _BLOCK)
+        return _moments(self.path, ticks * self.period + phase)
+
 
 class Reference(LeafSystem):
     """Plays a path against the time of the context.
@@ -47,10 +77,10 @@ class Reference(LeafSystem):
         out ``V_WE_desired``  vector 6, its spatial velocity in rad/s and m/s
         out ``A_WE_desired``  vector 6, its spatial acceleration in rad/s^2 and m/s^2
         out ``X_WE_preview``, ``V_WE_preview``, ``A_WE_preview``  the same ``preview`` seconds later
-        out ``reference``     PathAhead, for any time ahead
+        out ``reference``     PathAhead, for any time
 
     The path is at rest before it begins and after it ends. It can be asked for at any time; multiples of
-    the period are computed beforehand, all at once.
+    the period are computed beforehand, many at once.
     """
 
     def __init__(self, config: ReferenceConfig, period: float = 4e-3) -> None:
@@ -64,12 +94,10 @@ class Reference(LeafSystem):
             ValueError: if the configuration describes no path, see `systems.reference.paths.make_path`.
         """
         super().__init__()
-        self._path = make_path(config)
-        self._period = period
-        now = self._moments_from(0.0)
-        self._declare_ports("desired", now)
-        self._declare_ports("preview", self._moments_from(config.preview) if config.preview > 0.0 else now)
-        ahead = PathAhead(self._path)
+        ahead = PathAhead(make_path(config), period, config.preview)
+        self._path = ahead.path
+        self._declare_ports("desired", ahead, 0.0)
+        self._declare_ports("preview", ahead, config.preview)
         self.DeclareAbstractOutputPort(
             "reference",
             lambda: Value[object](ahead),
@@ -82,28 +110,17 @@ class Reference(LeafSystem):
         """The path that is played."""
         return self._path
 
-    def _moments_from(self, ahead: float) -> Callable[[float], _Moment]:
-        """A function from the time to the moment of the path that is ``ahead`` of it."""
-        period = self._period
-        table = _moments(self._path, np.arange(math.ceil(self._path.duration / period) + 1) * period + ahead)
-
-        def moment_at(time: float) -> _Moment:
-            tick = round(time / period)
-            if 0 <= tick < len(table) and abs(time - tick * period) < 1e-9:
-                return table[tick]
-            return _moments(self._path, np.array([time + ahead]))[0]
-
-        return moment_at
-
-    def _declare_ports(self, name: str, moment_at: Callable[[float], _Moment]) -> None:
+    def _declare_ports(self, name: str, ahead: PathAhead, later: float) -> None:
         def calc_pose(context: Context, X_WE: AbstractValue) -> None:
-            X_WE.set_value(moment_at(context.get_time())[0])
+            rows = ahead.moment(context.get_time() + later).X_WE
+            # Orthonormal by construction; checking it again would cost more than the path.
+            X_WE.set_value(RigidTransform.MakeUnchecked(np.array(rows)))
 
         def calc_velocity(context: Context, V_WE: BasicVector) -> None:
-            V_WE.set_value(moment_at(context.get_time())[1])
+            V_WE.set_value(ahead.moment(context.get_time() + later).V_WE)
 
         def calc_acceleration(context: Context, A_WE: BasicVector) -> None:
-            A_WE.set_value(moment_at(context.get_time())[2])
+            A_WE.set_value(ahead.moment(context.get_time() + later).A_WE)
 
         time = {self.time_ticket()}
         self.DeclareAbstractOutputPort(f"X_WE_{name}", lambda: Value(RigidTransform()), calc_pose, time)
@@ -111,8 +128,7 @@ class Reference(LeafSystem):
         self.DeclareVectorOutputPort(f"A_WE_{name}", 6, calc_acceleration, time)
 
 
-def _moments(path: CartesianPath, times: np.ndarray) -> list[_Moment]:
-    """Pose, twist and acceleration at each of the times."""
+def _moments(path: CartesianPath, times: np.ndarray) -> list[PathMoment]:
+    """The path at each of the times."""
     X_WE, V_WE, A_WE = path.sample(times)
-    # The rotations are orthonormal by construction; checking them again would cost more than the path.
-    return [(RigidTransform.MakeUnchecked(X[:3]), V, A) for X, V, A in zip(X_WE, V_WE, A_WE, strict=True)]
+    return list(map(PathMoment, X_WE[:, :3].tolist(), V_WE.tolist(), A_WE.tolist()))

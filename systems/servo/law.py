@@ -6,7 +6,6 @@ from typing import NamedTuple
 
 import numpy as np
 from pydrake.common.value import Value
-from pydrake.math import RigidTransform
 from pydrake.systems.framework import Context, DiscreteValues, LeafSystem
 
 from robots.description.model import NUM_JOINTS
@@ -18,16 +17,19 @@ from robots.pose import Rows, error_of_rows
 from systems.controller_model import ControllerModel
 from systems.guard.guard import GuardConfig
 from systems.reference.paths import CartesianPath
+from systems.reference.reference import PathAhead
 from systems.samples import JointSample, PoseSample
 from systems.servo.law_config import LawConfig
 
-_ENTRY = 19  # a moment of the path: time, the rows of the 3 x 4 pose matrix, the twist
 # rad in one tick: ten times what the fastest joint can do, far less than from branch to branch
 _LARGEST_STEP = 0.4
 _JOINTS_SIZE = 18  # positions, velocities, velocities of the tick before
 _NEWTON_STEP = 5e-5  # rad; what one such step leaves is its square, a few nanometres
 _DAMPED = 1e-10  # rad and m that a step leaves which was not damped
 _NO_COMMAND = np.full(NUM_JOINTS, np.nan)
+# The groups of the state, each a port but for what the law itself remembers.
+_OUTPUTS = ("position_command", "velocity_command", "correction", "measurement")
+_POSITION, _VELOCITY, _CORRECTION, _MEASUREMENT, _MEMORY = range(len(_OUTPUTS) + 1)
 
 
 class LawInput(NamedTuple):
@@ -57,8 +59,7 @@ class ServoLaw(LeafSystem):
     A law adds `step` and may add `initial_state`.
 
     Ports:
-        in  ``X_WE_desired``      RigidTransform, the wanted pose at t + preview
-        in  ``V_WE_desired``      vector 6, the wanted twist at t + preview
+        in  ``reference``         PathAhead; it is followed as it is at t + preview
         in  ``joint_sample``      JointSample
         in  ``pose_sample``       PoseSample
         in  ``deviation``         vector 6 in rad, may be left open: what the guard issues less what the law
@@ -70,7 +71,7 @@ class ServoLaw(LeafSystem):
                                   when the newest one was exposed (s)
 
     A sample is compared with the path at the instant of its exposure, so that transport delay does not
-    look like an error. For that a law remembers the path for as long as a sample may be late and is used.
+    look like an error.
 
     What a law is stands on its class, see `systems.servo.contract.LawTraits`. What it works with:
         ``kinematics``  of the robot as the controller knows it, compliant if that knows its compliances
@@ -113,26 +114,16 @@ class ServoLaw(LeafSystem):
         self.angle_limit = math.radians(config.correction_limit_deg)
         self._guard, self._preview = guard, preview
         self._smallest_trace = 1.0 + 2.0 * math.cos(math.radians(guard.largest_deviation_deg))
-        self._X_WD = self.DeclareAbstractInputPort("X_WE_desired", Value(RigidTransform()))
-        self._V_WD = self.DeclareVectorInputPort("V_WE_desired", 6)
+        self._oldest = model.camera_delay + guard.hold_after + 2.0 * period  # s, of what is compared
+        self._reference = self.DeclareAbstractInputPort("reference", Value[object]())
         self._joints = self.DeclareAbstractInputPort("joint_sample", Value(JointSample()))
         self._camera = self.DeclareAbstractInputPort("pose_sample", Value(PoseSample()))
         self._deviation = self.DeclareVectorInputPort("deviation", NUM_JOINTS)
-        self._outputs = [
-            self.DeclareDiscreteState(_NO_COMMAND),
-            self.DeclareDiscreteState(_NO_COMMAND),
-            self.DeclareDiscreteState(np.zeros(6)),
-            self.DeclareDiscreteState(np.array([-np.inf, 0.0, -np.inf])),
-        ]
-        memory_span = model.camera_delay + guard.hold_after  # the oldest exposure that is compared
-        self.DeclareDiscreteState(
-            np.full((int(np.ceil((memory_span + preview) / period)) + 2) * _ENTRY, np.nan)
-        )
-        self._memory = self.DeclareDiscreteState(self.memory_size)
-        for name, state in zip(
-            ("position_command", "velocity_command", "correction", "measurement"), self._outputs, strict=True
-        ):
-            self.DeclareStateOutputPort(name, state)
+        none = np.array([-np.inf, 0.0, -np.inf])
+        for name, value in zip(_OUTPUTS, (_NO_COMMAND, _NO_COMMAND, np.zeros(6), none), strict=True):
+            self.DeclareStateOutputPort(name, self.DeclareDiscreteState(value))
+        # Not a number until the first tick.
+        self._memory = self.DeclareDiscreteState(np.full(self.memory_size, np.nan))
         self.DeclarePeriodicDiscreteUpdateEvent(period, 0.0, self._tick)
 
     def check_path(self, path: CartesianPath) -> None:
@@ -148,22 +139,18 @@ class ServoLaw(LeafSystem):
 
     def _tick(self, context: Context, discrete_state: DiscreteValues) -> None:
         time = context.get_time()
-        X_WD = self._X_WD.Eval(context).GetAsMatrix34()
-        V_WD = self._V_WD.Eval(context)
+        ahead: PathAhead = self._reference.Eval(context)
         joints: JointSample = self._joints.Eval(context)
         sample: PoseSample = self._camera.Eval(context)
-        last_used, refused, newest = context.get_discrete_state(self._outputs[3]).value().tolist()
-
-        path = discrete_state.get_mutable_value(4).reshape(-1, _ENTRY)
-        tick = round(time / self.period)
-        entry = path[tick % len(path)]
-        entry[0], entry[1:13], entry[13:] = time + self._preview, X_WD.ravel(), V_WD
-
+        state = context.get_discrete_state()
+        last_used, refused, newest = state.value(_MEASUREMENT).tolist()
         measured = None
         arrived = sample.valid and sample.time > newest
         # A sample serves until the next one arrives, but not for ever. How late it came does not matter.
         if arrived or (sample.valid and time - last_used <= self._guard.hold_after + 1e-9):
-            measured = self.pose_error_at_exposure(path, tick, sample, self.guard_offset(context))
+            if time - sample.time <= self._oldest:
+                wanted = ahead.moment(sample.time).X_WE
+                measured = self.pose_error_at_exposure(wanted, sample, self.guard_offset(context))
             if arrived:
                 newest = sample.time
                 if measured is None:
@@ -171,22 +158,21 @@ class ServoLaw(LeafSystem):
                 else:
                     last_used = time
 
-        moment = LawInput(X_WD.tolist(), V_WD.tolist(), joints.position, measured)
-        first_tick = math.isnan(path[(tick - 1) % len(path), 0])
-        memory = (
-            self.initial_state(moment) if first_tick else context.get_discrete_state(self._memory).value()
-        )
+        wanted = ahead.moment(time + self._preview)
+        moment = LawInput(wanted.X_WE, wanted.V_WE, joints.position, measured)
+        memory = state.value(_MEMORY)
+        if self.memory_size and math.isnan(memory[0]):
+            memory = self.initial_state(moment)
         try:
             step = self.step(moment, memory)
         except (UnreachableError, JointLimitError):
             # No command is an answer too: the guard holds the robot and counts it.
-            correction = context.get_discrete_state(self._outputs[2]).value()
-            step = LawOutput(_NO_COMMAND, _NO_COMMAND, correction, memory)
-        discrete_state.set_value(0, step.position)
-        discrete_state.set_value(1, step.velocity)
-        discrete_state.set_value(2, step.correction)
-        discrete_state.set_value(3, np.array([last_used, refused, newest]))
-        discrete_state.set_value(5, step.memory)
+            step = LawOutput(_NO_COMMAND, _NO_COMMAND, state.value(_CORRECTION), memory)
+        discrete_state.set_value(_POSITION, step.position)
+        discrete_state.set_value(_VELOCITY, step.velocity)
+        discrete_state.set_value(_CORRECTION, step.correction)
+        discrete_state.set_value(_MEASUREMENT, np.array((last_used, refused, newest)))
+        discrete_state.set_value(_MEMORY, step.memory)
 
     def joints_at(self, X_WE: Rows, V_WE: Sequence[float], last: np.ndarray) -> np.ndarray:
         """The joints for a pose and a twist, next to those of the last tick.
@@ -242,7 +228,7 @@ class ServoLaw(LeafSystem):
         deviation = self._deviation.Eval(context)
         if not any(deviation.tolist()):
             return None
-        commanded = context.get_discrete_state(self._outputs[0]).value()
+        commanded = context.get_discrete_state().value(_POSITION)
         if math.isnan(commanded[0]):
             return None
         # A law that commands speeds does so from where the joints are, any other from where they shall be.
@@ -251,46 +237,29 @@ class ServoLaw(LeafSystem):
         return forward(led)[:3], forward(led - deviation)[:3]
 
     def pose_error_at_exposure(
-        self,
-        path: np.ndarray,
-        tick: int,
-        sample: PoseSample,
-        offset: tuple[np.ndarray, np.ndarray] | None,
+        self, wanted: Rows, sample: PoseSample, offset: tuple[np.ndarray, np.ndarray] | None
     ) -> tuple[Rows, Rows] | None:
         """The pose that was wanted when a sample was exposed, and the pose that was seen.
 
         Args:
-            path: the remembered moments, a ring of rows.
-            tick: the number of the newest one.
+            wanted: where the path was at the exposure.
             sample: a valid sample.
             offset: what `guard_offset` says of the robot; it is taken to be so at the exposure already.
 
         Returns:
-            None if the sample is too old to compare or too far from the path to be true.
+            None if the sample is too far from the path to be true.
         """
-        ago = max(0, round(tick + (self._preview - sample.time) / self.period))
-        if ago >= len(path):
-            return None
-        entry = path[(tick - ago) % len(path)]
-        if math.isnan(entry[0]):
-            # Before the first tick the path was where it was then: it starts at rest.
-            entry = path[np.nanargmin(path[:, 0])]
-        wanted = entry[1:13].reshape(3, 4)
-        passed = sample.time - float(entry[0])
-        if abs(passed) > 1e-6:
-            wanted = integrate_twist(wanted, passed * entry[13:])
         if offset is not None:
-            wanted = _shifted_by_guard(wanted, *offset)
-        wanted_rows: Rows = wanted.tolist()
+            wanted = _shifted_by_guard(np.array(wanted), *offset).tolist()
         seen: Rows = sample.X_WE.GetAsMatrix34().tolist()
-        (a0, a1, a2, ax), (b0, b1, b2, bx), (c0, c1, c2, cx) = wanted_rows
+        (a0, a1, a2, ax), (b0, b1, b2, bx), (c0, c1, c2, cx) = wanted
         (d0, d1, d2, dx), (e0, e1, e2, ex), (f0, f1, f2, fx) = seen
         gap_squared = (ax - dx) ** 2 + (bx - ex) ** 2 + (cx - fx) ** 2
         # The trace of the rotation between them is the product of all their entries.
         trace = a0 * d0 + a1 * d1 + a2 * d2 + b0 * e0 + b1 * e1 + b2 * e2 + c0 * f0 + c1 * f1 + c2 * f2
         if gap_squared > self._guard.largest_deviation**2 or trace < self._smallest_trace:
             return None
-        return wanted_rows, seen
+        return wanted, seen
 
 
 def _shifted_by_guard(X: np.ndarray, led: np.ndarray, wished: np.ndarray) -> np.ndarray:

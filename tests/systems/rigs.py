@@ -1,6 +1,7 @@
 """What tests of systems share: signals as functions of time, cameras, hand-cranked laws and guards."""
 
 from collections.abc import Callable
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -16,6 +17,7 @@ from robots.kinematics.forward import Kinematics
 from systems.cell.pose_camera import BLOCK, ExposureConfig
 from systems.controller_model import ControllerModel
 from systems.guard.guard import KINDS, CommandGuard, GuardConfig
+from systems.reference.reference import PathMoment
 from systems.samples import JointSample, PoseSample
 from systems.servo import LAWS, LawConfig
 
@@ -133,6 +135,17 @@ class GuardRig:
         return issued, speed, dict(zip(KINDS, counts.astype(int).tolist(), strict=True))
 
 
+@dataclass(frozen=True)
+class _Wanted:
+    """What a law asks of a `PathAhead`, from a function of time."""
+
+    path: Callable[[float], tuple[np.ndarray, np.ndarray]]
+
+    def moment(self, t: float) -> PathMoment:
+        X_WD, V_WD = self.path(t)
+        return PathMoment(X_WD[:3].tolist(), V_WD.tolist(), [0.0] * 6)
+
+
 class LawRig:
     """A law on a perfect robot: what it commands at a tick is where the joints are at the next.
 
@@ -155,8 +168,9 @@ class LawRig:
         config = LAWS[law].Config(**vars(config or LawConfig()))
         self.law = LAWS[law](model, config, GuardConfig())
         self.context = self.law.CreateDefaultContext()
+        self.law.GetInputPort("reference").FixValue(self.context, Value[object](_Wanted(path)))
         self.true = Kinematics(true or nominal)
-        self.path, self.preview, self.delay = path, preview, delay
+        self.delay = delay
         self.q = q
         self.tips: list[np.ndarray] = []  # X_WE at the ticks so far
         self.ticks, self.running = 0, True
@@ -174,10 +188,7 @@ class LawRig:
             sample = PoseSample()
             if exposed >= 0:
                 sample = PoseSample(exposed * PERIOD, pose(self.tips[exposed]), True)
-        X_WD, V_WD = self.path(time + self.preview)
         self.context.SetTime(time)
-        self.law.GetInputPort("X_WE_desired").FixValue(self.context, Value(pose(X_WD)))
-        self.law.GetInputPort("V_WE_desired").FixValue(self.context, V_WD)
         joints = JointSample(time, self.q, np.zeros(6), np.zeros(6), True)
         self.law.GetInputPort("joint_sample").FixValue(self.context, Value(joints))
         self.law.GetInputPort("pose_sample").FixValue(self.context, Value(sample))

@@ -67,20 +67,29 @@ def test_the_rotations_are_rotations():
         assert np.linalg.det(R_WE.matrix()) > 0.0
 
 
-def test_ticks_are_computed_beforehand_and_other_times_when_they_are_asked_for(monkeypatch):
+def test_ticks_are_computed_many_at_once_and_other_times_when_they_are_asked_for(monkeypatch):
     asked = []
     sample = CartesianPath.sample
     monkeypatch.setattr(CartesianPath, "sample", lambda path, time: asked.append(time) or sample(path, time))
-    reference, root, context = in_diagram(ReferenceConfig(preview=0.1))
-    asked.clear()
-    for tick in (0, 1, 700):
+    reference, root, context = in_diagram(ReferenceConfig(preview=0.1013))
+    for tick in range(700):
         root.SetTime(0.004 * tick)
         outputs(reference, context, "desired")
         outputs(reference, context, "preview")
-    assert asked == []
+    assert sum(map(len, asked)) < 2 * 1000
+    assert min(map(len, asked)) > 100
+    asked.clear()
     root.SetTime(0.0051)
-    outputs(reference, context, "preview")
-    assert {float(time[0]) for time in asked} == {0.1051}
+    outputs(reference, context, "desired")
+    assert [time.tolist() for time in asked] == [[0.0051]] * 3  # once a port
+
+
+@pytest.mark.parametrize("time", [-0.3, 0.0, 0.004, 2.0001, 1.0243, 3.0 + 1.7e-3, 1e5])
+def test_what_is_asked_at_one_time_is_the_path(time):
+    reference, _, context = in_diagram(ReferenceConfig(preview=1.7e-3))
+    moment = reference.GetOutputPort("reference").Eval(context).moment(time)
+    for actual, expected in zip(moment, reference.path.sample(time), strict=True):
+        np.testing.assert_allclose(actual, expected[:3] if expected.ndim == 2 else expected, atol=1e-14)
 
 
 def test_refuses_a_path_that_does_not_exist():
