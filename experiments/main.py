@@ -47,6 +47,7 @@ from experiments.cli.tables import print_summary
 from experiments.cli.workers import usable_cores
 from experiments.comparison.compare import compare, compared_laws, named_laws, simulating
 from experiments.comparison.results import RESULTS, write_results
+from experiments.compensate.command import compensate_command
 from experiments.diagram.view import write_diagram
 from experiments.drivetrain.command import drivetrain_command
 from experiments.feedforward.command import feedforward_command
@@ -257,6 +258,7 @@ app.add_typer(cameras_app, name="cameras")
 app.command("feedforward")(feedforward_command)
 app.command("design")(design_command)
 app.command("calibrate")(calibrate_command)
+app.command("compensate")(compensate_command)
 app.command("drivetrain")(drivetrain_command)
 app.command("robustness")(robustness_command)
 app.command("frame")(frame_command)

@@ -1,0 +1,1 @@
+"""Robot programs for the robot as it is: ``truetip compensate``."""

@@ -1,0 +1,147 @@
+"""Tables of poses or joint positions as programs: only the fields of numbers are ever replaced.
+
+The first line that is not a comment names the columns: ``x_mm``, ``y_mm``, ``z_mm`` (or ``_m``) with ``qw``,
+``qx``, ``qy``, ``qz`` or the ZYX Euler angles ``alpha_deg``, ``beta_deg``, ``gamma_deg`` (or ``_rad``), of
+the tool of the robot file in the world; or ``q1_deg`` ... ``q6_deg`` (or ``_rad``). ``payload_kg`` and
+``name`` if there are such. Fields are separated by ``;`` (then decimal commas are read too), by ``,`` or by
+tabulators.
+"""
+
+import re
+from collections.abc import Mapping
+
+from robots.programs.program import (
+    DEGREE,
+    JOINTS,
+    MILLIMETRE,
+    Literal,
+    Note,
+    Program,
+    ProgramContext,
+    ProgramError,
+    Source,
+    Target,
+)
+
+_UNITS = {"mm": MILLIMETRE, "m": 1.0, "deg": DEGREE, "rad": 1.0, "": 1.0}
+_POSITION, _QUATERNION, _EULER = ("x", "y", "z"), ("qw", "qx", "qy", "qz"), ("alpha", "beta", "gamma")
+_NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?")
+_COMMA = re.compile(r"[+-]?(\d+,\d*|,\d+)([eE][+-]?\d+)?")
+
+
+def read_pose_table(source: Source, context: ProgramContext) -> Program:
+    """Reads a table.
+
+    Raises:
+        ProgramError: if columns are missing, twice there, or of both kinds, or if no row is one of numbers.
+    """
+    if context.others or context.tool or context.base:
+        raise ProgramError(f"{source.name}: a table knows the tool of the robot file only, and the world")
+    header: dict[str, int] = {}
+    separator, targets, notes = ",", [], []
+    for match in re.finditer(r"[^\r\n]+", source.text):
+        line, text = source.line(match.start()), match.group()
+        if not text.strip() or text.lstrip("\ufeff\xef\xbb\xbf ").startswith("#"):
+            continue
+        if not header:
+            separator = next((each for each in ";,\t" if each in text), ",")
+            header = _header(source, line, text.lstrip("\xef\xbb\xbf"), separator)
+            continue
+        target = _row(line, _fields(text, match.start(), separator), header, separator)
+        if isinstance(target, Note):
+            notes.append(target)
+        else:
+            targets.append(target)
+    if not targets:
+        raise ProgramError(f"{source.name}: no row of numbers; {notes[0].text if notes else 'it is empty'}")
+    return Program(source.name, source.text, tuple(targets), tuple(notes))
+
+
+def _header(source: Source, line: int, text: str, separator: str) -> dict[str, int]:
+    """Places of the columns by their names."""
+    names = [field.strip().strip('"').strip() for field in text.split(separator)]
+    where = source.where(line)
+    twice = {name for name in names if name and names.count(name) > 1}
+    if twice:
+        raise ProgramError(f"{where}: column {min(twice)} is there twice")
+    columns = {name: number for number, name in enumerate(names)}
+    has_pose, has_joints = (any(_column(columns, role) for role in roles) for roles in (_POSITION, JOINTS))
+    if has_pose and has_joints:
+        raise ProgramError(
+            f"{where}: the table has poses and joint positions; which of them is to be corrected?"
+        )
+    roles = _needed(columns)
+    missing = [role for role in roles if _column(columns, role) is None]
+    if missing:
+        raise ProgramError(
+            f"{where}: column {missing[0]} is missing (with its unit); there are {', '.join(names)}"
+        )
+    return columns
+
+
+def _needed(columns: Mapping[str, int]) -> tuple[str, ...]:
+    if _column(columns, JOINTS[0]):
+        return JOINTS
+    return _POSITION + (_QUATERNION if "qw" in columns else _EULER)
+
+
+def _column(columns: Mapping[str, int], role: str) -> tuple[int, float] | None:
+    """Place and unit of a column; None if there is none."""
+    units = ("",) if role in _QUATERNION else ("mm", "m") if role in _POSITION else ("deg", "rad")
+    for unit in units:
+        name = f"{role}_{unit}" if unit else role
+        if name in columns:
+            return columns[name], _UNITS[unit]
+    return None
+
+
+def _row(
+    line: int, fields: list[tuple[int, str]], columns: Mapping[str, int], separator: str
+) -> Target | Note:
+    numbers = {}
+    for role in _needed(columns):
+        column = _column(columns, role)
+        assert column is not None
+        place, unit = column
+        literal = _literal(*fields[place], unit, separator) if place < len(fields) else None
+        if literal is None:
+            text = fields[place][1] if place < len(fields) else ""
+            return Note(line, f"{role} is not a number: '{text.strip()}', row left alone")
+        numbers[role] = literal
+    if "qw" in numbers and not any(numbers[role].value for role in _QUATERNION):
+        return Note(line, "the quaternion is zero, row left alone")
+    payloads: tuple[float, ...] = ()
+    if "payload_kg" in columns:
+        place = columns["payload_kg"]
+        payload = _literal(*fields[place], 1.0, separator) if place < len(fields) else None
+        if payload is None:
+            return Note(line, "payload_kg is not a number, row left alone")
+        payloads = (payload.value,)
+    name = fields[columns["name"]][1].strip().strip('"') if "name" in columns else ""
+    return Target(name, line, numbers, payloads=payloads)
+
+
+def _literal(start: int, text: str, unit: float, separator: str) -> Literal | None:
+    """The number in a field that begins at a character; None if there is none."""
+    inner = text.strip().strip('"').strip()
+    start += text.index(inner)
+    if _NUMBER.fullmatch(inner):
+        return Literal(start, start + len(inner), float(inner), unit)
+    if separator != "," and _COMMA.fullmatch(inner):
+        value = float(inner.replace(",", "."))
+        return Literal(start, start + len(inner), value, unit, has_comma=True)
+    return None
+
+
+def _fields(text: str, start: int, separator: str) -> list[tuple[int, str]]:
+    """Fields of a line with the character at which each begins; quotes hold separators."""
+    pattern = re.compile(rf'\s*"(?:[^"]|"")*"\s*|[^{re.escape(separator)}]*')
+    fields, at = [], 0
+    while True:
+        match = pattern.match(text, at)
+        assert match is not None
+        fields.append((start + at, match.group()))
+        at = match.end()
+        if at >= len(text):
+            return fields
+        at += len(separator)

@@ -1,0 +1,351 @@
+"""Programs of ABB controllers: modules in RAPID with ``robtarget`` and ``jointtarget``.
+
+The tool, the work object and the loads of a target are those of the instructions that move to it, grippers
+(``GripLoad``) in the order of the text. What is an expression in place of numbers is left alone and named.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+from itertools import pairwise
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from robots.programs.program import (
+    DEGREE,
+    JOINTS,
+    MILLIMETRE,
+    WORLD,
+    Frame,
+    Literal,
+    Note,
+    Program,
+    ProgramContext,
+    ProgramError,
+    Source,
+    Target,
+    homogeneous,
+)
+from robots.programs.rapid_text import (
+    KEYWORDS,
+    Other,
+    Token,
+    Tree,
+    aggregate,
+    has_shape,
+    literals,
+    split,
+    statements,
+)
+
+_POSE_ROLES = ("x", "y", "z", "qw", "qx", "qy", "qz", "cf1", "cf4", "cf6", "cfx")
+_POSE_UNITS = (*(MILLIMETRE,) * 3, *(1.0,) * 8)
+# Which argument of an instruction is the tool, where its name is not declared; the others are found by name.
+_TOOL_PLACE = {
+    **dict.fromkeys(("movej", "movel", "moveabsj", "moveldo", "movejdo", "movelsync", "movejsync"), 3),
+    **dict.fromkeys(("movec", "movecdo", "movecsync", "triggl", "triggj", "searchl"), 4),
+    **dict.fromkeys(("triggc", "searchc", "arcl", "arclstart", "arclend"), 5),
+}
+_SHIFTED = {"offs", "reltool"}  # functions that give a target beside another
+_DISPLACING = {"pdispon", "pdispset", "eoffson", "eoffsset"}
+_KINDS = ("robtarget", "jointtarget", "tooldata", "wobjdata", "loaddata")
+_TOOL0 = Frame("tool0", np.eye(4))
+
+
+@dataclass
+class _Declared:
+    """A value of one of `_KINDS` with a name."""
+
+    kind: str
+    name: str
+    tree: Tree
+    source: Source
+    line: int
+
+
+@dataclass(frozen=True)
+class _Use:
+    """One instruction that moves to a target."""
+
+    line: str
+    tool: Frame | None
+    base: Frame
+    payload: float
+
+
+@dataclass
+class _Place:
+    """A target on its way to become one."""
+
+    name: str
+    line: int
+    numbers: dict[str, Literal]
+    uses: list[_Use] = field(default_factory=list)
+
+
+def read_rapid(source: Source, context: ProgramContext) -> Program:
+    """Reads a module.
+
+    Raises:
+        ProgramError: if a tool, work object or load is not declared or cannot be read, or if one target is
+            moved to with several of them.
+    """
+    return _Reader(source, context).program()
+
+
+class _Reader:
+    """One module with what others declare."""
+
+    def __init__(self, source: Source, context: ProgramContext) -> None:
+        self._source, self._context = source, context
+        self._notes: list[Note] = []
+        self._declared: dict[str, _Declared] = {}
+        self._places: dict[str, list[_Place]] = {}  # by the small letters of the name
+        self._inline: list[_Place] = []
+        self._gripped = 0.0
+        self._parsed = [(each, list(statements(each))) for each in (source, *context.others)]
+
+    def program(self) -> Program:
+        """The targets with their frames."""
+        for source, found in reversed(self._parsed):  # the module itself last: its own names count
+            for statement in found:
+                self._declare(source, statement)
+        for declared in list(self._declared.values()):
+            if declared.kind in _KINDS[:2] and declared.source is self._source:
+                places = self._places_of(declared.name, declared.line, declared.tree)
+                if places:
+                    self._places[declared.name.lower()] = places
+        for source, found in self._parsed:
+            self._gripped = 0.0
+            for statement in found:
+                self._follow(source, statement)
+        places = [place for group in self._places.values() for place in group] + self._inline
+        places.sort(key=lambda place: min(each.start for each in place.numbers.values()))
+        targets = [target for target in map(self._target, places) if target is not None]
+        notes = sorted(set(self._notes), key=lambda note: note.line)
+        return Program(self._source.name, self._source.text, tuple(targets), tuple(notes))
+
+    def _note(self, source: Source, line: int, text: str) -> None:
+        if source is self._source:
+            self._notes.append(Note(line, text))
+
+    # Declarations
+
+    def _declare(self, source: Source, statement: Sequence[Token]) -> None:
+        for at, token in enumerate(statement):
+            if token.word in ("const", "pers", "var") and len(statement) > at + 2:
+                kind, name = statement[at + 1].word, statement[at + 2]
+                parts = split(statement[at + 3 :], ":=")
+                if kind in _KINDS and len(parts) == 2:
+                    line = source.line(name.start)
+                    value = _Declared(kind, name.text, aggregate(parts[1][1]), source, line)
+                    self._declared[name.word] = value
+                return
+
+    def _places_of(self, name: str, line: int, tree: Tree) -> list[_Place]:
+        """The targets in the value of a declaration, of an array more than one."""
+        numbers = _target_numbers(tree)
+        if numbers:
+            return [_Place(name, line, numbers)]
+        if isinstance(tree, list) and tree and not has_shape(tree, *map(_length, tree)):
+            return [
+                place
+                for number, part in enumerate(tree, 1)
+                for place in self._places_of(f"{name}{{{number}}}", line, part)
+            ]
+        self._note(self._source, line, f"{name} has expressions in place of numbers, left alone")
+        return []
+
+    def _frame(self, name: str, where: str) -> Frame:
+        """A declared tool in the flange, or a work object in the world."""
+        if name.lower() in ("tool0", "wobj0"):
+            return _TOOL0 if name.lower() == "tool0" else WORLD
+        declared = self._declared.get(name.lower())
+        if declared is None:
+            raise ProgramError(f"{where}: {name} is not declared; --with FILE reads further modules")
+        tree, at = declared.tree, declared.source.where(declared.line)
+        is_tool = declared.kind == "tooldata"
+        frames = []
+        if isinstance(tree, list) and len(tree) == (3 if is_tool else 5):
+            frames = [literals(part, 3, 4) for part in (tree[1:2] if is_tool else tree[3:])]
+        if not isinstance(tree, list) or not frames or None in frames:
+            raise ProgramError(f"{at}: {name} must be given in numbers, it holds expressions")
+        if _flag(tree[0]) is not is_tool:
+            raise ProgramError(f"{at}: {name} is of a tool that stands still, which cannot be compensated")
+        if not is_tool and not _flag(tree[1]):
+            raise ProgramError(f"{at}: {name} is moved by a mechanical unit, which cannot be compensated")
+        X = np.eye(4)
+        for rows in filter(None, frames):
+            X = X @ _pose(rows)
+        return Frame(name, X)
+
+    def _mass(self, name: str, where: str) -> float:
+        """Of a load, or of a tool, in kg."""
+        if name.lower() in ("tool0", "load0"):
+            return 0.0
+        declared = self._declared.get(name.lower())
+        tree = declared.tree if declared else None
+        load = tree[2] if isinstance(tree, list) and len(tree) == 3 else tree
+        mass = load[0] if isinstance(load, list) and load else None
+        if not isinstance(mass, Literal):
+            raise ProgramError(
+                f"{where}: the mass of {name} is not declared in numbers; --with FILE reads it"
+            )
+        return mass.value
+
+    # Instructions
+
+    def _follow(self, source: Source, statement: Sequence[Token]) -> None:
+        """Takes from a statement where it moves, and with what."""
+        if any(token.word in ("const", "pers", "var") for token in statement):
+            return
+        statement = _without_heading(statement)
+        for at, (token, after) in enumerate(pairwise(statement)):
+            if token.kind != "name" or token.word in KEYWORDS or (at and statement[at - 1].word == "if"):
+                continue
+            if after.text in (":=", ".", "{"):
+                parts = split(statement[at:], ":=")
+                if len(parts) == 2:
+                    self._assigned(source, token)
+                    return
+            is_argument = after.text in ("[", "\\") or after.kind in ("name", "string", "number")
+            if is_argument and after.word not in KEYWORDS:
+                self._instruction(source, token, statement[at + 1 :])
+                return
+
+    def _assigned(self, source: Source, name: Token) -> None:
+        for place in self._places.pop(name.word, []):
+            text = f"{place.name} is given another value by the program, left alone"
+            self._note(self._source, place.line, text)
+
+    def _instruction(self, source: Source, name: Token, arguments: Sequence[Token]) -> None:
+        line = source.line(name.start)
+        where = source.where(line)
+        positional, options = [], {}
+        for sign, part in split(arguments, ",", "\\"):
+            if sign == "\\" and part:
+                options[part[0].word] = part[2:]
+            elif part:
+                positional.append(part)
+        if name.word == "gripload" and positional:
+            self._gripped = self._mass(positional[0][0].text, where)
+        if name.word in _DISPLACING:
+            self._note(source, line, f"{name.text} displaces what follows, which is not taken into account")
+        places = [place for part in positional for place in self._moved_to(source, line, name.word, part)]
+        if not places:
+            return
+        tool = self._tool_of(name.word, positional, where)
+        base, payload = WORLD, self._gripped
+        if options.get("wobj"):
+            base = self._frame(options["wobj"][0].text, where)
+        if options.get("tload"):
+            payload = self._mass(options["tload"][0].text, where)
+        elif tool is not None:
+            payload += self._mass(tool.name, where)
+        for place in places:
+            place.uses.append(_Use(where, tool, base, payload))
+
+    def _tool_of(self, name: str, positional: Sequence[Sequence[Token]], where: str) -> Frame | None:
+        for part in positional:
+            declared = self._declared.get(part[0].word)
+            if len(part) == 1 and (part[0].word == "tool0" or (declared and declared.kind == "tooldata")):
+                return self._frame(part[0].text, where)
+        place = _TOOL_PLACE.get(name)
+        if place is not None and place < len(positional):
+            return self._frame(" ".join(token.text for token in positional[place]), where)
+        return None
+
+    def _moved_to(self, source: Source, line: int, name: str, part: Sequence[Token]) -> list[_Place]:
+        """The targets that an argument names or holds."""
+        first = part[0]
+        if first.kind == "name" and (len(part) == 1 or part[1].text == "{"):
+            return self._places.get(first.word, [])
+        if first.word in _SHIFTED and len(part) > 2:
+            beside = self._places.get(part[2].word, [])
+            if beside:
+                text = f"{first.text} of {beside[0].name}: shifted with it, not corrected by itself"
+                self._note(source, line, text)
+            return beside
+        if first.text == "[":
+            tree = aggregate(part)
+            if has_shape(tree, 3, 4, 4, 6) or has_shape(tree, 6, 6):
+                numbers = _target_numbers(tree)
+                if numbers is None:
+                    self._note(source, line, f"the target of {name} has expressions, left alone")
+                elif source is self._source:
+                    self._inline.append(_Place("", line, numbers))
+                    return self._inline[-1:]
+        return []
+
+    # Targets
+
+    def _target(self, place: _Place) -> Target | None:
+        """The target with its frames; None where nothing says its tool."""
+        where = self._source.where(place.line)
+        uses = [use for use in place.uses if use.tool is not None]
+        if not uses and not self._context.tool:
+            text = f"{place.name} is not moved to with a tool that is named; --tool NAME says it, left alone"
+            self._note(self._source, place.line, text)
+            return None
+        if not uses:
+            tool = self._frame(self._context.tool, "--tool")
+            base = self._frame(self._context.base, "--base") if self._context.base else WORLD
+            uses = [_Use(where, tool, base, self._mass(tool.name, where))]
+        first = uses[0]
+        for use in uses[1:]:
+            for a, b in ((use.tool, first.tool), (use.base, first.base)):
+                assert a is not None
+                assert b is not None
+                if not np.allclose(a.X, b.X, rtol=0.0, atol=1e-12):
+                    raise ProgramError(
+                        f"{use.line}: {place.name or 'the target'} is moved to with {a.name}, and with "
+                        f"{b.name} in {first.line}: no single place is right for both"
+                    )
+        payloads = tuple(sorted({use.payload for use in uses}))
+        return Target(place.name, place.line, place.numbers, first.tool, first.base, payloads)
+
+
+def _target_numbers(tree: Tree) -> dict[str, Literal] | None:
+    """The literals of a robtarget or jointtarget by their roles; external axes may be anything."""
+    if has_shape(tree, 3, 4, 4, 6):
+        assert isinstance(tree, list)
+        rows = literals(tree[:3], 3, 4, 4)
+        if rows is None or not any(each.value for each in rows[1]):
+            return None
+        flat = [literal for row in rows for literal in row]
+        units = zip(_POSE_ROLES, flat, _POSE_UNITS, strict=True)
+        return {role: replace(literal, unit=unit) for role, literal, unit in units}
+    if has_shape(tree, 6, 6):
+        assert isinstance(tree, list)
+        rows = literals(tree[:1], 6)
+        if rows is None:
+            return None
+        return {role: replace(each, unit=DEGREE) for role, each in zip(JOINTS, rows[0], strict=True)}
+    return None
+
+
+def _without_heading(statement: Sequence[Token]) -> Sequence[Token]:
+    """What follows the name and the parameters of a routine, where the statement begins with one."""
+    for at, token in enumerate(statement):
+        if token.word in ("proc", "func", "trap", "module"):
+            depth = 0
+            for end in range(at + 1, len(statement)):
+                depth += (statement[end].text == "(") - (statement[end].text == ")")
+                following = statement[end + 1].text if end + 1 < len(statement) else ""
+                if depth == 0 and following != "(" and (statement[end].text == ")" or token.word != "func"):
+                    return _without_heading(statement[end + 1 :])
+    return statement
+
+
+def _length(tree: Tree) -> int:
+    return len(tree) if isinstance(tree, list) else -1
+
+
+def _flag(tree: Tree) -> bool:
+    return isinstance(tree, Other) and tree.text.lower() == "true"
+
+
+def _pose(rows: list[list[Literal]]) -> np.ndarray:
+    position, quaternion = ([each.value for each in row] for row in rows)
+    R = Rotation.from_quat(quaternion, scalar_first=True).as_matrix()
+    return homogeneous([MILLIMETRE * each for each in position], R)

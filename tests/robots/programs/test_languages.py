@@ -1,0 +1,169 @@
+"""What RAPID and KRL say of tools, frames, loads and configurations, and what is left alone and named."""
+
+import numpy as np
+import pytest
+
+from robots.programs.program import Program, ProgramContext, ProgramError, Source
+from robots.programs.read import parse_program
+
+EXTERNAL = "[9E9,9E9,9E9,9E9,9E9,9E9]"
+
+
+def rapid(*lines: str, others: tuple[str, ...] = (), tool: str = "") -> Program:
+    context = ProgramContext(tuple(Source("other.mod", text) for text in others), tool)
+    return parse_program(Source("m.mod", "\n".join(["MODULE m", *lines, "ENDMODULE"])), context)
+
+
+def robtarget(name: str, x: str = "600") -> str:
+    return f"CONST robtarget {name}:=[[{x},0,500],[0,0,1,0],[0,-1,0,1],{EXTERNAL}];"
+
+
+def krl(*lines: str, suffix: str = "src", others: tuple[str, ...] = ()) -> Program:
+    context = ProgramContext(tuple(Source("config.dat", text) for text in others))
+    return parse_program(Source(f"m.{suffix}", "\n".join(lines)), context)
+
+
+GRIPPER = "PERS tooldata grip:=[TRUE,[[0,0,150],[1,0,0,0]],[2.5,[0,0,60],[1,0,0,0],0,0,0]];"
+TABLE = 'PERS wobjdata table:=[FALSE,TRUE,"",[[100,0,0],[0,0,0,1]],[[0,20,0],[1,0,0,0]]];'
+PART = "PERS loaddata part:=[1.5,[0,0,80],[1,0,0,0],0,0,0];"
+
+
+def test_a_target_has_tool_work_object_and_load_of_its_move():
+    program = rapid(
+        GRIPPER, TABLE, PART, robtarget("p1"), robtarget("p2"),
+        "PROC main() MoveL\\Conc, p1, v100\\V:=50, z10, grip\\WObj:=table;",
+        "GripLoad part; MoveC p2, p1, v100, fine, grip\\WObj:=table; ENDPROC",
+    )  # fmt: skip
+    first, second = program.targets
+    assert first.tool is not None
+    assert first.tool.X[2, 3] == pytest.approx(0.15)
+    np.testing.assert_allclose(first.base.X[:3, 3], [0.1, -0.02, 0.0], atol=1e-15)  # turned by 180 degrees
+    assert (first.payloads, second.payloads) == ((2.5, 4.0), (4.0,))
+    np.testing.assert_allclose(first.X_BT[:3, 3], [0.6, 0.0, 0.5])
+    assert [first.numbers[role].value for role in ("cf1", "cf4", "cf6", "cfx")] == [0, -1, 0, 1]
+
+
+def test_tools_of_another_module_and_arrays_and_inline_targets():
+    rest = f"[1,0,0,0],[0,0,0,0],{EXTERNAL}"
+    array = f"VAR robtarget p{{2}}:=[[[1,2,3],{rest}],[[4,5,6],{rest}]];"
+    program = rapid(
+        array, "PROC main() FOR i FROM 1 TO 2 DO MoveL p{i}, v10, fine, grip; ENDFOR",
+        f"MoveAbsJ [[0,10,20,0,30,0],{EXTERNAL}]\\NoEOffs, v10, fine, grip; ENDPROC", others=(GRIPPER,),
+    )  # fmt: skip
+    assert [each.name for each in program.targets] == ["p{1}", "p{2}", ""]
+    assert [each.line for each in program.targets] == [2, 2, 4]
+    np.testing.assert_allclose(np.rad2deg(program.targets[2].q), [0, 10, 20, 0, 30, 0])
+
+
+@pytest.mark.parametrize(
+    ("lines", "note"),
+    [
+        ([robtarget("p", "reach+10"), "PROC main() MoveL p,v1,fine,tool0;"], "p has expressions"),
+        ([robtarget("p"), "PROC main() p:=Offs(p,0,0,1); MoveL p,v1,fine,tool0;"], "given another value"),
+        ([robtarget("p"), "PROC main() p.trans.x:=3; MoveL p,v1,fine,tool0;"], "given another value"),
+        ([robtarget("p"), "PROC main() approach p;"], "--tool NAME says it"),
+        (
+            ["PROC main()", f"MoveL [[x,0,0],[1,0,0,0],[0,0,0,0],{EXTERNAL}],v1,fine,tool0;"],
+            "has expressions",
+        ),
+    ],
+)
+def test_what_is_no_plain_target_is_left_alone_and_named(lines: list[str], note: str):
+    program = rapid(*lines)
+    assert not program.targets
+    assert [note in each.text for each in program.notes] == [True]
+
+
+def test_a_target_beside_another_is_named_and_the_other_corrected():
+    program = rapid(robtarget("p"), "PROC main()", "MoveL Offs(p,0,0,50),v1,fine,tool0;", "ENDPROC")
+    assert [target.name for target in program.targets] == ["p"]
+    assert [(note.line, "Offs of p" in note.text) for note in program.notes] == [(4, True)]
+
+
+@pytest.mark.parametrize(
+    ("lines", "refusal"),
+    [
+        ([robtarget("p"), "PROC main()", "MoveL p,v1,fine,gone;"], "m.mod, line 4: gone is not declared"),
+        (
+            [GRIPPER, robtarget("p"), "PROC main()", "MoveL p,v1,fine,grip;", "MoveL p,v1,fine,tool0;"],
+            "line 6: p is moved to with tool0, and with grip in m.mod, line 5",
+        ),
+        (
+            [GRIPPER.replace("TRUE", "FALSE"), robtarget("p"), "PROC main() MoveL p,v1,fine,grip;"],
+            "stands still",
+        ),
+        ([GRIPPER.replace("150", "len"), robtarget("p"), "PROC main() MoveL p,v1,fine,grip;"], "in numbers"),
+        (
+            [
+                TABLE.replace("TRUE", "FALSE"),
+                robtarget("p"),
+                "PROC main() MoveL p,v1,fine,tool0\\WObj:=table;",
+            ],
+            "unit",
+        ),
+    ],
+)
+def test_a_frame_that_nobody_knows_is_refused_with_its_line(lines: list[str], refusal: str):
+    with pytest.raises(ProgramError, match=refusal):
+        rapid(*lines)
+
+
+CONFIG = """TOOL_DATA[1]={X 0.0,Y 0.0,Z 150.0,A 0,B 0,C 0}
+BASE_DATA[2]={X 500,Y 0,Z 0,A 90,B 0,C 0}
+LOAD_DATA[1]={M 3.5}"""
+POSE = "X 600.0,Y 0.0,Z 500.0,A 0.0,B 180.0,C 0.0,S 2,T 10"
+
+
+def test_a_taught_position_has_tool_base_and_load_of_its_frame_data():
+    lines = (f"DECL E6POS XP1={{{POSE}}}", "DECL FDAT FP1={TOOL_NO 1,BASE_NO 2,IPO_FRAME #BASE}")
+    (target,) = krl("DEFDAT m", *lines, "ENDDAT", suffix="dat", others=(CONFIG,)).targets
+    assert target.tool is not None
+    assert target.tool.X[2, 3] == pytest.approx(0.15)
+    np.testing.assert_allclose(target.base.X[:3, :3] @ [1, 0, 0], [0, 1, 0], atol=1e-15)
+    assert target.payloads == (3.5,)
+    assert (target.numbers["status"].value, target.numbers["turn"].value) == (2, 10)
+
+
+def test_an_inline_position_has_the_tool_that_the_text_has_set():
+    program = krl(
+        "DEF m()", "BAS(#TOOL,1)", "$BASE={X 0,Y 0,Z 100,A 0,B 0,C 0}", f"LIN {{{POSE}}} C_DIS",
+        "$TOOL=$NULLFRAME", f"CIRC {{E6POS: {POSE}}},{{{POSE}}}", "PTP {A1 0,A2 -90,A3 90,A4 0,A5 0,A6 0}",
+        others=(CONFIG,),
+    )  # fmt: skip
+    heights = [target.tool.X[2, 3] for target in program.targets if target.tool]
+    np.testing.assert_allclose(heights, [0.15, 0.0, 0.0, 0.0])
+    assert [target.line for target in program.targets] == [4, 6, 6, 7]
+    np.testing.assert_allclose(program.targets[3].q, np.deg2rad([0, -90, 90, 0, 0, 0]))
+
+
+@pytest.mark.parametrize(
+    ("lines", "note"),
+    [
+        (["$TOOL=$NULLFRAME", "PTP {A1 5}"], "parts of a pose"),
+        (["$TOOL=$NULLFRAME", "LIN_REL {X 5}"], "by a distance"),
+        ([f"LIN {{{POSE}}}"], "nothing says the tool"),
+        (["$TOOL=$NULLFRAME", f"P1={{{POSE}}}", "P1.X=P1.X+1", "LIN P1"], "given another value"),
+    ],
+)
+def test_krl_that_is_no_plain_target_is_left_alone_and_named(lines: list[str], note: str):
+    program = krl(*lines)
+    assert not program.targets
+    assert [note in each.text for each in program.notes] == [True]
+
+
+def test_krl_refuses_a_tool_that_is_not_declared():
+    with pytest.raises(ProgramError, match=r"m\.src, line 1: TOOL_DATA\[3\] is not declared"):
+        krl("$TOOL=TOOL_DATA[3]", f"LIN {{{POSE}}}")
+
+
+@pytest.mark.parametrize(
+    ("text", "refusal"),
+    [
+        ("x_mm,y_mm\n1,2\n", "line 1: column z is missing"),
+        ("x_mm,y_mm,z_mm,qw,qx,qy,qz,q1_deg\n", "poses and joint positions"),
+        ("q1_deg,q2_deg,q3_deg,q4_deg,q5_deg,q6_deg\na,b,c,d,e,f\n", "no row of numbers"),
+    ],
+)
+def test_a_table_without_targets_is_refused(text: str, refusal: str):
+    with pytest.raises(ProgramError, match=refusal):
+        parse_program(Source("m.csv", text))
