@@ -9,7 +9,7 @@ from diagrams.runs.simulation import run
 from diagrams.scenario.scenario import Scenario, load_scenario
 from experiments.cli.workers import Progress
 from robots.description.model import NUM_JOINTS, RobotModel
-from robots.kinematics.analytic_inverse import seen_from_base
+from robots.kinematics.arm_structure import seen_from_base
 from robots.kinematics.forward import Kinematics
 from robots.pose import zyx_from_rotation
 from systems.feedforward import FeedforwardConfig

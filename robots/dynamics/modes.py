@@ -15,7 +15,7 @@ from scipy.linalg import eigh
 
 from robots.description.model import NUM_JOINTS, RobotModel
 from robots.dynamics.plant import add_robot
-from robots.kinematics.analytic_inverse import seen_from_base
+from robots.kinematics.arm_structure import seen_from_base
 
 # rad; central differences of a load that changes over radians are then right to eight digits.
 _STEP = 1e-4

@@ -9,7 +9,6 @@ stretched that of the other is bent, and joint 4 stands elsewhere. Newton's step
 of Levenberg and Marquardt takes over, from all branches of the ideal robot.
 """
 
-import math
 from contextlib import suppress
 from dataclasses import replace
 from typing import Protocol
@@ -19,40 +18,17 @@ from scipy.optimize import least_squares
 
 from robots.description.model import Joint, Placement, RobotModel
 from robots.dynamics.compliant_kinematics import CompliantKinematics
-from robots.kinematics.analytic_inverse import (
-    AXES,
-    FREE_OF_OFFSET,
-    InverseKinematics,
-    JointLimitError,
-    UnreachableError,
-    has_spherical_wrist,
-    seen_from_base,
-    turned_into,
-)
-from robots.kinematics.forward import Kinematics, robust_solve
-from robots.pose import pose_error, zyx_from_rotation
+from robots.kinematics.analytic_inverse import InverseKinematics, JointLimitError, UnreachableError
+from robots.kinematics.arm_structure import AXES, FREE_OF_OFFSET, has_spherical_wrist, seen_from_base
+from robots.kinematics.forward import Kinematics
+from robots.kinematics.numeric_inverse import CLOSE, ForwardKinematics, NumericInverse
+from robots.pose import zyx_from_rotation
 
-_CLOSE = 0.05  # rad and m; from no farther than this the steps begin where the robot is
-_CONVERGED = 1e-10  # rad; a step of this size leaves an error of its square
-_MOST_STEPS = 25
 _ACCURATE = 1e-9  # m, or of direction cosines: what a solution may be off
 _MOST_EVALUATIONS = 100  # of Levenberg and Marquardt
-_LONGEST_STEP = 0.3  # rad, of all joints together
 _LARGEST_TILT = 0.3  # of direction cosines: what still counts as a deviation
 _LARGEST_OFFSET = 0.05  # m
 _SAMPLES = 64  # configurations at which the ideal robot is compared with the true one
-
-
-class ForwardKinematics(Protocol):
-    """What a Newton step needs to know of a robot."""
-
-    def forward(self, q: np.ndarray) -> np.ndarray:
-        """Poses (..., 4, 4) at joint positions (..., 6)."""
-        ...
-
-    def forward_and_jacobian(self, q: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Pose (4, 4) and geometric Jacobian (6, 6) at joint positions (6,)."""
-        ...
 
 
 class InverseSolver(Protocol):
@@ -68,18 +44,19 @@ class InverseSolver(Protocol):
 
 
 def inverse_kinematics(robot: RobotModel, payload: float = 0.0) -> InverseSolver:
-    """The analytic solution where the robot is built for it, Newton's method where it nearly is or yields.
+    """The analytic solution where the robot is built for it, a numeric one where it is not, or yields.
 
     Args:
         robot: nominal or calibrated.
         payload: mass at the flange in kg, under which a robot with compliances bends.
-
-    Raises:
-        ValueError: if the robot is too far from a spherical wrist on a plane arm; the message says where.
     """
-    if robot.compliance.any():
-        return NewtonInverse(robot, CompliantKinematics(robot, payload))
-    return InverseKinematics(robot) if has_spherical_wrist(robot) else NewtonInverse(robot)
+    yielding = CompliantKinematics(robot, payload) if robot.compliance.any() else None
+    if yielding is None and has_spherical_wrist(robot):
+        return InverseKinematics(robot)
+    try:
+        return NewtonInverse(robot, yielding)
+    except ValueError:  # too far from an ideal robot
+        return NumericInverse(robot, yielding)
 
 
 def ideal_robot(robot: RobotModel) -> RobotModel:
@@ -119,8 +96,8 @@ def ideal_robot(robot: RobotModel) -> RobotModel:
     return replace(robot, joints=joints, tool=tool)
 
 
-class NewtonInverse:
-    """Joint positions for poses of a robot's tool in the world."""
+class NewtonInverse(NumericInverse):
+    """Joint positions of a robot next to an ideal one, whose branches are the first guesses."""
 
     def __init__(self, robot: RobotModel, kinematics: ForwardKinematics | None = None) -> None:
         """Finds the ideal robot.
@@ -132,10 +109,8 @@ class NewtonInverse:
         Raises:
             ValueError: as `ideal_robot`.
         """
-        self.robot = robot
-        self._kinematics = kinematics or Kinematics(robot)
+        super().__init__(robot, kinematics)
         self._ideal = InverseKinematics(ideal_robot(robot))
-        self._lower, self._upper = robot.lower.tolist(), robot.upper.tolist()
         # A pose so far beyond the reach of the ideal robot may still be within that of the true one.
         q = np.random.default_rng(0).uniform(robot.lower, robot.upper, (_SAMPLES, len(self._lower)))
         apart = self._kinematics.forward(q) - Kinematics(self._ideal.robot).forward(q)
@@ -160,7 +135,7 @@ class NewtonInverse:
             "out of reach: the iteration to the exact inverse does not converge"
         )
         try:
-            q = self._newton(X_WE, q_near, _CLOSE)
+            q = self._newton(X_WE, q_near, CLOSE)
             if q is None:
                 q = self._newton(X_WE, self._ideal.nearest(X_WE, q_near), np.inf)
             if q is not None:
@@ -172,18 +147,6 @@ class NewtonInverse:
             raise refusal
         return q
 
-    def _wrap_into_limits(self, q: np.ndarray) -> np.ndarray:
-        """The joint positions within the limits, by full turns where that helps."""
-        for i, (angle, lower, upper) in enumerate(zip(q.tolist(), self._lower, self._upper, strict=True)):
-            turned = turned_into(angle, lower, upper)
-            if turned is None:
-                raise JointLimitError(
-                    f"joint {i + 1} would be at {math.degrees(angle):.2f} deg, "
-                    f"allowed are {math.degrees(lower):g} to {math.degrees(upper):g} deg"
-                )
-            q[i] = turned
-        return q
-
     def _nearest_of_all(self, X_WE: np.ndarray, q_near: np.ndarray) -> np.ndarray | None:
         """The solution within the limits that is nearest to a configuration, from all ideal branches."""
         X_WE = np.vstack([X_WE[:3], [0.0, 0.0, 0.0, 1.0]])
@@ -192,7 +155,7 @@ class NewtonInverse:
         if not len(starts):
             return None
         # With axes 4 and 6 nearly in line the ideal joint 4 says little about the true one.
-        for turn in (0.0, 0.5 * math.pi):
+        for turn in (0.0, 0.5 * np.pi):
             quarter = np.array([0.0, 0.0, 0.0, turn, 0.0, -turn])
             found = [self._levenberg_marquardt(X_WE, start + quarter) for start in [q_near, *starts]]
             solutions = []
@@ -202,33 +165,6 @@ class NewtonInverse:
                         solutions.append(self._wrap_into_limits(q))
             if solutions:
                 return min(solutions, key=lambda q: float(np.sum((q - q_near) ** 2)))
-        return None
-
-    def along(self, X_WE: np.ndarray, q_start: np.ndarray) -> np.ndarray:
-        """The joint path for a path of the tool, as `InverseKinematics.along`."""
-        path = np.empty((len(X_WE), len(q_start)))
-        q = q_start
-        for k, X in enumerate(X_WE):
-            try:
-                q = path[k] = self.nearest(X, q)
-            except ValueError as error:
-                raise type(error)(f"sample {k} of {len(X_WE)}: {error}") from error
-        return path
-
-    def _newton(self, X_WE: np.ndarray, q: np.ndarray, largest_error: float) -> np.ndarray | None:
-        """Newton steps from q; None if they begin with a larger error or do not converge."""
-        for _ in range(_MOST_STEPS):
-            X, J = self._kinematics.forward_and_jacobian(q)
-            error = pose_error(X_WE, X)
-            if error @ error > largest_error**2:
-                return None
-            largest_error = np.inf
-            step = robust_solve(J, error)
-            length = float(np.sqrt(step @ step))
-            q = q + step * min(1.0, _LONGEST_STEP / max(length, _LONGEST_STEP))
-            if length < _CONVERGED:
-                # The damped steps at a singularity are short without being near a solution.
-                return q if error @ error < _ACCURATE**2 else None
         return None
 
     def _levenberg_marquardt(self, X_WE: np.ndarray, q: np.ndarray) -> np.ndarray | None:

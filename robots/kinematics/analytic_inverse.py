@@ -1,8 +1,9 @@
 """Analytic inverse kinematics of six-axis robots with a spherical wrist: all branches, or the nearest.
 
-Probst (2024), section 2.1.2, eqs. (2.13) to (2.27), for any tool, any base, and offsets in the plane of
-the arm. A pose has up to eight solutions: two of the shoulder (c1 = 1 reaches forward, -1 backward over
-the head), two of the elbow (c2 = 1, -1) and two of the wrist (flipped or not).
+Probst (2024), section 2.1.2, eqs. (2.13) to (2.27), for any tool, any base, any zeros of the joints, offsets
+in the plane of the arm and an arm beside axis 1. A pose has up to eight solutions: two of the shoulder (c1 =
+1 reaches forward, -1 backward over the head), two of the elbow (c2 = 1, -1) and two of the wrist (flipped or
+not).
 
 The formulas are written once, for floats and for arrays: their argument ``m`` is ``math`` for one pose,
 which is fast, or its counterpart for arrays, ``_ARRAYS``, for many.
@@ -15,16 +16,12 @@ from typing import Any
 import numpy as np
 
 from robots.description.model import NUM_JOINTS, RobotModel
+from robots.kinematics.arm_structure import arm_structure
 from robots.pose import wrap_angle
 
 REACH_TOLERANCE = 1e-9  # m, a pose this far beyond the reach is taken as a stretched or a folded arm
 LIMIT_TOLERANCE = 1e-9  # rad, an angle this far beyond a limit is put on the limit
 _SINGULAR = 1e-9  # sine of joint 5, or distance in m of the wrist from axis 1, that leaves an angle open
-_STRUCTURE_TOLERANCE = 1e-9  # of direction cosines, and of lengths in m
-
-AXES = "zyyxyx"  # the directions of the joint axes at zero joint angles
-# The directions, by the number of the joint, in which its origin must not be off the one before.
-FREE_OF_OFFSET = {2: "y", 3: "y", 4: "y", 5: "yz", 6: "yz"}
 _TURN = 2.0 * math.pi
 _ARRAYS = SimpleNamespace(sin=np.sin, cos=np.cos, atan2=np.arctan2)
 # (c1, c2, c5) in the order of `all_branches`; c5 is the sign of the sine of joint 5.
@@ -49,22 +46,24 @@ class InverseKinematics:
             ValueError: if the robot is not built as the method needs it; the message says what does not fit.
         """
         self.robot = robot
-        signs, offsets, R_BF = _structure(robot)
-        self._signs = signs.tolist()
-        self._lower, self._upper = robot.lower.tolist(), robot.upper.tolist()
+        arm = arm_structure(robot)
+        offsets = arm.offsets
+        self._signs, self._zeros = arm.signs.tolist(), arm.zeros
+        self._lower, self._upper = (robot.lower - arm.zeros).tolist(), (robot.upper - arm.zeros).tolist()
         self._shoulder_x, self._shoulder_z = float(offsets[1, 0]), float(offsets[1, 2])
         # Upper arm 2-3 and forearm 3-5: lengths, and angles from z towards x at zero joint angles.
         (x23, _, z23), (x35, _, z35) = offsets[2].tolist(), (offsets[3] + offsets[4]).tolist()
         self._l23, self._angle23 = math.hypot(x23, z23), math.atan2(x23, z23)
         self._l35, self._angle35 = math.hypot(x35, z35), math.atan2(x35, z35)
         self._longest, self._shortest = self._l23 + self._l35, abs(self._l23 - self._l35)
+        self._beside = float(offsets[3, 1])  # how far the plane of the arm is from axis 1
         # Frame 1: first joint. Frame H: on link 6 in the centre of the wrist. Both parallel to B at zero.
-        X_W1 = robot.base.pose().GetAsMatrix4()
+        X_W1 = arm.base.GetAsMatrix4()
         X_W1[:3, 3] += X_W1[:3, :3] @ offsets[0]
         X_HF = np.eye(4)
-        X_HF[:3, :3], X_HF[:3, 3] = R_BF, offsets[5]
+        X_HF[:3, :3], X_HF[:3, 3] = arm.R_BF, offsets[5]
         self._X_1W = np.linalg.inv(X_W1)
-        self._X_EH = np.linalg.inv(X_HF @ robot.tool.pose().GetAsMatrix4())
+        self._X_EH = np.linalg.inv(X_HF @ arm.tool.GetAsMatrix4())
 
     def all_branches(self, X_WE: np.ndarray, reach_tolerance: float = REACH_TOLERANCE) -> np.ndarray:
         """Every solution, whether within the joint limits or not.
@@ -85,10 +84,15 @@ class InverseKinematics:
         x, y, z, _ = rows[:, 3]
         c1, c2, c5 = np.array(_BRANCHES).T
         radius = np.hypot(x, y)
-        q1 = np.where(radius > _SINGULAR, np.arctan2(c1 * y, c1 * x), 0.0)
+        if self._beside == 0.0:
+            q1, missing = np.where(radius > _SINGULAR, np.arctan2(c1 * y, c1 * x), 0.0), 0.0
+        else:
+            missing = abs(self._beside) - radius
+            radius = np.sqrt(np.maximum(radius**2 - self._beside**2, 0.0))
+            q1 = np.arctan2(y, x) - np.arctan2(self._beside, c1 * radius)
         l25_squared, direction, area = self._triangle(_ARRAYS, c1 * radius, z)
         l25 = np.sqrt(l25_squared)
-        excess = np.maximum(l25 - self._longest, self._shortest - l25)
+        excess = np.maximum(np.maximum(l25 - self._longest, self._shortest - l25), missing)
         root = np.sqrt(np.where(excess > reach_tolerance, np.nan, np.maximum(area, 0.0)))
         q2, q3 = self._upper_arm_and_elbow(_ARRAYS, l25_squared, direction, c2 * root)
         wrist = _wrist_rotation(_ARRAYS, rows, q1, q2 + q3)
@@ -96,7 +100,7 @@ class InverseKinematics:
         q4 = np.where(np.hypot(a21, a31) > _SINGULAR, np.arctan2(c5 * a21, -c5 * a31), 0.0)
         q5, q6 = _last_two(_ARRAYS, wrist, q4)
         q = np.stack([q1, q2, q3, q4, q5, q6], -1) * self._signs
-        return wrap_angle(np.where(np.isnan(q2)[..., None], np.nan, q))
+        return wrap_angle(np.where(np.isnan(q2)[..., None], np.nan, q + self._zeros))
 
     def nearest(self, X_WE: np.ndarray, q_near: np.ndarray) -> np.ndarray:
         """The solution within the joint limits that is nearest to a configuration, full turns included.
@@ -117,7 +121,7 @@ class InverseKinematics:
             JointLimitError: if branches reach it, but none within the joint limits.
             ValueError: if an argument is not finite.
         """
-        near = np.asarray(q_near, dtype=float).tolist()
+        near = (np.asarray(q_near, dtype=float) - self._zeros).tolist()
         # A sum of squares is finite only if all of its terms are.
         if not (math.isfinite(np.vdot(X_WE, X_WE)) and math.isfinite(sum(near))):
             raise ValueError(f"inverse kinematics: not finite: pose {X_WE.tolist()} or configuration {near}")
@@ -127,12 +131,13 @@ class InverseKinematics:
         q = self._solve(X, near, *self._branch_of(near))
         if q is not None:
             fitted, squared = self._wrap_into_limits(q, near)
-            # Another shoulder turns q1 by pi, another wrist q4 by pi, another elbow q3 by this much. No other
-            # branch can be nearer than a solution closer than half of the smallest of these.
+            # Another shoulder turns q1 by pi, less beside axis 1, another wrist q4 by pi, another elbow q3 by
+            # this much. No branch can be nearer than a solution closer than half of the smallest of these.
             elbow = 2.0 * abs(q[2] * self._signs[2] - self._angle23 + self._angle35)
-            if fitted is not None and squared < 0.25 * min(math.pi, elbow, _TURN - elbow) ** 2:
-                return np.array(fitted)
-        return np.array(self._nearest_of_all(X, near))
+            shoulder = math.pi - 2.0 * math.asin(min(1.0, self._share_beside(X)))
+            if fitted is not None and squared < 0.25 * min(shoulder, elbow, _TURN - elbow) ** 2:
+                return np.array(fitted) + self._zeros
+        return np.array(self._nearest_of_all(X, near)) + self._zeros
 
     def along(self, X_WE: np.ndarray, q_start: np.ndarray) -> np.ndarray:
         """The joint path for a path of the tool: each sample nearest to the one before.
@@ -155,6 +160,12 @@ class InverseKinematics:
             except ValueError as error:
                 raise type(error)(f"sample {k} of {len(X_WE)}: {error}") from error
         return path
+
+    def _share_beside(self, X: list) -> float:
+        """How far the plane of the arm is from axis 1, over how far the wrist is."""
+        if self._beside == 0.0:
+            return 0.0
+        return abs(self._beside) / max(math.hypot(X[0][3], X[1][3]), _SINGULAR)
 
     def _triangle(self, m: Any, x: Any, z: Any) -> tuple[Any, Any, Any]:
         """Joints 2, 3 and the wrist, with the wrist at (x, z) in the plane of the arm, from frame 1.
@@ -194,7 +205,13 @@ class InverseKinematics:
         """One branch for the pose of the wrist, or None out of reach; ``near`` fills in what is open."""
         x, y, z = X[0][3], X[1][3], X[2][3]
         radius = math.hypot(x, y)
-        q1 = math.atan2(c1 * y, c1 * x) if radius > _SINGULAR else self._signs[0] * near[0]
+        if self._beside == 0.0:
+            q1 = math.atan2(c1 * y, c1 * x) if radius > _SINGULAR else self._signs[0] * near[0]
+        else:
+            if abs(self._beside) - radius > REACH_TOLERANCE:
+                return None
+            radius = math.sqrt(max(radius * radius - self._beside**2, 0.0))
+            q1 = math.atan2(y, x) - math.atan2(self._beside, c1 * radius)
         l25_squared, direction, area = self._triangle(math, c1 * radius, z)
         if area < 0.0:
             if self._excess(math.sqrt(l25_squared)) > REACH_TOLERANCE:
@@ -241,6 +258,12 @@ class InverseKinematics:
 
     def _reach_message(self, X: list) -> str:
         radius = math.hypot(X[0][3], X[1][3])
+        if radius < abs(self._beside) - REACH_TOLERANCE:
+            return (
+                f"out of reach: the wrist centre would be {1e3 * radius:.1f} mm from axis 1, and the arm "
+                f"moves {1e3 * abs(self._beside):.1f} mm beside it"
+            )
+        radius = math.sqrt(max(radius * radius - self._beside**2, 0.0))
         squares = [self._triangle(math, x, X[2][3])[0] for x in (radius, -radius)]
         l25 = min(map(math.sqrt, squares), key=self._excess)
         where = "far from" if l25 > self._longest else "close to"
@@ -257,10 +280,8 @@ class InverseKinematics:
             angle, lower, upper = near[i] + move, self._lower[i], self._upper[i]
             if turned_into(angle, lower, upper) is None:
                 break
-        return (
-            f"joint {i + 1} would be at {math.degrees(angle):.2f} deg, "
-            f"allowed are {math.degrees(lower):g} to {math.degrees(upper):g} deg"
-        )
+        angle, lower, upper = (math.degrees(each + self._zeros[i]) for each in (angle, lower, upper))
+        return f"joint {i + 1} would be at {angle:.2f} deg, allowed are {lower:g} to {upper:g} deg"
 
 
 def turned_into(angle: float, lower: float, upper: float) -> float | None:
@@ -299,57 +320,3 @@ def _last_two(m: Any, wrist: tuple[Any, Any, Any], q4: Any) -> tuple[Any, Any]:
     a11, (a21, a22, a23), (a31, a32, a33) = wrist
     s4, c4 = m.sin(q4), m.cos(q4)
     return m.atan2(s4 * a21 - c4 * a31, a11), m.atan2(-c4 * a23 - s4 * a33, c4 * a22 + s4 * a32)
-
-
-def seen_from_base(robot: RobotModel) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """What the robot looks like at zero joint angles, in the axes of the base.
-
-    Returns:
-        The axes of the joints (6, 3), the offsets between the frames of the links (6, 3) in m, and the
-        rotation of the flange (3, 3).
-    """
-    axes, offsets, R_BL = np.empty((NUM_JOINTS, 3)), np.empty((NUM_JOINTS, 3)), np.eye(3)
-    for i, joint in enumerate(robot.joints):
-        offsets[i] = R_BL @ joint.placement.translation
-        R_BL = R_BL @ joint.placement.pose().rotation().matrix()
-        axes[i] = R_BL @ robot.axes[i]
-    return axes, offsets, R_BL
-
-
-def has_spherical_wrist(robot: RobotModel) -> bool:
-    """Whether the robot is built exactly as the analytic solution needs it."""
-    try:
-        _structure(robot)
-    except ValueError:
-        return False
-    return True
-
-
-def _structure(robot: RobotModel) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """The signs of the axes (6,), the offsets between the links (6, 3) in m, the rotation of the flange.
-
-    Raises:
-        ValueError: if an axis or an offset is not as it must be.
-    """
-    axes, offsets, R_BF = seen_from_base(robot)
-    signs = np.empty(NUM_JOINTS)
-    for i, letter in enumerate(AXES):
-        unit = np.eye(3)["xyz".index(letter)]
-        signs[i] = np.sign(unit @ axes[i])
-        if np.abs(axes[i] - signs[i] * unit).max() > _STRUCTURE_TOLERANCE:
-            raise ValueError(
-                f"inverse kinematics of {robot.name}: the axis of joint {i + 1} must point along {letter} "
-                f"at zero joint angles, got {np.round(axes[i], 6).tolist()} in the base"
-            )
-    for number, directions in FREE_OF_OFFSET.items():
-        for letter in directions:
-            length = offsets[number - 1, "xyz".index(letter)]
-            if abs(length) > _STRUCTURE_TOLERANCE:
-                what = "the arm must lie in a plane" if letter == "y" else "the axes of the wrist must meet"
-                raise ValueError(
-                    f"inverse kinematics of {robot.name}: joint {number} must have no offset along {letter}, "
-                    f"got {1e3 * length:.3f} mm; {what}"
-                )
-    if min(np.linalg.norm(offsets[2]), np.linalg.norm(offsets[3] + offsets[4])) < _STRUCTURE_TOLERANCE:
-        raise ValueError(f"inverse kinematics of {robot.name}: the upper arm or the forearm has no length")
-    return signs, offsets, R_BF

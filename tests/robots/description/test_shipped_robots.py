@@ -22,7 +22,7 @@ DATA_SHEETS = {
     "kr210": (2.696, 0.215, 1068.0),
 }
 
-NO_SPHERICAL_WRIST = ("puma560", "ur10")  # or an offset shoulder: the analytic inverse does not know them
+NO_SPHERICAL_WRIST = ("ur10",)  # the analytic inverse does not know it
 
 
 @pytest.mark.parametrize(("name", "numbers"), DATA_SHEETS.items(), ids=DATA_SHEETS)

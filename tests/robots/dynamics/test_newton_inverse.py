@@ -99,8 +99,12 @@ def test_what_cannot_be_reached_is_refused_with_the_reason():
         inverse.nearest(np.full((4, 4), np.nan), np.zeros(6))
 
 
-def test_a_robot_of_another_kind_is_refused():
+def test_a_robot_of_another_kind_has_no_ideal_and_is_solved_numerically():
     joints = list(NOMINAL.joints)
     joints[4] = replace(joints[4], placement=Placement(np.array([0.45, 0.1, 0.0])))
+    robot = replace(NOMINAL, joints=joints)
     with pytest.raises(ValueError, match=r"joint 5 must have nearly no offset along y, got 100\.0 mm"):
-        inverse_kinematics(replace(NOMINAL, joints=joints))
+        ideal_robot(robot)
+    q = np.deg2rad([10.0, 20.0, 10.0, 15.0, 40.0, -30.0])
+    X_WE = Kinematics(robot).forward(q)
+    np.testing.assert_allclose(inverse_kinematics(robot).nearest(X_WE, q + 0.02), q, atol=1e-9)
