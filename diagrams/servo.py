@@ -97,6 +97,7 @@ class Servo(Diagram):
                 commands[name] = self.law.GetOutputPort(name)
         if feedforward.kind != "none":
             model = FEEDFORWARDS.find(feedforward.kind)(self.model, feedforward)
+            model.check_path(self.reference.path)
             ahead = builder.AddNamedSystem("feedforward", model)
             builder.ConnectInput(joints, ahead.GetInputPort("joint_sample"))
             self._add_feedforward(builder, ahead, commands)

@@ -54,6 +54,12 @@ def feedforward_command(
             metavar="SHARE", help="Relative error of the models' springs and dampers; positive is too stiff."
         ),
     ] = 0.0,
+    smooth: Annotated[
+        bool,
+        typer.Option(
+            help="Motions with five continuous derivatives, or sin^2 acceleration, whose fourth one jumps."
+        ),
+    ] = True,
     out: Annotated[Path, typer.Option("--out", metavar="DIR", help="Folder of the figures.")] = Path("out"),
     json_file: JsonOption = None,
     jobs: JobsOption = None,
@@ -73,7 +79,8 @@ def feedforward_command(
         label = f"{count(runs, 'run')} in {count(processes, 'process', 'processes')}"
         with progress_bar(label) as progress:
             config = FeedforwardConfig(stiffness_error=stiffness_error)
-            study = study_feedforward(model, mass, config, grid, processes, progress, realistic)
+            timing = "polynomial" if smooth else "sine_squared"
+            study = study_feedforward(model, mass, config, grid, processes, progress, realistic, timing)
         write_study_page(page, study)
         output.write(study_json(study))
     human.print(_table(study))

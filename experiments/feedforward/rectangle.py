@@ -18,7 +18,7 @@ from systems.reference.paths import ReferenceConfig
 from systems.reference.shapes import Rectangle, Waypoint
 
 LAW = "open_loop"  # no camera: the feedforward has to do it alone
-PACE = 8.0  # 1/s^2, k_a: an edge takes a second
+PACE = 8.0  # 1/s^2, k_a: an edge takes 1.2 s, with sin^2 timing a second
 DEPTH, WIDTH = 0.2, 0.4  # of the reach, the edges away from the robot and across
 SETTLE, DWELL = 1.0, 0.5  # s at rest: the arm is first wound up, at the end it rings
 _LEANING = np.deg2rad(30.0)  # of the upper arm from the vertical
@@ -32,6 +32,7 @@ class RectangleTrial:
     payload: float  # kg
     config: FeedforwardConfig
     plant: RobotModel | None = None  # in the station, if it is another one than the model's
+    timing: str = "polynomial"  # of `systems.reference.timing.TIMINGS`
 
     def run(self, progress: Progress | None = None) -> "Deviation":
         """Simulates it with an elastic structure.
@@ -94,6 +95,7 @@ def rectangle_scenario(trial: RectangleTrial) -> Scenario:
     reference = ReferenceConfig(
         Rectangle(rectangle(trial.robot, home)),
         acceleration=PACE,
+        timing=trial.timing,
         settle=SETTLE,
         dwell=DWELL,
         preview=drive.command_delay + drive.dead_time,

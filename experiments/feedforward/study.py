@@ -27,6 +27,7 @@ class FeedforwardStudy:
     payload: float  # kg
     plant: str  # of `PLANTS`, what stands in the station
     config: FeedforwardConfig  # how wrong the models are
+    timing: str  # of `systems.reference.timing.TIMINGS`
     axis_2: np.ndarray  # (n,) rad, where the motions begin
     axis_3: np.ndarray  # (n,) rad
     criterion: Mapping[int, Mapping[str, np.ndarray]]  # by angle in degrees and feedforward, (n, n) in m/s
@@ -47,6 +48,7 @@ def study_feedforward(
     processes: int | None = None,
     progress: Callable[[float], None] | None = None,
     realistic: RobotModel | None = None,
+    timing: str = "polynomial",
 ) -> FeedforwardStudy:
     """Simulates all of it.
 
@@ -58,6 +60,7 @@ def study_feedforward(
         processes: how many work at a time; None for one per core.
         progress: is called now and then with the share that is done, 0 to 1.
         realistic: what stands in the station; None for the robot exactly as the models know it.
+        timing: of all motions; what is too rough for a model is accepted.
 
     Raises:
         ValueError: if the grid is too small, or the robot or a model refuses.
@@ -65,6 +68,7 @@ def study_feedforward(
     """
     if grid < 2:
         raise ValueError(f"--grid must be at least 2, got {grid}")
+    config = replace(config, rough_path="accept")
     configs = {kind: replace(config, kind=kind) for kind in KINDS}
     for each in configs.values():  # what is impossible is refused here and not in a process
         FEEDFORWARDS[each.kind](ControllerModel(robot, payload), each)
@@ -72,12 +76,13 @@ def study_feedforward(
     axis_2, axis_3 = np.linspace(robot.lower[1:3], robot.upper[1:3] - np.deg2rad(max(ANGLES_DEG)), grid).T
     starts = [np.array([0.0, q2, q3, 0.0, 0.0, 0.0]) for q2 in axis_2 for q3 in axis_3]
     jobs: list[RectangleTrial | Trial] = [
-        RectangleTrial(robot, payload, configs[kind], realistic) for kind in KINDS
+        RectangleTrial(robot, payload, configs[kind], realistic, timing) for kind in KINDS
     ]
     for angle in ANGLES_DEG:
         for kind in KINDS:
             jobs += [
-                Trial(robot, payload, start, np.deg2rad(angle), configs[kind], realistic) for start in starts
+                Trial(robot, payload, start, np.deg2rad(angle), configs[kind], realistic, timing)
+                for start in starts
             ]
     results = in_processes(_work, jobs, processes, progress)
     path: dict[str, Any] = dict(zip(KINDS, results[: len(KINDS)], strict=True))
@@ -87,9 +92,9 @@ def study_feedforward(
         for angle, of_angle in zip(ANGLES_DEG, values, strict=True)
     }
     # Alone on a core, after the rest is done.
-    tick = {kind: tick_time(RectangleTrial(robot, payload, configs[kind])) for kind in KINDS}
+    tick = {kind: tick_time(RectangleTrial(robot, payload, configs[kind], timing=timing)) for kind in KINDS}
     plant = "realistic" if realistic else "exact"
-    return FeedforwardStudy(robot, payload, plant, config, axis_2, axis_3, criterion, path, tick)
+    return FeedforwardStudy(robot, payload, plant, config, timing, axis_2, axis_3, criterion, path, tick)
 
 
 def _work(job: RectangleTrial | Trial, progress: Progress) -> Deviation | float:
@@ -106,6 +111,7 @@ def study_json(study: FeedforwardStudy) -> dict[str, Any]:
         "robot": study.robot.name,
         "payload_kg": study.payload,
         "plant": study.plant,
+        "timing": study.timing,
         "stiffness_error": study.config.stiffness_error,
         "path": {
             "integral": {kind: one.integral / rigid.integral for kind, one in study.path.items()},

@@ -17,11 +17,11 @@ from experiments.cli.workers import Progress
 from robots.description.model import NUM_JOINTS, RobotModel
 from systems.controller_model import ControllerModel
 from systems.feedforward import FEEDFORWARDS, FeedforwardConfig, JointReference
-from systems.reference.paths import SineSquaredProfile
+from systems.reference.timing import TIMINGS, Profile
 
 SETTLE = 0.1  # s at rest before the motion
 RINGING = 0.9  # s after the motion, T of (6.1)
-SPEEDING_UP = 0.5  # s, from rest to the largest speed with the acceleration of the motions
+SPEEDING_UP = 0.5  # s, from rest to the largest speed with the mean acceleration of the motions
 _AXES = 3  # that move
 _WRIST = 5  # the origin of this link is the point where axes 4, 5 and 6 meet
 _MAX_STEP = 2e-3  # s; the ringing of the best feedforward is then right to some percent
@@ -37,12 +37,25 @@ class Trial:
     angle: float  # rad, signed
     config: FeedforwardConfig
     plant: RobotModel | None = None  # in the station, if it is another one than the model's
+    timing: str = "polynomial"  # of `systems.reference.timing.TIMINGS`
+
+    @property
+    def profile(self) -> Profile:
+        """How far the axes have turned, in rad.
+
+        It takes as long as a constant acceleration would that brings the slowest of them to its largest speed
+        in `SPEEDING_UP`, then as constant a deceleration.
+        """
+        acceleration = float(self.robot.speed[:_AXES].min()) / SPEEDING_UP
+        return TIMINGS[self.timing].lasting(
+            2.0 * float(np.sqrt(abs(self.angle) / acceleration)), abs(self.angle)
+        )
 
     def run(self, progress: Progress | None = None) -> float:
         """Simulates it with the drives of the station and an elastic structure; returns C of (6.1) in m/s."""
         config = StationConfig(elasticity="structure", payload=self.payload)
         period, ahead = config.period, config.drive.command_delay + config.drive.dead_time
-        stop = SETTLE + motion_profile(self.robot, self.angle).duration
+        stop = SETTLE + self.profile.duration
         told = commands(self, np.arange(0.0, stop + RINGING, period) + ahead, period)
         builder = DiagramBuilder()
         station = builder.AddNamedSystem(
@@ -88,16 +101,9 @@ class CommandPlayer(LeafSystem):
             discrete_state.set_value(index, command)
 
 
-def motion_profile(robot: RobotModel, angle: float) -> SineSquaredProfile:
-    """How far the axes have turned, in rad: the slowest of them could reach its largest speed in 0.5 s."""
-    # On the average of a hump the acceleration is half of its peak.
-    acceleration = 2.0 * float(robot.speed[:_AXES].min()) / SPEEDING_UP
-    return SineSquaredProfile(acceleration, abs(angle))
-
-
 def references(trial: Trial, times: np.ndarray) -> list[JointReference]:
     """Where the links shall be."""
-    s, rate, acceleration = motion_profile(trial.robot, trial.angle).at_times(times - SETTLE)
+    s, rate, acceleration = trial.profile.at_times(times - SETTLE)
     direction = np.zeros(NUM_JOINTS)
     direction[:_AXES] = np.sign(trial.angle)
     return [

@@ -106,7 +106,8 @@ class GeometricCorrection:
     """Axis 2 puts axis 3 in its place, axes 3 and 1 the tip, Reiner (2010) section 3.6.2.
 
     Each turn takes a lever of the deformed arm to where the lever of the rigid arm points. Three forward
-    kinematics, no Jacobian; the orientation is left as it is. Short levers are left alone (3.59).
+    kinematics, no Jacobian; the orientation is left as it is. Short levers turn less, as by (3.59), but
+    smoothly also where they vanish.
     """
 
     def __init__(self, robot: RobotModel, arm: DeformedArm) -> None:
@@ -128,8 +129,9 @@ class GeometricCorrection:
         """The angle about an axis from one lever to another, both seen along the axis."""
         lever = lever - (lever @ axis) * axis
         target = target - (target @ axis) * axis
-        angle = math.atan2(float(axis @ np.cross(lever, target)), float(lever @ target))
-        return angle * -math.expm1(-float(lever @ lever) / self._short**2)
+        # A factor on the angle, as in (3.59), would leave its jump by 2 pi where the two point apart.
+        short = self._short**2 * math.exp(-float(lever @ lever) / self._short**2)
+        return math.atan2(float(axis @ np.cross(lever, target)), float(lever @ target) + short)
 
 
 CORRECTIONS = {"least_squares": LeastSquaresCorrection, "geometric": GeometricCorrection}

@@ -23,5 +23,7 @@ class FeedforwardConfig:
     # By which shares stiffness and damping, and masses and inertias, of the model are above the robot's.
     stiffness_error: float = quantity(0.0, -0.9, 10.0)
     inertia_error: float = quantity(0.0, -0.9, 10.0)
+    # What becomes of a path with too few continuous derivatives: refuse it, or accept torques that jump
+    rough_path: str = choice("refuse", ("refuse", "accept"))
     correction: CorrectionConfig = field(default_factory=CorrectionConfig)
     prefilter: PrefilterConfig = field(default_factory=PrefilterConfig)

@@ -14,7 +14,7 @@ from systems.feedforward.sprung_deflection import SprungDeflection
 
 
 class ElasticStructureFeedforward(FlexibleJointFeedforward):
-    """Five steps a tick, Reiner (2010) figure 3.21; an exact inverse would not be stable.
+    """Five steps a sub-step, Reiner (2010) figure 3.21; an exact inverse would not be stable.
 
     1. The torques in bearings and beams, as if nothing yielded (3.76).
     2. How far these yield to them (3.78).
@@ -24,7 +24,7 @@ class ElasticStructureFeedforward(FlexibleJointFeedforward):
 
     The rest is what masses along the arm move differently from those of a rigid arm; the tip does not.
 
-    The memory holds that of the gears, then the section torques of the last tick, then deflections and
+    The memory holds that of the gears, then the section torques of the last sub-step, then deflections and
     corrections of the last three.
     """
 
@@ -53,7 +53,7 @@ class ElasticStructureFeedforward(FlexibleJointFeedforward):
         super().__init__(model, config, memory)
         self._arm, self._size = arm, arm.size
         share = 1.0 + config.stiffness_error
-        self._springs = SprungDeflection(share * self._arm.stiffness, share * self._arm.damping, model.period)
+        self._springs = SprungDeflection(share * self._arm.stiffness, share * self._arm.damping, self.substep)
         self._correction = CORRECTIONS[correction.method](model.robot, self._arm)
         self._limit = np.deg2rad(correction.limit_deg)
 

@@ -14,11 +14,15 @@ from robots.dynamics.plant import add_robot
 from robots.kinematics.analytic_inverse import JointLimitError, UnreachableError
 from robots.kinematics.forward import Kinematics, robust_solve
 from systems.controller_model import ControllerModel
+from systems.feedforward.between_ticks import BetweenTicks
 from systems.feedforward.config import FeedforwardConfig
 from systems.feedforward.joint_motion import Answer, Drive, JointReference
 from systems.feedforward.prefilter import Prefilter
+from systems.reference.paths import CartesianPath
 from systems.samples import JointSample
 
+_LONGEST_SUBSTEP = 2e-3  # s; half of it changes the torque of an elastic inverse by some tenths of a percent
+_OF_REFERENCE = 3 * NUM_JOINTS  # numbers
 _SMALL_TURN = 1e-5  # s times the joint velocity: over which the change of the Jacobian is measured
 _NOTHING = np.zeros(NUM_JOINTS)
 _NO_COMMAND = np.full(NUM_JOINTS, np.nan)
@@ -52,7 +56,14 @@ class Feedforward(LeafSystem):
 
     With a prefilter the derivatives of the path come from it, and the links follow the path as late as the
     filter is; the offsets contain the difference, so that this too goes with any law. ``delay`` says how much
-    more preview makes up for it.
+    more preview makes up for it. Without one the path itself has to be smooth enough, see `check_path`.
+
+    Drives hold a torque until the next tick, so a model runs half a tick ahead, to the middle of the hold, in
+    sub-steps of at most 2 ms: what it differentiates does not depend on how long a tick is.
+
+    Attributes:
+        delay: s, of the prefilter.
+        substep: s, from one call of `drive` to the next.
     """
 
     title = "feedforward"  # for people
@@ -78,13 +89,14 @@ class Feedforward(LeafSystem):
         """
         super().__init__()
         robot, period, payload = model.robot, model.period, model.payload
-        self._memory_size = NUM_JOINTS + self.memory_size + extra_memory
+        self._between = BetweenTicks(period, _LONGEST_SUBSTEP)
+        self.substep = self._between.substep
         for label in ("stiffness_error", "inertia_error"):
             if not -1.0 < getattr(config, label) < np.inf:
                 raise ValueError(
                     f"feedforward: {label} must be above -1 and finite, got {getattr(config, label)}"
                 )
-        self._period, self._inertia = period, 1.0 + config.inertia_error
+        self._inertia = 1.0 + config.inertia_error
         self._stiffness = (1.0 + config.stiffness_error) * robot.joint_stiffness
         self._damping = (1.0 + config.stiffness_error) * robot.joint_damping
         self._rotor, self._viscous = robot.reflected_inertia, robot.joint_viscous_friction
@@ -92,10 +104,15 @@ class Feedforward(LeafSystem):
         # Beyond these, what a robot file says of its drive trains; friction is in them then.
         self._trains = robot.drive_trains
         self._kinematics = Kinematics(robot)
-        self._filter = None
+        self._filter, self._config = None, config
         if config.prefilter.kind != "none":
-            self._filter = Prefilter(config.prefilter, period, self.derivatives, f"feedforward {config.kind}")
+            user = f"feedforward {config.kind}"
+            self._filter = Prefilter(config.prefilter, self.substep, self.derivatives, user)
         self.delay = self._filter.delay if self._filter else 0.0  # s
+        of_filter = (self._filter.order + 1) * NUM_JOINTS if self._filter else 0
+        # The reference of the last tick; the filter's input and states; what the model remembers.
+        self._parts_of_memory = np.cumsum([_OF_REFERENCE, of_filter])
+        self._memory_size = _OF_REFERENCE + of_filter + self.memory_size + extra_memory
         # Where the links have to be: the law alone cares for their sag under gravity, if it knows of it.
         self._inverse = inverse_kinematics(robot, payload)
         self._sag = CompliantKinematics(robot, payload) if robot.compliance.any() else None
@@ -113,8 +130,6 @@ class Feedforward(LeafSystem):
             self.DeclareStateOutputPort(name, self.DeclareDiscreteState(value))
         self._last = self.DeclareDiscreteState(np.full(NUM_JOINTS, np.nan))
         self._memory = self.DeclareDiscreteState(self.fresh_memory())
-        order = self._filter.order if self._filter else 0
-        self._filtered = self.DeclareDiscreteState(np.full(max(1, order * NUM_JOINTS), np.nan))
         self.DeclarePeriodicDiscreteUpdateEvent(period, 0.0, self._tick)
 
     def fresh_memory(self) -> np.ndarray:
@@ -128,24 +143,46 @@ class Feedforward(LeafSystem):
             reference: of the links.
             memory: of the last tick, `fresh_memory` at the first one.
         """
-        last_torque, memory = memory[:NUM_JOINTS], memory[NUM_JOINTS:]
-        drive = self.drive(reference, memory)
+        last, filtered, memory = np.split(memory, self._parts_of_memory)
+        now = np.stack([reference.position, reference.velocity, reference.acceleration])
+        drives = []
+        for moment in self._between.references(last.reshape(3, NUM_JOINTS), now):
+            smooth = JointReference(*moment)
+            if self._filter is not None:
+                smooth, filtered = self._filtered(self._filter, moment[0], filtered)
+            drive = self.drive(smooth, memory)
+            memory = drive.memory
+            drives.append((smooth, drive))
+        (smooth, drive), (later, ahead) = drives[self._between.half - 1], drives[-1]
+        position, velocity = smooth.position - drive.deflection, smooth.velocity - drive.deflection_rate
         sag, sag_rate = self._known_sag(reference)
-        torque = drive.torque - self._gravity_compensation(reference.position - drive.deflection)
-        # The drives hold a torque for a period: on the average it is half a period late.
-        ahead = torque if np.isnan(last_torque[0]) else 1.5 * torque - 0.5 * last_torque
-        memory = np.concatenate([torque, drive.memory])
         return Answer(
-            reference.position - drive.deflection,
-            reference.velocity - drive.deflection_rate,
-            sag - drive.deflection,
-            sag_rate - drive.deflection_rate,
-            ahead,
-            memory,
+            position,
+            velocity,
+            sag + position - reference.position,
+            sag_rate + velocity - reference.velocity,
+            ahead.torque - self._gravity_compensation(later.position - ahead.deflection),
+            np.concatenate([now.ravel(), filtered, memory]),
         )
 
+    def check_path(self, path: CartesianPath) -> None:
+        """Refuses a path that is too rough.
+
+        Raises:
+            ValueError: if the outputs depend on more derivatives of the path than are continuous, there is no
+                prefilter, and the configuration does not accept what comes of it.
+        """
+        if self._filter is not None or self._config.rough_path == "accept":
+            return
+        if path.continuous_derivatives < self.derivatives:
+            raise ValueError(
+                f"feedforward {self._config.kind} takes {self.derivatives} derivatives of its path, of which "
+                f"{path.continuous_derivatives} are continuous: choose reference.timing=polynomial, "
+                "servo.feedforward.prefilter.kind=bessel, or servo.feedforward.rough_path=accept"
+            )
+
     def drive(self, reference: JointReference, memory: np.ndarray) -> Drive:
-        """What the motors shall do; the memory is the model's, of the last tick, NaN at the first one."""
+        """What the motors shall do, a sub-step after the last call; the memory is that of `drive_under`."""
         return self.drive_under(reference, self.link_load(reference), memory)
 
     def drive_under(self, reference: JointReference, load: np.ndarray, memory: np.ndarray) -> Drive:
@@ -154,14 +191,13 @@ class Feedforward(LeafSystem):
         Args:
             reference: of the links.
             load: torques in N m that move the links so, without rotors and friction, shape (6,).
-            memory: of the last tick, NaN at the first one.
+            memory: the model's own, of the last sub-step, NaN at the first one.
         """
         raise NotImplementedError
 
     def _tick(self, context: Context, discrete_state: DiscreteValues) -> None:
         last = context.get_discrete_state(self._last).value()
-        is_first = np.isnan(last[0])
-        if is_first:
+        if np.isnan(last[0]):
             last = self._joints.Eval(context).position
         try:
             q = self._link_positions(self._X_WD.Eval(context), last)
@@ -170,21 +206,15 @@ class Feedforward(LeafSystem):
                 discrete_state.set_value(index, value)
             discrete_state.set_value(int(self._memory), self.fresh_memory())
             return
-        if self._filter is None:
-            reference = self._exact_reference(context, q)
-        else:
-            state = context.get_discrete_state(self._filtered).value().reshape(-1, NUM_JOINTS)
-            state = self._filter.at_rest(q) if is_first else self._filter.step(state, last, q)
-            reference = self._filtered_reference(state, q)
-            discrete_state.set_value(int(self._filtered), state.ravel())
+        reference = self._joint_reference(context, q)
         answer = self.answer(reference, context.get_discrete_state(self._memory).value())
-        position_offset, velocity_offset = answer.position_offset, answer.velocity_offset
-        if self._filter is not None:
-            position_offset = position_offset + reference.position - q
-            velocity_offset = (
-                velocity_offset + reference.velocity - self._velocity(q, self._V_WD.Eval(context))
-            )
-        outputs = (answer.position, answer.velocity, answer.torque, position_offset, velocity_offset)
+        outputs = (
+            answer.position,
+            answer.velocity,
+            answer.torque,
+            answer.position_offset,
+            answer.velocity_offset,
+        )
         for index, value in enumerate(outputs):
             discrete_state.set_value(index, value)
         discrete_state.set_value(int(self._last), q)
@@ -194,10 +224,7 @@ class Feedforward(LeafSystem):
         q = self._inverse.nearest(X_WD.GetAsMatrix34(), last)
         return q if self._sag is None else self._sag.link_positions(q)
 
-    def _velocity(self, q: np.ndarray, V_WD: np.ndarray) -> np.ndarray:
-        return robust_solve(self._kinematics.jacobian(q), V_WD)
-
-    def _exact_reference(self, context: Context, q: np.ndarray) -> JointReference:
+    def _joint_reference(self, context: Context, q: np.ndarray) -> JointReference:
         """Two derivatives of the path in joint positions, from its twist and acceleration."""
         J = self._kinematics.jacobian(q)
         velocity = robust_solve(J, self._V_WD.Eval(context))
@@ -205,10 +232,16 @@ class Feedforward(LeafSystem):
         acceleration = robust_solve(J, self._A_WD.Eval(context) - change)
         return JointReference(q, velocity, acceleration)
 
-    def _filtered_reference(self, state: np.ndarray, q: np.ndarray) -> JointReference:
-        assert self._filter is not None
-        acceleration = state[2] if len(state) > 2 else self._filter.highest_derivative(state, q)
-        return JointReference(state[0], state[1], acceleration)
+    @staticmethod
+    def _filtered(
+        prefilter: Prefilter, position: np.ndarray, memory: np.ndarray
+    ) -> tuple[JointReference, np.ndarray]:
+        """The smooth reference a sub-step later; the memory holds the last input and the states."""
+        before, state = memory[:NUM_JOINTS], memory[NUM_JOINTS:].reshape(-1, NUM_JOINTS)
+        is_first = np.isnan(before[0])
+        state = prefilter.at_rest(position) if is_first else prefilter.step(state, before, position)
+        acceleration = state[2] if len(state) > 2 else prefilter.highest_derivative(state, position)
+        return JointReference(state[0], state[1], acceleration), np.concatenate([position, state.ravel()])
 
     def _known_sag(self, reference: JointReference) -> tuple[np.ndarray, np.ndarray]:
         """The deflection under gravity and its rate that are in the law's commands already, (6,) each."""

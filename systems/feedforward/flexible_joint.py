@@ -23,8 +23,8 @@ class FlexibleJointFeedforward(Feedforward):
     Where the robot's drive trains have further parts, their play, hysteresis, uneven ratio and losses are
     inverted, and a motor that lags gets what its torque will change by ahead of time.
 
-    The memory holds the load of the last tick and the deflections of the last three; with further parts also
-    the torque of the last tick and what `GearParts` remembers.
+    The memory holds the load of the last sub-step and the deflections of the last three; with further parts
+    also the torque of the last one and what `GearParts` remembers.
     """
 
     title = "flexible joint"
@@ -46,9 +46,9 @@ class FlexibleJointFeedforward(Feedforward):
         springs = model.robot.stiffening_gears
         if springs is not None:
             springs = springs.scaled(1.0 + config.stiffness_error)
-        self._gears = SprungDeflection(self._stiffness, self._damping, model.period, springs)
+        self._gears = SprungDeflection(self._stiffness, self._damping, self.substep, springs)
         self._gear_parts = GearParts(trains, self._gears) if trains else None
-        self._differences = BackwardDifferences(model.period)
+        self._differences = BackwardDifferences(self.substep)
 
     def drive_under(self, reference: JointReference, load: np.ndarray, memory: np.ndarray) -> Drive:
         """Motors that turn ahead by what the load deflects."""
@@ -82,6 +82,6 @@ class FlexibleJointFeedforward(Feedforward):
         torque = self.motor_torque(reference.velocity - rate, reference.acceleration - acceleration, load)
         told = torque
         if not is_first and self._trains is not None:
-            told = torque + self._trains.motor_lag / self._period * (torque - last_torque)
+            told = torque + self._trains.motor_lag / self.substep * (torque - last_torque)
         history = with_newest(deflection, history)
         return Drive(deflection, rate, told, np.concatenate([load, history.ravel(), torque, of_parts]))

@@ -1,7 +1,8 @@
 """Paths of the tool in the world: their geometry, their timing, and the configuration they are made from.
 
-A path is a row of segments. Along each of them a parameter s runs with the sin^2 acceleration profile
-from rest to rest: over one straight line from way point to way point, or over the turns of a closed curve.
+A path is a row of segments. Along each of them a parameter s runs from rest to rest with a profile of
+`systems.reference.timing`: over one straight line from way point to way point, or over the turns of a closed
+curve.
 """
 
 import math
@@ -11,10 +12,11 @@ from typing import overload
 
 import numpy as np
 
-from robots.configuration.quantity import quantity
+from robots.configuration.quantity import choice, quantity
 from robots.pose import rotation_vector
 from systems.reference.segment import Segment, weights
 from systems.reference.shapes import Rectangle, Shape
+from systems.reference.timing import TIMINGS, Profile
 
 _CLOSED = 1e-9  # m and rad, the ends of a path that is closed are that near to each other
 
@@ -26,53 +28,13 @@ class ReferenceConfig:
     path: Shape = field(default_factory=Rectangle)
     # k_a, peak acceleration in segments (or turns) per s^2
     acceleration: float = quantity(0.7, 1e-3, 100.0, "1/s^2")
+    # sine_squared has three continuous derivatives, polynomial five, as an elastic structure needs them
+    timing: str = choice("sine_squared", tuple(TIMINGS))
     settle: float = quantity(0.0, 0.0, 600.0, "s")  # at the start pose before the path begins
     dwell: float = quantity(2.0, 0.0, 600.0, "s")  # at rest at the end; with "points" at every point
     # How often the path is run, one after the other; more than once it must be closed
     laps: int = quantity(1, 1, 10000)
     preview: float = quantity(0.0, 0.0, 1.0, "s")  # that the preview ports of the Reference look ahead
-
-
-class SineSquaredProfile:
-    """s(t) from 0 to ``length``, rest to rest, with two sin^2 humps of acceleration, Probst (2024) eq. (5.2).
-
-    Each hump lasts T = sqrt(2 length / k_a); the speed peaks between them at sqrt(k_a length / 2).
-    """
-
-    def __init__(self, acceleration: float, length: float = 1.0) -> None:
-        self.length = length
-        self.hump = math.sqrt(2.0 * length / acceleration)  # s
-        self.duration = 2.0 * self.hump  # s
-        self._acceleration = acceleration
-        self._frequency = math.pi / self.hump  # rad/s
-
-    def at(self, t: float) -> tuple[float, float, float]:
-        """s, ds/dt and d2s/dt2, t seconds after the start; at rest before the start and after the end."""
-        if t <= 0.0:
-            return 0.0, 0.0, 0.0
-        if t >= self.duration:
-            return self.length, 0.0, 0.0
-        if t <= self.hump:
-            u = self._frequency * t
-            return self._first_hump(t, math.sin(u), math.cos(u))
-        t = self.duration - t
-        u = self._frequency * t
-        s, rate, acceleration = self._first_hump(t, math.sin(u), math.cos(u))
-        return self.length - s, rate, -acceleration
-
-    def at_times(self, t: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """The same for an array of times of any shape."""
-        t = np.clip(t, 0.0, self.duration)
-        second = t > self.hump
-        t = np.where(second, self.duration - t, t)
-        u = self._frequency * t
-        s, rate, acceleration = self._first_hump(t, np.sin(u), np.cos(u))
-        return np.where(second, self.length - s, s), rate, np.where(second, -acceleration, acceleration)
-
-    def _first_hump(self, t, sine, cosine):
-        """Eq. (5.2) and its two integrals up to t <= T; the second hump is its mirror image in time."""
-        half, q = 0.5 * self._acceleration, sine / self._frequency
-        return 0.5 * half * (t * t - q * q), half * (t - q * cosine), 2.0 * half * sine * sine
 
 
 class CartesianPath:
@@ -83,12 +45,13 @@ class CartesianPath:
         lap_starts: s, shape (laps,), each lap begins; the first one with the path.
         dwell_start: s, the last pose is reached.
         duration: s, the path is over: settling, motion and dwell.
+        continuous_derivatives: how many time derivatives of the pose do not jump anywhere.
     """
 
     def __init__(
         self,
         segments: list[Segment],
-        profile: SineSquaredProfile,
+        profile: Profile,
         settle: float,
         dwell: float,
         hold: float,
@@ -110,6 +73,7 @@ class CartesianPath:
         self._starts = [settle + hold + i * (profile.duration + hold) for i in range(len(segments))]
         self.dwell_start = self._starts[-1] + profile.duration
         self.duration = self.dwell_start + dwell
+        self.continuous_derivatives = profile.continuous_derivatives  # segments are analytic in s
         self._profile = profile
         self._segments = segments
         self._start_times = np.array(self._starts)
@@ -158,8 +122,8 @@ class CartesianPath:
 def make_path(config: ReferenceConfig) -> CartesianPath:
     """The path that a configuration describes.
 
-    Straight lines take 2 sqrt(2 / k_a) each. A circle or a figure eight of n turns is one motion from rest to
-    rest, s counting turns, so that it takes 2 sqrt(2 n / k_a).
+    Straight lines take 2 sqrt(2 / k_a) each, a fifth more with the polynomial. A circle or a figure eight of
+    n turns is one motion from rest to rest, s counting turns, so that it takes sqrt(n) times as long.
 
     Raises:
         ValueError: if the configuration names no path or an impossible one.
@@ -171,9 +135,11 @@ def make_path(config: ReferenceConfig) -> CartesianPath:
             raise ValueError(f"reference: {name} must be finite and not negative, got {value} s")
     if not 1 <= config.laps < math.inf or config.laps != int(config.laps):
         raise ValueError(f"reference: laps must be a whole number from 1 on, got {config.laps}")
+    if config.timing not in TIMINGS:
+        raise ValueError(f"reference: timing must be one of {', '.join(TIMINGS)}, got '{config.timing}'")
     shape = config.path
     segments = shape.segments()
-    profile = SineSquaredProfile(config.acceleration, shape.length)
+    profile = TIMINGS[config.timing](config.acceleration, shape.length)
     hold = config.dwell if shape.rests else 0.0
     path = CartesianPath(segments, profile, config.settle, config.dwell, hold, config.laps)
     if config.laps > 1:

@@ -21,6 +21,7 @@ SETTINGS = [
     "station.payload=7",
     "initial_error_mm=[0, 0, 0]",
     "reference.preview=0.004",
+    "reference.timing=polynomial",
     "reference.settle=0.3",
     "reference.dwell=1.0",
     "station.camera.position_sigma=0",
@@ -53,7 +54,7 @@ CIRCLE = ["reference.path=circle", "reference.acceleration=2", "reference.dwell=
 
 
 def largest_gap_mm(*settings: str, robot: RobotModel | None = None) -> float:
-    """Between the true tip and a circle of 100 mm in 2 s, without a camera, once the arm is wound up."""
+    """Between the true tip and a circle of 100 mm in 2.4 s, without a camera, once the arm is wound up."""
     scenario = load_scenario("nominal", [*SETTINGS, *CIRCLE, *STRUCTURE, "reference.settle=0.6", *settings])
     log = run(scenario, "open_loop", robot)
     gap = np.linalg.norm(log.X_WE_true[:, :3, 3] - log.X_WE_desired[:, :3, 3], axis=1)
@@ -160,5 +161,5 @@ def test_gears_that_stiffen_under_load_are_followed_like_linear_ones(tmp_path: P
     settings = [f"robot={path}", "servo.feedforward.kind=flexible_joint", "station.elasticity=joints"]
     linear = load_robot("irb1200")
     linear.calibration.of = path  # what the controller takes the robot for
-    assert largest_gap_mm(*settings) < 0.005
+    assert largest_gap_mm(*settings) < 0.008
     assert largest_gap_mm(*settings, robot=linear) > 0.03

@@ -64,7 +64,8 @@ def test_a_motor_that_lags_is_told_ahead_what_its_torque_will_change_by():
         for each in (robot, lagging)
     )
     memories, torques = [plain.fresh_memory(), ahead.fresh_memory()], []
-    for t in np.arange(0.0, 0.4, 4e-3):
+    step = plain.substep
+    for t in np.arange(0.0, 0.4, step):
         turn = 0.2 * np.sin(4.0 * t) ** 3 * np.ones(6)
         rate = 2.4 * np.sin(4.0 * t) ** 2 * np.cos(4.0 * t) * np.ones(6)
         acceleration = (19.2 * np.sin(4 * t) * np.cos(4 * t) ** 2 - 9.6 * np.sin(4 * t) ** 3) * np.ones(6)
@@ -75,7 +76,7 @@ def test_a_motor_that_lags_is_told_ahead_what_its_torque_will_change_by():
         memories = [np.concatenate([np.zeros(6), drive.memory]) for drive in drives]
         torques.append([drive.torque for drive in drives])
     told = np.array(torques)[10:]
-    expected = told[1:, 0] + 3e-3 / 4e-3 * np.diff(told[:, 0], axis=0)
+    expected = told[1:, 0] + 3e-3 / step * np.diff(told[:, 0], axis=0)
     np.testing.assert_allclose(told[1:, 1], expected, rtol=1e-6, atol=1e-6 * abs(expected).max())
 
 

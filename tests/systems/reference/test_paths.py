@@ -10,13 +10,10 @@ from pydrake.common.yaml import yaml_load_typed
 from scipy.integrate import cumulative_simpson
 
 from robots.pose import pose_error, rotation_from_zyx
-from systems.reference.paths import (
-    ReferenceConfig,
-    SineSquaredProfile,
-    make_path,
-)
+from systems.reference.paths import ReferenceConfig, make_path
 from systems.reference.segment import line
 from systems.reference.shapes import Circle, FigureEight, Points, Rectangle, Waypoint, rectangle_waypoints
+from systems.reference.timing import SineSquaredProfile
 
 TILTED = np.array([30.0, 40.0, 50.0])
 SHAPES = {
@@ -24,6 +21,7 @@ SHAPES = {
     "points": ReferenceConfig(Points(), dwell=0.5),
     "circle": ReferenceConfig(Circle(plane_zyx_deg=TILTED, turns=2)),
     "figure_eight": ReferenceConfig(FigureEight(plane_zyx_deg=TILTED)),
+    "smooth rectangle": ReferenceConfig(timing="polynomial"),
 }
 every_shape = pytest.mark.parametrize("config", SHAPES.values(), ids=SHAPES.keys())
 fractions = st.floats(0.0, 1.0)
@@ -33,27 +31,6 @@ angles = st.lists(st.floats(-math.pi, math.pi), min_size=3, max_size=3)
 def inside(path, fraction: float) -> float:
     """A time between a little before the path and a little after it."""
     return -0.1 + fraction * (path.duration + 0.2)
-
-
-@given(acceleration=st.floats(0.01, 100.0), length=st.sampled_from([1.0, 2.0, 5.0]))
-def test_two_integrals_of_the_acceleration_reach_the_length(acceleration: float, length: float):
-    profile = SineSquaredProfile(acceleration, length)
-    t = np.linspace(0.0, profile.duration, 2001)
-    s, rate, dd = profile.at_times(t)
-    speed = cumulative_simpson(dd, x=t, initial=0)
-    # Simpson's rule with 2000 intervals: about 1e-12 of the largest value on each integral, with a margin.
-    np.testing.assert_allclose(rate, speed, atol=1e-9 * rate.max())
-    np.testing.assert_allclose(s, cumulative_simpson(speed, x=t, initial=0), atol=1e-9 * length)
-    assert profile.at(np.nextafter(profile.duration, 0.0))[0] == pytest.approx(length, rel=1e-14)
-
-
-def test_the_profile_lasts_and_peaks_as_its_acceleration_says():
-    profile = SineSquaredProfile(0.7)
-    assert profile.duration == pytest.approx(2.0 * math.sqrt(2.0 / 0.7))
-    quarter, half = profile.duration / 4.0, profile.duration / 2.0
-    assert profile.at(quarter)[2] == pytest.approx(0.7)
-    assert profile.at(half) == pytest.approx((0.5, math.sqrt(0.7 / 2.0), 0.0))
-    assert profile.at(3.0 * quarter)[2] == pytest.approx(-0.7)
 
 
 @every_shape
