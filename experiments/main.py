@@ -16,6 +16,7 @@ from diagrams.scenario.scenario import Scenario, load_scenario, shipped_scenario
 from experiments.calibration.calibrate_command import calibrate_command
 from experiments.calibration.design_command import design_command
 from experiments.cameras.command import cameras_app
+from experiments.cli.cluster import executor
 from experiments.cli.console import (
     count,
     print_list,
@@ -35,6 +36,7 @@ from experiments.cli.options import (
     OutOption,
     RobotOption,
     ScenarioOption,
+    SchedulerOption,
     SetOption,
     StationOption,
     WithCellOption,
@@ -44,7 +46,6 @@ from experiments.cli.options import (
 from experiments.cli.prepare import Prepared, check, prepare
 from experiments.cli.staging import staged_file, staged_folder
 from experiments.cli.tables import print_summary
-from experiments.cli.workers import usable_cores
 from experiments.comparison.compare import compare, compared_laws, named_laws, simulating
 from experiments.comparison.results import RESULTS, write_results
 from experiments.compensate.command import compensate_command
@@ -61,6 +62,7 @@ from experiments.robustness.command import robustness_command
 from experiments.station.cell_command import cell_command
 from experiments.station.guided_command import ask_before_moving, guide, on_station
 from experiments.station.latency_command import latency_command
+from experiments.study.command import study_command
 from experiments.zeros.command import zeros_command
 from robots.configuration.described import described
 from systems.servo import LAWS
@@ -140,6 +142,7 @@ def compare_command(
     ] = 3,
     laps: LapsOption = None,
     jobs: JobsOption = None,
+    scheduler: SchedulerOption = None,
 ) -> None:
     """Run several laws on one scenario, by default the open loop and three others, and compare them."""
     human = human_console(json_file)
@@ -152,6 +155,7 @@ def compare_command(
         name, changes = on_station(scenario, changes, station, with_cell)
         prepared = prepare(name, changes, robot, is_quick)
         check(prepared, chosen)
+        where = executor(scheduler, jobs)
         print_note(human, prepared.note)
         is_guided = prepared.scenario.station.kind == "egm"
         if is_guided:
@@ -162,10 +166,9 @@ def compare_command(
         if is_guided:
             logs = guide(human, (stage, out), prepared, chosen, cycles, with_cell)
         else:
-            processes = min(jobs or usable_cores(), cycles * len(chosen))
-            runs = count(cycles * len(chosen), "run")
-            with progress_bar(f"{runs} in {count(processes, 'process', 'processes')}") as progress:
-                logs = compare(prepared.scenario, prepared.robot, chosen, cycles, processes, progress)
+            runs = cycles * len(chosen)
+            with progress_bar(f"{count(runs, 'run')} {where.place(runs)}") as progress:
+                logs = compare(prepared.scenario, prepared.robot, chosen, cycles, where, progress)
         result = _write(human, stage, prepared, logs)
         output.write(with_timing(result, timing(logs)))
     _conclude(human, result, out)
@@ -261,6 +264,7 @@ app.command("calibrate")(calibrate_command)
 app.command("compensate")(compensate_command)
 app.command("drivetrain")(drivetrain_command)
 app.command("robustness")(robustness_command)
+app.command("study")(study_command)
 app.command("frame")(frame_command)
 app.command("chain")(chain_command)
 app.command("tool")(tool_command)

@@ -19,10 +19,11 @@ from experiments.cameras.laws import study_laws
 from experiments.cameras.report import print_study, write_study_page
 from experiments.cameras.study import CamerasStudy, covariances, study_json, study_setup
 from experiments.cameras.sweeps import study_sweeps
+from experiments.cli.cluster import executor
 from experiments.cli.console import print_files, progress_bar, refusing
 from experiments.cli.json_output import human_console, json_output
 from experiments.cli.option_limits import at_least, positive
-from experiments.cli.options import JobsOption, JsonOption, ScenarioOption, SetOption
+from experiments.cli.options import JobsOption, JsonOption, ScenarioOption, SchedulerOption, SetOption
 from experiments.cli.prepare import prepare
 from experiments.cli.staging import PAGE, TABLE, YAML, staged_file
 from experiments.report.files import write_text
@@ -128,6 +129,7 @@ def study_cameras_command(
         bool, typer.Option("--without-laws", help="Geometry and images only; a few seconds.")
     ] = False,
     jobs: JobsOption = None,
+    scheduler: SchedulerOption = None,
     out: Annotated[Path, typer.Option(metavar="FILE.html", help="The report.")] = Path("out/study.html"),
     json_file: JsonOption = None,
 ) -> None:
@@ -139,13 +141,14 @@ def study_cameras_command(
         page = stack.enter_context(staged_file(out, *PAGE))
         stack.enter_context(output.staged())
         setup = study_setup(prepared)
+        where = executor(scheduler, jobs)
         covariance_on_path, covariance_in_workspace = covariances(setup)
         with progress_bar("Geometry and images") as progress:
-            sweeps = study_sweeps(setup, jobs, progress)
+            sweeps = study_sweeps(setup, where, progress)
         laws = []
         if not without_laws:
             with progress_bar("Servo laws") as progress:
-                laws = study_laws(scenario, settings or [], is_quick, jobs, progress)
+                laws = study_laws(scenario, settings or [], is_quick, where, progress)
         study = CamerasStudy(setup, covariance_on_path, covariance_in_workspace, sweeps, laws)
         write_study_page(page, prepared.title, study)
         output.write(study_json(study))

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from experiments.cli.prepare import prepare
-from experiments.cli.workers import Progress, in_processes
+from experiments.cli.workers import Executor, Progress, in_order
 from experiments.comparison.compare import RunJob, compared_laws, run_job
 from experiments.metrics.run_metrics import error_metrics
 from systems.cell.cameras import CAMERAS
@@ -29,7 +29,7 @@ def study_laws(
     scenario: str,
     settings: Sequence[str],
     is_quick: bool,
-    processes: int | None,
+    executor: Executor,
     progress: Progress | None = None,
 ) -> list[LawResult]:
     """The laws with each camera, and the first law with fewer frames.
@@ -44,7 +44,7 @@ def study_laws(
     runs = [(law, camera, rate) for camera in reversed(CAMERAS) for law in laws]
     runs += [(laws[0], "features", each) for each in FRAME_RATES if abs(each - rate) > 1e-6]
     jobs = [_law_job(scenario, settings, is_quick, *each) for each in runs]
-    logs = in_processes(run_job, jobs, processes, progress)
+    logs = in_order(executor, run_job, jobs, progress)
     results = [
         LawResult(law, camera, each, error_metrics(log, "true"))
         for (law, camera, each), log in zip(runs, logs, strict=True)

@@ -20,7 +20,7 @@ from experiments.cameras.accuracy import (
     pose_covariance,
 )
 from experiments.cameras.variations import best_subsets, ring, with_markers, with_resolution, with_size
-from experiments.cli.workers import Progress, in_processes
+from experiments.cli.workers import Executor, Progress, in_order
 from robots.description.model import RobotModel
 from systems.cell.imaging.images import ImageConfig
 from systems.vision.camera_model import Cameras
@@ -77,11 +77,11 @@ class _Job:
 
 
 def study_sweeps(
-    setup: SweepSetup, processes: int | None, progress: Progress | None = None
+    setup: SweepSetup, executor: Executor, progress: Progress | None = None
 ) -> dict[str, list[SweepPoint]]:
     """All sweeps, by the names of `SWEEPS`."""
     jobs = [_Job(setup, name, value) for name, sweep in SWEEPS.items() for value in sweep.values]
-    points = in_processes(_study, jobs, processes, progress)
+    points = in_order(executor, _study, jobs, progress)
     found: dict[str, list[SweepPoint]] = {name: [] for name in SWEEPS}
     for job, point in zip(jobs, points, strict=True):
         if all(point.value != other.value for other in found[job.sweep]):  # there are no more than there are

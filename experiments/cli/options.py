@@ -93,6 +93,15 @@ JobsOption = Annotated[
     int | None,
     typer.Option("--jobs", metavar="N", help="Number of parallel processes.", show_default="one per core"),
 ]
+SchedulerOption = Annotated[
+    str | None,
+    typer.Option(
+        "--scheduler",
+        metavar="ADDRESS",
+        help="A Dask scheduler whose workers do the runs, for example tcp://host:8786.",
+        show_default="processes of this machine",
+    ),
+]
 OutOption = Annotated[Path, typer.Option("--out", metavar="DIR", help="Folder of the results.")]
 PictureOption = Annotated[Path, typer.Option(metavar="FILE.html", help="The picture.")]  # --out or --report
 

@@ -1,16 +1,18 @@
-"""Distributes work over processes, with progress and a clean end on Ctrl-C."""
+"""Distributes work over the processes of this machine, with progress and a clean end on Ctrl-C."""
 
 import multiprocessing
 import os
 import signal
 import threading
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Generator, Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
 from concurrent.futures.process import BrokenProcessPool
-from contextlib import contextmanager
-from typing import Any, TypeVar
+from contextlib import closing, contextmanager
+from dataclasses import dataclass
+from typing import Any, Protocol, TypeVar
 
 _POLL = 0.1  # s between two looks at the progress
+_AHEAD = 4  # jobs per process that wait in its queue: enough that none is idle, few enough to hold in memory
 _ONE_THREAD = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "OPENCV_FOR_THREADS_NUM")
 
 Job = TypeVar("Job")
@@ -22,61 +24,112 @@ class SimulationError(RuntimeError):
     """A run was aborted, for example because the integrator failed."""
 
 
+class Executor(Protocol):
+    """Does jobs somewhere: in processes of this machine, or on a cluster."""
+
+    def place(self, jobs: int) -> str:
+        """Where that many jobs would be done, for people: "in 2 processes"."""
+        ...
+
+    def completed(
+        self,
+        work: Callable[[Job, Progress], Result],
+        jobs: Sequence[Job],
+        progress: Progress | None = None,
+    ) -> Generator[tuple[int, Result], None, None]:
+        """Does all jobs and gives number and result of each as soon as it is done.
+
+        Close it (`contextlib.closing`) where not all results are taken.
+
+        Args:
+            work: what to do with a job; a function of a module, for it is sent to other processes. It is
+                given a function to call now and then with the share that is done.
+            jobs: they travel to other processes too; the first ones are begun first.
+            progress: is called now and then with the share of everything that is done, 0 to 1.
+
+        Raises:
+            SimulationError: if what does the jobs is lost; also whatever a job raises.
+            KeyboardInterrupt: if the user stopped it; no process is left behind.
+        """
+        ...
+
+
+@dataclass(frozen=True)
+class LocalProcesses:
+    """An `Executor` of processes of this machine; ``count`` None for one per core."""
+
+    count: int | None = None
+
+    def place(self, jobs: int) -> str:
+        """See `Executor`."""
+        processes = self._processes(jobs)
+        return f"in {processes} process{'es' if processes > 1 else ''}"
+
+    def completed(
+        self,
+        work: Callable[[Job, Progress], Result],
+        jobs: Sequence[Job],
+        progress: Progress | None = None,
+    ) -> Generator[tuple[int, Result], None, None]:
+        """See `Executor`."""
+        processes = self._processes(len(jobs))
+        # Spawned processes load numpy anew, so the settings of the environment reach them.
+        context = multiprocessing.get_context("spawn")
+        shares = context.Array("d", len(jobs), lock=False)
+        stop = context.Event()
+        with _environment(dict.fromkeys(_ONE_THREAD, "1")):
+            pool = ProcessPoolExecutor(processes, context, _start_worker, (shares, stop))
+            waiting: dict[Future[Result], int] = {}
+            upcoming = iter(enumerate(jobs))
+            try:
+                while True:
+                    with _sigint_ignored():
+                        while len(waiting) < _AHEAD * processes and (job := next(upcoming, None)):
+                            waiting[pool.submit(_do, work, *job)] = job[0]
+                    if not waiting:
+                        return
+                    done, _ = wait(waiting, timeout=_POLL, return_when=FIRST_COMPLETED)
+                    for future in done:
+                        yield waiting.pop(future), future.result()
+                    if progress:
+                        progress(sum(shares) / len(shares))
+            except BrokenProcessPool as error:
+                raise SimulationError(
+                    "a worker process was ended from outside, or ran out of memory"
+                ) from error
+            finally:
+                stop.set()
+                pool.shutdown(wait=True, cancel_futures=True)
+
+    def _processes(self, jobs: int) -> int:
+        return max(1, min(self.count or usable_cores(), jobs))
+
+
+def in_order(
+    executor: Executor,
+    work: Callable[[Job, Progress], Result],
+    jobs: Sequence[Job],
+    progress: Progress | None = None,
+) -> list[Result]:
+    """The results of all jobs in the order of the jobs; see `Executor.completed`."""
+    with closing(executor.completed(work, jobs, progress)) as completed:
+        results = dict(completed)
+    return [results[number] for number in range(len(jobs))]
+
+
 def in_processes(
     work: Callable[[Job, Progress], Result],
     jobs: Sequence[Job],
     processes: int | None = None,
     progress: Progress | None = None,
 ) -> list[Result]:
-    """Does all jobs, the first ones first.
-
-    Args:
-        work: what to do with a job; a function of a module, for it is sent to other processes. It is given a
-            function to call now and then with the share that is done.
-        jobs: at least one; they travel to other processes too.
-        processes: how many work at a time; None for one per core.
-        progress: is called now and then with the share of everything that is done, 0 to 1.
-
-    Returns:
-        The results in the order of the jobs.
-
-    Raises:
-        SimulationError: if a process was ended from outside; also whatever a job raises.
-        KeyboardInterrupt: if the user stopped it; no process is left behind.
-    """
-    processes = min(processes or usable_cores(), len(jobs))
-    # Spawned processes load numpy anew, so the settings of the environment reach them.
-    context = multiprocessing.get_context("spawn")
-    shares = context.Array("d", len(jobs), lock=False)
-    stop = context.Event()
-    with _environment(dict.fromkeys(_ONE_THREAD, "1")):
-        pool = ProcessPoolExecutor(processes, context, _start_worker, (shares, stop))
-        try:
-            with _sigint_ignored():
-                futures = [pool.submit(_do, work, number, job) for number, job in enumerate(jobs)]
-            _watch(futures, shares, progress)
-            return [future.result() for future in futures]
-        except BrokenProcessPool as error:
-            raise SimulationError("a worker process was ended from outside, or ran out of memory") from error
-        finally:
-            stop.set()
-            pool.shutdown(wait=True, cancel_futures=True)
+    """The same in processes of this machine, one per core unless their number is given."""
+    return in_order(LocalProcesses(processes), work, jobs, progress)
 
 
 def usable_cores() -> int:
     """The number of cores that this process may use."""
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
-
-
-def _watch(futures: Sequence[Future], shares: Any, progress: Progress | None) -> None:
-    """Waits for all jobs, or for the first that fails."""
-    waiting = set(futures)
-    while waiting:
-        done, waiting = wait(waiting, timeout=_POLL, return_when=FIRST_COMPLETED)
-        for future in done:
-            future.result()
-        if progress:
-            progress(sum(shares) / len(shares))
 
 
 @contextmanager

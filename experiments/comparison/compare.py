@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from diagrams.record.log import RunLog
 from diagrams.runs.simulation import run
 from diagrams.scenario.scenario import Scenario
-from experiments.cli.workers import Progress, SimulationError, in_processes
+from experiments.cli.workers import Executor, LocalProcesses, Progress, SimulationError, in_order
 from robots.description.model import RobotModel
 from systems.servo import LAWS
 from systems.servo.contract import law_traits
@@ -28,19 +28,19 @@ def compare(
     robot: RobotModel,
     laws: Sequence[str],
     cycles: int = 1,
-    processes: int | None = None,
+    executor: Executor | None = None,
     progress: Callable[[float], None] | None = None,
 ) -> dict[str, list[RunLog]]:
     """Runs every law ``cycles`` times, with the scenario's seed and the ones after it.
 
-    The result does not depend on the number of processes.
+    The result does not depend on where they run.
 
     Args:
         scenario: what to do.
         robot: the robot as the controller knows it.
         laws: which laws, in the order of the result.
         cycles: runs of each law, at least 1.
-        processes: how many run at a time; None for one per core.
+        executor: where they run; by default in one process per core.
         progress: is called now and then with the share that is done, 0 to 1.
 
     Returns:
@@ -55,7 +55,7 @@ def compare(
         for law in sorted(laws, key=_is_quick)
         for cycle in range(cycles)
     ]
-    results = in_processes(run_job, jobs, processes, progress)
+    results = in_order(executor or LocalProcesses(), run_job, jobs, progress)
     logs = {(job.law, job.seed): log for job, log in zip(jobs, results, strict=True)}
     return {law: [logs[law, scenario.seed + cycle] for cycle in range(cycles)] for law in laws}
 

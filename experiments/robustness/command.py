@@ -10,11 +10,11 @@ from rich.markup import escape
 from rich.table import Table
 
 from diagrams.scenario.scenario import load_scenario
+from experiments.cli.cluster import executor
 from experiments.cli.console import count, progress_bar, refusing
 from experiments.cli.json_output import human_console, json_output
 from experiments.cli.option_limits import at_least
-from experiments.cli.options import JobsOption, JsonOption, SetOption
-from experiments.cli.workers import usable_cores
+from experiments.cli.options import JobsOption, JsonOption, SchedulerOption, SetOption
 from experiments.comparison.compare import named_laws
 from experiments.report.style import law_title
 from experiments.robustness.cases import CASES
@@ -42,6 +42,7 @@ def robustness_command(
     laps: Annotated[int, typer.Option(metavar="N", help="Laps of the path in each run.")] = 1,
     settings: SetOption = None,
     jobs: JobsOption = None,
+    scheduler: SchedulerOption = None,
     json_file: JsonOption = None,
 ) -> None:
     """Run laws on random robots and print the worst and the median error."""
@@ -56,15 +57,13 @@ def robustness_command(
         for trial in todo:
             if trial.seed == first_seed:  # what cannot run is refused before anything does
                 make_path(load_scenario(scenario, trial.settings).reference)
-        processes = min(jobs or usable_cores(), len(todo))
+        where = executor(scheduler, jobs)
         with (
             json_output(json_file) as output,
             output.staged(),
-            progress_bar(
-                f"{count(len(todo), 'run')} in {count(processes, 'process', 'processes')}"
-            ) as progress,
+            progress_bar(f"{count(len(todo), 'run')} {where.place(len(todo))}") as progress,
         ):
-            rows = run_trials(todo, processes, progress)
+            rows = run_trials(todo, where, progress)
             results = [
                 {"case": case.name, "law": law, **judged(matching)}
                 for case in chosen

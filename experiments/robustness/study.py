@@ -8,7 +8,7 @@ import numpy as np
 
 from diagrams.runs.simulation import run
 from diagrams.scenario.scenario import load_scenario
-from experiments.cli.workers import Progress, in_processes
+from experiments.cli.workers import Executor, LocalProcesses, Progress, in_order
 from experiments.comparison.compare import simulating
 from experiments.metrics.laps import lap_metrics
 from experiments.metrics.run_metrics import error_metrics, pose_errors
@@ -65,15 +65,17 @@ def trials(
 
 
 def run_trials(
-    todo: Sequence[Trial], processes: int | None = None, progress: Callable[[float], None] | None = None
+    todo: Sequence[Trial],
+    executor: Executor | None = None,
+    progress: Callable[[float], None] | None = None,
 ) -> list[dict[str, Any]]:
-    """Runs them on as many processes as there are cores; rows in the order of the trials.
+    """Runs them, by default in one process per core; rows in the order of the trials.
 
     Raises:
         ValueError: if a scenario is refused.
         SimulationError: if a process was ended from outside.
     """
-    return in_processes(run_trial, todo, processes, progress)
+    return in_order(executor or LocalProcesses(), run_trial, todo, progress)
 
 
 def run_trial(trial: Trial, progress: Progress) -> dict[str, Any]:

@@ -10,7 +10,7 @@ import pytest
 from diagrams.runs.simulation import run
 from diagrams.scenario.scenario import load_scenario
 from experiments.cli.prepare import quick
-from experiments.cli.workers import SimulationError
+from experiments.cli.workers import LocalProcesses, SimulationError
 from experiments.comparison.compare import compare
 from robots.description.model import load_robot
 from tests.experiments.commands import SHORT
@@ -31,7 +31,12 @@ def scenario():
 def test_a_cycle_is_a_run_with_its_own_seed_bit_for_bit(scenario):
     robot, shares, environment = load_robot("irb1200"), [], dict(os.environ)
     logs = compare(
-        scenario, robot, ["numerical_ik", "open_loop"], cycles=2, processes=2, progress=shares.append
+        scenario,
+        robot,
+        ["numerical_ik", "open_loop"],
+        cycles=2,
+        executor=LocalProcesses(2),
+        progress=shares.append,
     )
     assert list(logs) == ["numerical_ik", "open_loop"]
     for cycle, log in enumerate(logs["numerical_ik"]):
@@ -46,7 +51,7 @@ def test_a_cycle_is_a_run_with_its_own_seed_bit_for_bit(scenario):
 def test_a_run_that_breaks_off_ends_the_comparison_and_its_processes(scenario):
     broken = replace(scenario, integrator=replace(scenario.integrator, scheme="magic"))
     with pytest.raises(SimulationError, match=r"law open_loop, seed 5: .*magic"):
-        compare(broken, load_robot("irb1200"), ["open_loop"], processes=1)
+        compare(broken, load_robot("irb1200"), ["open_loop"], executor=LocalProcesses(1))
     assert multiprocessing.active_children() == []
 
 
@@ -58,7 +63,14 @@ def test_an_interruption_ends_all_processes_at_once(scenario):
             raise KeyboardInterrupt
 
     with pytest.raises(KeyboardInterrupt):
-        compare(long, load_robot("irb1200"), ["open_loop"], cycles=3, processes=2, progress=interrupt)
+        compare(
+            long,
+            load_robot("irb1200"),
+            ["open_loop"],
+            cycles=3,
+            executor=LocalProcesses(2),
+            progress=interrupt,
+        )
     assert multiprocessing.active_children() == []
 
 

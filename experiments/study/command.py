@@ -1,0 +1,201 @@
+"""``truetip study``: many runs of several laws over what is varied in a scenario."""
+
+import time
+from collections.abc import Sequence
+from contextlib import closing
+from dataclasses import asdict
+from pathlib import Path
+from typing import Annotated, Any
+
+import numpy as np
+import typer
+from rich import box
+from rich.console import Console
+from rich.markup import escape
+from rich.table import Table
+
+from experiments.cli.cluster import executor
+from experiments.cli.console import count, fail, print_files, progress_bar, refusing
+from experiments.cli.json_output import human_console, json_output
+from experiments.cli.option_limits import at_least
+from experiments.cli.options import JobsOption, JsonOption, SchedulerOption
+from experiments.cli.staging import staged_file
+from experiments.cli.workers import Executor, SimulationError
+from experiments.metrics.single_figures import FIGURES
+from experiments.report.plot_page import Section, html_table, write_plot_page
+from experiments.report.style import law_title
+from experiments.study.analysis import Rows, of_law, spread, study_json, worst_row
+from experiments.study.figures import effects_figure, indices_figure, spread_figure
+from experiments.study.rows import StudyRow, first_scenario, run_row, study_rows
+from experiments.study.store import TABLE, StudyStore, columns_of
+from experiments.study.study_file import Study, load_study
+
+_PAGE = "study.html"
+_SHOWN_FAILURES = 20
+
+
+def study_command(
+    file: Annotated[Path, typer.Argument(metavar="FILE", help="The study, a YAML file.", show_default=False)],
+    out: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="DIR", help="Folder of the results.", show_default="out/ and the name of the file"
+        ),
+    ] = None,
+    jobs: JobsOption = None,
+    scheduler: SchedulerOption = None,
+    retry_failed: Annotated[bool, typer.Option("--retry-failed", help="Run again what has failed.")] = False,
+    json_file: JsonOption = None,
+) -> None:
+    """Run laws over everything that a file varies; started again, it goes on where it ended."""
+    human = human_console(json_file)
+    folder = out or Path("out") / file.stem
+    start = time.perf_counter()
+    with json_output(json_file) as output, refusing(ValueError, OSError), output.staged():
+        at_least("--jobs", 1, jobs)
+        study = load_study(file)
+        rows = study_rows(study)
+        plan = {"study": asdict(study), "first_scenario": first_scenario(rows)}
+        where = executor(scheduler, jobs)
+        factors = {
+            name: [dict(row.factors)[name] for row in rows[:: len(study.laws)]] for name in study.factors
+        }
+        store = StudyStore(folder, plan, columns_of(factors, list(FIGURES)))
+        finished = store.finished(with_failures=not retry_failed)
+        todo = [row for row in rows if row.number not in finished]
+        if finished and todo:
+            human.print(f"{count(len(finished), 'run')} of {len(rows)} are there from before")
+        _run(store, where, todo, len(rows))
+        table = store.finish()
+        found = {name: _column(table, name) for name in table.column_names}
+        numbers = study_json(study, found, [row.command for row in rows])
+        with staged_file(folder / _PAGE) as page:
+            _write_page(page, study, found, rows)
+        output.write(numbers | {"seconds": time.perf_counter() - start})
+    _print(human, study, found)
+    print_files(human, folder / _PAGE, folder / TABLE)
+
+
+def _run(store: StudyStore, where: Executor, todo: Sequence[StudyRow], total: int) -> None:
+    """Runs what is not there yet. What is done stays, whatever ends the rest."""
+    if not todo:
+        return
+    with progress_bar(count(len(todo), "run")) as progress:
+        try:
+            with closing(where.completed(run_row, todo, progress)) as completed:
+                for _, line in completed:
+                    store.add(line)
+        except KeyboardInterrupt:
+            fail(f"interrupted; {_kept(store, total)}", 130)
+        except SimulationError as error:
+            raise SimulationError(f"{error}; {_kept(store, total)}") from error
+        finally:
+            store.flush()
+
+
+def _kept(store: StudyStore, total: int) -> str:
+    store.flush()
+    return f"{len(store.finished())} of {count(total, 'run')} are kept, the same command goes on"
+
+
+def _column(table: Any, name: str) -> np.ndarray:
+    """A column as numbers or texts; NaN where there is no number."""
+    values = table[name].to_pylist()
+    if any(isinstance(value, str) for value in values):
+        return np.array(values, dtype=object)
+    return np.array([np.nan if value is None else value for value in values])
+
+
+def _print(human: Console, study: Study, rows: Rows) -> None:
+    for metric in study.metrics:
+        table = Table(box=box.SIMPLE_HEAD, title=FIGURES[metric], title_justify="left", title_style="italic")
+        for name in ("law", "runs", "median", "95 %", "worst"):
+            table.add_column(name, justify="left" if name == "law" else "right")
+        for line in _spread_lines(study, rows, metric):
+            table.add_row(*map(escape, line))
+        human.print(table)
+    failed = int((rows["failure"] != "").sum())
+    if failed:
+        human.print(f"[red]{count(failed, 'run')} failed; the reasons are in the report[/red]")
+
+
+def _spread_lines(study: Study, rows: Rows, metric: str) -> list[list[str]]:
+    lines = []
+    for law in study.laws:
+        found = spread(of_law(rows, law)[metric])
+        numbers = [f"{found[name]:.4g}" if name in found else "-" for name in ("median", "p95", "worst")]
+        lines.append([law_title(law), str(found["runs"]), *numbers])
+    return lines
+
+
+def _write_page(path: Path, study: Study, rows: Rows, plan: Sequence[StudyRow]) -> None:
+    sections = []
+    for metric in study.metrics:
+        sections += [
+            Section(
+                f"Spread of {metric}",
+                f"The share of runs whose {FIGURES[metric]} is at most what the axis says.",
+                spread_figure(study, rows, metric),
+            ),
+            Section(
+                f"What each factor does to {metric}",
+                "Means over all runs with that value, and their 95 % intervals.",
+                effects_figure(study, rows, metric),
+                height=380,
+            ),
+        ]
+        indices = indices_figure(study, rows, metric)
+        if indices is not None:
+            sections.append(
+                Section(
+                    f"Whose doing the variance of {metric} is",
+                    "Sobol's indices: of the factor alone, and with its interactions; 95 % intervals.",
+                    indices,
+                )
+            )
+    sections.append(Section("The numbers", "Of all runs that did not fail.", _numbers_table(study, rows)))
+    sections.append(
+        Section("Worst runs", "With the command line that repeats each.", _worst_table(study, rows, plan))
+    )
+    failures = np.flatnonzero(rows["failure"] != "")
+    if len(failures):
+        shown = [
+            [str(rows["row"][i]), law_title(str(rows["law"][i])), str(rows["failure"][i]), plan[i].command]
+            for i in failures[:_SHOWN_FAILURES]
+        ]
+        note = f"{len(failures)} of {count(len(plan), 'run')}; the first {len(shown)}. All are in {TABLE}."
+        sections.append(Section("Failures", note, html_table(["row", "law", "reason", "command"], shown)))
+    write_plot_page(path, study.description or "Study", study_verdict(study, rows), sections)
+
+
+def study_verdict(study: Study, rows: Rows) -> str:
+    """What came out, in a sentence: the best law by the worst run of the first metric."""
+    metric = study.metrics[0]
+    found = {law: spread(of_law(rows, law)[metric]) for law in study.laws}
+    ranked = sorted((law for law in found if found[law]["runs"]), key=lambda law: found[law]["worst"])
+    failed = int((rows["failure"] != "").sum())
+    if not ranked:
+        return f"All {count(len(rows['row']), 'run')} failed."
+    best = ranked[0]
+    return (
+        f"Over {count(len(rows['row']), 'run')} {law_title(best)} is best in its worst run: "
+        f"{FIGURES[metric]} {found[best]['worst']:.3g}, in the median {found[best]['median']:.3g}."
+        + (f" {count(failed, 'run')} failed." if failed else "")
+    )
+
+
+def _numbers_table(study: Study, rows: Rows) -> str:
+    lines = [[metric, *line] for metric in study.metrics for line in _spread_lines(study, rows, metric)]
+    return html_table(["metric", "law", "runs", "median", "95 %", "worst"], lines)
+
+
+def _worst_table(study: Study, rows: Rows, plan: Sequence[StudyRow]) -> str:
+    lines = []
+    for metric in study.metrics:
+        for law in study.laws:
+            own = of_law(rows, law)
+            worst = worst_row(own, metric)
+            if worst is not None:
+                command = plan[int(own["row"][worst])].command
+                lines.append([metric, law_title(law), f"{own[metric][worst]:.4g}", command])
+    return html_table(["metric", "law", "value", "command"], lines)

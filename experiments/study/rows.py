@@ -1,0 +1,110 @@
+"""One row of a study: a law at a point of the design, run wherever there is a free core."""
+
+import shlex
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from diagrams.runs.simulation import run
+from experiments.cli.prepare import prepare
+from experiments.cli.workers import Progress
+from experiments.comparison.compare import simulating
+from experiments.metrics.single_figures import FIGURES, single_figures
+from experiments.study.designs import Value, design_points
+from experiments.study.study_file import Study
+
+
+@dataclass(frozen=True)
+class StudyRow:
+    """What is run, in a form that is small enough to have a million of."""
+
+    number: int
+    point: int  # of the design
+    repetition: int
+    law: str
+    scenario: str
+    settings: tuple[str, ...]  # that all rows have
+    factors: tuple[tuple[str, Value], ...]
+    seed: int  # of the camera's noise
+    is_quick: bool
+
+    @property
+    def all_settings(self) -> list[str]:
+        """Of the scenario, as ``--set`` takes them."""
+        varied = [f"{key}={value if isinstance(value, str) else repr(value)}" for key, value in self.factors]
+        return [*self.settings, f"seed={self.seed}", *varied]
+
+    @property
+    def command(self) -> str:
+        """The command line that repeats it."""
+        settings = [word for setting in self.all_settings for word in ("--set", setting)]
+        quick = ["--quick"] if self.is_quick else ["--cycles", "1"]
+        words = ["truetip", "compare", "--scenario", self.scenario, "--laws", self.law, *quick, *settings]
+        return shlex.join(words)
+
+
+def study_rows(study: Study) -> list[StudyRow]:
+    """All rows of a study, point by point; all laws of a point see the same noise."""
+    points = design_points(study.factors, study.design, study.seed)
+    rows = [
+        (number, repetition, law, tuple(point.items()))
+        for number, point in enumerate(points)
+        for repetition in range(study.repetitions)
+        for law in study.laws
+    ]
+    return [
+        StudyRow(
+            number=number,
+            point=point,
+            repetition=repetition,
+            law=law,
+            scenario=study.scenario,
+            settings=tuple(study.settings),
+            factors=factors,
+            seed=study.seed + repetition,
+            is_quick=study.quick,
+        )
+        for number, (point, repetition, law, factors) in enumerate(rows)
+    ]
+
+
+def run_row(row: StudyRow, progress: Progress) -> dict[str, Any]:
+    """Runs it and gives its line of the table; one that fails has ``failure`` in place of numbers.
+
+    ``wall_s`` is how long it took, which is not the same in two runs of a study.
+    """
+    line: dict[str, Any] = {
+        "row": row.number,
+        "point": row.point,
+        "repetition": row.repetition,
+        "law": row.law,
+        "seed": row.seed,
+        "failure": "",
+        "command": row.command,
+        "wall_s": float("nan"),
+        **dict(row.factors),
+        **dict.fromkeys(FIGURES, float("nan")),
+    }
+    try:
+        prepared = prepare(row.scenario, row.all_settings, is_quick=row.is_quick)
+        with simulating(row.law, row.seed):
+            log = run(prepared.scenario, row.law, prepared.robot, progress=progress)
+        return line | single_figures(log) | {"wall_s": log.wall_time}
+    # A refused combination or a run that broke off is a result of the study; the others shall go on.
+    except (ValueError, RuntimeError) as error:
+        return line | {"failure": " ".join(str(error).split())}
+
+
+def first_scenario(rows: Sequence[StudyRow]) -> str:
+    """The whole scenario of the first row as YAML; with the commands of the others it says what they run.
+
+    It refuses a study whose keys are misspelt or whose values are of the wrong kind before anything runs.
+
+    Raises:
+        ValueError: with what the scenario refuses in the first row.
+    """
+    first = rows[0]
+    try:
+        return prepare(first.scenario, first.all_settings, is_quick=first.is_quick).text
+    except ValueError as error:
+        raise ValueError(f"the first run of the study is refused: {error}") from error

@@ -1,0 +1,161 @@
+"""The table of a study on disk: written while it runs, whole at any moment, taken up again where it ended.
+
+Finished rows go into small Parquet files beside the table. When the study is complete they become one
+file in the order of the rows; until then every start reads what is there. A file appears under its name only
+when it is complete, so a process that is killed leaves nothing half-written.
+"""
+
+import json
+import os
+import time
+from collections.abc import Mapping, Sequence
+from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path
+from typing import Any
+
+import pyarrow as pa
+import pyarrow.parquet as pq
+
+TABLE, TIMES = "study.parquet", "times.parquet"
+_PARTS, _PLAN = "parts", "plan.json"
+_FLUSH = 2.0  # s, as much work is lost at most
+_VERSIONS = ("truetip", "drake", "numpy", "scipy")
+
+
+class StudyStore:
+    """The rows of one study in a folder.
+
+    Args:
+        folder: is made if it does not exist.
+        plan: what identifies the study; a folder that holds another one is refused.
+        columns: name -> "number", "text" or "count", in the order of the table.
+
+    Raises:
+        ValueError: if the folder holds rows of another study, or of another version of truetip or Drake.
+        OSError: if it cannot be read or written.
+    """
+
+    def __init__(self, folder: Path, plan: Mapping[str, Any], columns: Mapping[str, str]) -> None:
+        self._folder = folder
+        self._schema = pa.schema([(name, _TYPES[kind]) for name, kind in columns.items()])
+        self._part_schema = self._schema.append(_WALL_TIME)
+        self._pending: list[dict[str, Any]] = []
+        self._last_flush = time.monotonic()
+        (folder / _PARTS).mkdir(parents=True, exist_ok=True)
+        self._agree_on(dict(plan) | {"versions": installed_versions()})
+        self._next_part = 1 + max((int(path.stem) for path in self._parts()), default=-1)
+
+    def finished(self, with_failures: bool = True) -> set[int]:
+        """Numbers of the rows that are there; those that failed only if wanted."""
+        tables = [self._folder / TABLE] if (self._folder / TABLE).exists() else []
+        rows: dict[int, str] = {}
+        for path in (*tables, *self._parts()):
+            found = pq.read_table(path, columns=["row", "failure"])
+            rows |= dict(zip(found["row"].to_pylist(), found["failure"].to_pylist(), strict=True))
+        return {row for row, failure in rows.items() if with_failures or not failure}
+
+    def add(self, row: Mapping[str, Any]) -> None:
+        """Takes a row; at least every 2 s what has come is on disk."""
+        self._pending.append(dict(row))
+        if time.monotonic() - self._last_flush > _FLUSH:
+            self.flush()
+
+    def flush(self) -> None:
+        """Writes what has come since the last time."""
+        self._last_flush = time.monotonic()
+        if not self._pending:
+            return
+        table = pa.Table.from_pylist(self._pending, schema=self._part_schema)
+        _write(table, self._folder / _PARTS / f"{self._next_part:06d}.parquet")
+        self._next_part += 1
+        self._pending = []
+
+    def table(self) -> pa.Table:
+        """All rows so far in their order; of a row that was done twice, the later result."""
+        self.flush()
+        return self._merged(TABLE, self._schema)
+
+    def finish(self) -> pa.Table:
+        """Makes one file of all parts and gives the table.
+
+        Wall times are apart in ``times.parquet``: ``study.parquet`` is the same however often the study was
+        interrupted, and on whatever machine it ran.
+        """
+        rows = self.table()
+        times = self._merged(TIMES, pa.schema([self._part_schema.field("row"), _WALL_TIME]))
+        _write(times, self._folder / TIMES)
+        _write(rows, self._folder / TABLE)
+        for path in self._parts():
+            path.unlink()
+        return rows
+
+    def _merged(self, name: str, schema: pa.Schema) -> pa.Table:
+        paths = [self._folder / name, *self._parts()]
+        tables = [pq.read_table(path, columns=schema.names) for path in paths if path.exists()]
+        if not tables:
+            return schema.empty_table()
+        rows = pa.concat_tables(tables)
+        latest = {number: index for index, number in enumerate(rows["row"].to_pylist())}
+        return rows.take([latest[number] for number in sorted(latest)]).combine_chunks()
+
+    def _parts(self) -> list[Path]:
+        return sorted((self._folder / _PARTS).glob("*.parquet"))
+
+    def _agree_on(self, plan: dict[str, Any]) -> None:
+        path = self._folder / _PLAN
+        if path.exists():
+            before = json.loads(path.read_text(encoding="utf-8"))
+            different = [key for key in plan if before.get(key) != plan[key]]
+            if different:
+                what = ", ".join(different)
+                raise ValueError(
+                    f"{self._folder} holds rows of another study (its {what} differ): choose another --out, "
+                    "or remove the folder"
+                )
+            return
+        _replace(path, (json.dumps(plan, indent=1, sort_keys=True) + "\n").encode())
+
+
+_WALL_TIME = pa.field("wall_s", pa.float64())
+_TYPES = {"number": pa.float64(), "text": pa.string(), "count": pa.int64()}
+
+
+def installed_versions() -> dict[str, str]:
+    """Of what decides about a number."""
+    found = {}
+    for name in _VERSIONS:
+        try:
+            found[name] = version(name)
+        except PackageNotFoundError:
+            found[name] = "not installed"
+    return found
+
+
+def _write(table: pa.Table, path: Path) -> None:
+    sink = pa.BufferOutputStream()
+    pq.write_table(table, sink, compression="zstd")
+    _replace(path, sink.getvalue())
+
+
+def _replace(path: Path, content: Any) -> None:
+    """Puts a file in its place when it is complete."""
+    unfinished = path.with_suffix(".unfinished")
+    unfinished.write_bytes(content)
+    os.replace(unfinished, path)
+
+
+def columns_of(factors: Mapping[str, Sequence[Any]], figures: Sequence[str]) -> dict[str, str]:
+    """The columns of the table of a study; ``factors``: name -> its values."""
+    kinds = {
+        name: "text" if any(isinstance(value, str) for value in values) else "number"
+        for name, values in factors.items()
+    }
+    return {
+        **dict.fromkeys(("row", "point", "repetition"), "count"),
+        "law": "text",
+        "seed": "count",
+        **kinds,
+        **dict.fromkeys(figures, "number"),
+        "failure": "text",
+        "command": "text",
+    }

@@ -1,0 +1,76 @@
+"""The table of a study survives whatever interrupts it."""
+
+import math
+from pathlib import Path
+
+import pyarrow.parquet as pq
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from experiments.study.store import TABLE, StudyStore, columns_of
+
+COLUMNS = columns_of({"station.payload": [0.0], "law_option": ["x"]}, ["max_norm_mm"])
+
+
+def line(number: int, failure: str = "") -> dict:
+    value = math.nan if failure else 0.1 * number
+    return {
+        "row": number,
+        "point": number,
+        "repetition": 0,
+        "law": "open_loop",
+        "seed": 0,
+        "station.payload": 7.0,
+        "law_option": "y",
+        "max_norm_mm": value,
+        "failure": failure,
+        "wall_s": 1.0 + number,
+        "command": f"truetip compare --set seed={number}",
+    }
+
+
+def complete(folder: Path, order: list[int], stops: set[int]) -> bytes:
+    """Does rows in an order, with the process ended after some of them; the table's bytes."""
+    store = StudyStore(folder, {"study": 1}, COLUMNS)
+    for count, number in enumerate(order):
+        store.add(line(number))
+        if count in stops:
+            store.flush()
+            store = StudyStore(folder, {"study": 1}, COLUMNS)
+    store.finish()
+    return (folder / TABLE).read_bytes()
+
+
+@settings(max_examples=15)
+@given(order=st.permutations(list(range(8))), stops=st.sets(st.integers(0, 7)))
+def test_the_table_does_not_depend_on_order_and_interruptions(tmp_path_factory, order, stops):
+    straight = complete(tmp_path_factory.mktemp("straight"), list(range(8)), set())
+    assert complete(tmp_path_factory.mktemp("broken"), list(order), stops) == straight
+
+
+def test_a_finished_row_is_known_and_a_failed_one_can_be_done_again(tmp_path):
+    store = StudyStore(tmp_path, {}, COLUMNS)
+    store.add(line(0))
+    store.add(line(1, failure="ran away"))
+    store.finish()
+    again = StudyStore(tmp_path, {}, COLUMNS)
+    assert (again.finished(), again.finished(with_failures=False)) == ({0, 1}, {0})
+    again.add(line(1))
+    again.finish()
+    assert pq.read_table(tmp_path / TABLE)["failure"].to_pylist() == ["", ""]
+    assert pq.read_table(tmp_path / "times.parquet")["wall_s"].to_pylist() == [1.0, 2.0]
+
+
+def test_rows_of_another_study_are_not_mixed_in(tmp_path):
+    StudyStore(tmp_path, {"study": 1}, COLUMNS)
+    with pytest.raises(ValueError, match=r"rows of another study \(its study differ\)"):
+        StudyStore(tmp_path, {"study": 2}, COLUMNS)
+
+
+def test_a_file_that_was_not_completed_is_not_read(tmp_path):
+    store = StudyStore(tmp_path, {}, COLUMNS)
+    store.add(line(0))
+    store.flush()
+    (tmp_path / "parts" / "000001.unfinished").write_bytes(b"PAR1")
+    assert StudyStore(tmp_path, {}, COLUMNS).finished() == {0}

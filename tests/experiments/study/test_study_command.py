@@ -1,0 +1,156 @@
+"""``truetip study``: a row of each law at each point, resumed, refused, and the same on a cluster."""
+
+import contextlib
+import json
+import os
+import re
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Iterator
+from pathlib import Path
+
+import pyarrow.parquet as pq
+import pytest
+
+from experiments.cli.cluster import DaskCluster
+from experiments.cli.workers import in_order
+from experiments.study.rows import run_row, study_rows
+from experiments.study.store import TABLE
+from experiments.study.study_file import Levels, Study, load_study
+from tests.experiments.commands import refusal, truetip
+
+# 1.8 s of a rigid robot; the second payload is more than the scenario allows.
+STUDY = """
+laws: [open_loop]
+settings: [reference.path=circle, reference.acceleration=8, reference.settle=0, reference.dwell=0.6,
+           station.elasticity=rigid]
+factors:
+  station.payload: {values: [0, 2000]}
+"""
+
+
+@pytest.fixture(scope="module")
+def study(tmp_path_factory) -> tuple[Path, Path]:
+    """A study of two runs, one of which is refused: its file and its folder."""
+    file = tmp_path_factory.mktemp("study") / "payload.yaml"
+    file.write_text(STUDY)
+    out = file.parent / "out"
+    result = truetip("study", file, "--out", out, "--jobs", 1, "--json", file.parent / "numbers.json")
+    assert result.exit_code == 0, result.output
+    return file, out
+
+
+def test_every_point_has_its_row_and_a_failure_its_reason(study):
+    _, out = study
+    rows = pq.read_table(out / TABLE).to_pylist()
+    assert [row["station.payload"] for row in rows] == [0.0, 2000.0]
+    assert rows[0]["max_norm_mm"] > 1.0
+    assert "station.payload must be between 0 and 1000 kg" in rows[1]["failure"]
+
+
+@pytest.mark.slow
+def test_the_command_of_a_row_repeats_it(study):
+    _, out = study
+    rows = pq.read_table(out / TABLE).to_pylist()
+    command = rows[0]["command"].split()
+    assert command[:2] == ["truetip", "compare"]
+    repeated = truetip(*command[1:], "--out", out / "again", "--json", out / "again.json")
+    assert repeated.exit_code == 0
+    error = json.loads((out / "again.json").read_text())["runs"]["open_loop"]["true"]
+    assert error["max_norm_mm"] == pytest.approx(rows[0]["max_norm_mm"], rel=1e-8)  # nine digits in JSON
+
+
+def test_started_again_it_runs_nothing_and_leaves_the_table_as_it_is(study):
+    file, out = study
+    before = (out / TABLE).read_bytes()
+    assert truetip("study", file, "--out", out).exit_code == 0
+    assert (out / TABLE).read_bytes() == before
+
+
+def test_the_numbers_name_the_worst_row_of_each_law(study):
+    file, _ = study
+    found = json.loads((file.parent / "numbers.json").read_text())
+    assert (found["rows"], found["failures"]) == (2, 1)
+    assert found["laws"]["open_loop"]["max_norm_mm"]["worst_row"] == 0
+
+
+@pytest.mark.parametrize(
+    ("text", "reason"),
+    [
+        ("factors: {station.payload: {values: []}}", "values: at least one is needed"),
+        ("factors: {station.payload: !Distribution {name: norm}}", "needs a design that samples"),
+        (
+            "{factors: {seed: !Distribution {name: normal}}, design: !Sobol {}}",
+            "scipy.stats has no distribution 'normal'",
+        ),
+        (
+            "{factors: {seed: !Distribution {name: norm, parameters: {sigma: 1}}}, design: !Sobol {}}",
+            "takes loc, scale; got sigma",
+        ),
+        ("{factors: {seed: {values: [1]}}, metrics: [speed]}", "metrics: must be of max_norm_mm"),
+        ("{factors: {seed: {values: [1]}}, laws: [magic]}", "magic"),
+        ("{factors: {station.paylaod: {values: [1]}}}", "the first run of the study is refused: .*paylaod"),
+        ("laws: [open_loop]", "at least one key of a scenario that is varied"),
+    ],
+)
+def test_a_wrong_study_is_refused_in_one_line(tmp_path, text, reason):
+    file = tmp_path / "wrong.yaml"
+    file.write_text(text)
+    assert re.search(reason, refusal(truetip("study", file, "--out", tmp_path / "out")))
+
+
+def test_a_scheduler_that_is_not_there_is_one_line(tmp_path, monkeypatch):
+    monkeypatch.setattr("experiments.cli.cluster._PATIENCE", 0.5)
+    file = tmp_path / "study.yaml"
+    file.write_text(STUDY)
+    result = truetip("study", file, "--out", tmp_path / "out", "--scheduler", "tcp://127.0.0.1:9")
+    assert "no Dask scheduler at tcp://127.0.0.1:9" in refusal(result)
+
+
+@contextlib.contextmanager
+def dask_process(*arguments: str) -> Iterator[subprocess.Popen[bytes]]:
+    process = subprocess.Popen([sys.executable, "-m", "distributed.cli." + arguments[0], *arguments[1:]])
+    try:
+        yield process
+    finally:
+        process.kill()
+        process.wait()
+
+
+@pytest.mark.slow
+def test_a_worker_that_is_killed_loses_nothing(tmp_path):
+    """On a scheduler and two workers in processes of their own the rows are those of this process."""
+    settings = ["reference.path=circle", "reference.acceleration=8", "reference.settle=0"]
+    study = Study(
+        laws=["open_loop"],
+        settings=[*settings, "station.elasticity=rigid"],
+        factors={"station.payload": Levels([float(mass) for mass in range(6)])},
+    )
+    rows = study_rows(study)
+    address = "tcp://127.0.0.1:18786"
+    worker = ("dask_worker", address, "--nthreads", "1", "--no-dashboard", "--local-directory", str(tmp_path))
+    with (
+        dask_process("dask_scheduler", "--host", "127.0.0.1", "--port", "18786", "--no-dashboard"),
+        dask_process(*worker, "--no-nanny") as first,
+        dask_process(*worker, "--no-nanny"),
+    ):
+        cluster = DaskCluster(address)
+        cluster.check()
+        killed = []
+
+        def kill_first(share: float) -> None:
+            if share > 0.0 and not killed:
+                os.kill(first.pid, signal.SIGKILL)
+                killed.append(time.monotonic())
+
+        found = in_order(cluster, run_row, rows, kill_first)
+    assert killed
+    alone = run_row(rows[3], lambda share: None)
+    assert {**found[3], "wall_s": 0.0} == {**alone, "wall_s": 0.0} | {"settling_s": found[3]["settling_s"]}
+    assert [row["failure"] for row in found] == [""] * len(rows)
+
+
+def test_the_file_that_comes_with_the_documentation_is_a_study():
+    assert len(study_rows(load_study("docs/studies/payload_and_dead_time.yaml"))) > 10
