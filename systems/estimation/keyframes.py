@@ -6,13 +6,14 @@ import numpy as np
 
 from robots.pose import pose_error
 from systems.estimation.arm_geometry import Constants
+from systems.estimation.gear_errors import NUM_SHAPES
 from systems.estimation.memory import Layout
-from systems.estimation.tip_model import TipModel
+from systems.estimation.tip_model import Prediction, TipModel
 
 # A keyframe: encoder positions, deflection of the gears, joint velocity and acceleration, twist, the rows of
-# the pose that was seen, and its weight in samples.
+# the pose that was seen, its weight in samples, and the shapes of the gears' errors if there are any.
 _THETA, _GEARS, _MOTION, _TWIST = slice(0, 6), slice(6, 12), slice(12, 24), slice(24, 30)
-_POSE, _WEIGHT, _ROW = slice(30, 42), 42, 43
+_POSE, _WEIGHT, _SHAPES = slice(30, 42), 42, 43
 _MANY = 60  # keyframes, some two seconds of motion
 
 
@@ -37,7 +38,7 @@ class Keyframes:
         self._model, self._weights, self._length, self._batch = model, weights, length, batch
         n = model.size
         self.layout = Layout(
-            rows=(length, _ROW),
+            rows=(length, _SHAPES + 6 * NUM_SHAPES * model.has_gear_errors),
             first=(1,),
             end=(1,),
             position=(1,),  # of the pass; below zero for none
@@ -121,6 +122,14 @@ class Keyframes:
         memory.position[0] = -1.0
         return True
 
+    def predict(self, constants: Constants, xi: np.ndarray, rows: np.ndarray) -> Prediction:
+        """The tip of some keyframes, (n, row), with loads worked out anew."""
+        model = self._model
+        motion = rows[:, 12:18], rows[:, 18:24]
+        configuration = rows[:, _THETA], rows[:, _GEARS]
+        shapes = rows[:, _SHAPES:].reshape(-1, NUM_SHAPES, 6) if model.has_gear_errors else None
+        return model.predict_anew(constants, model.full(xi), configuration, motion, rows[:, _TWIST], shapes)
+
     def _information(
         self, memory: SimpleNamespace, numbers: np.ndarray, constants: Constants, xi: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray]:
@@ -129,9 +138,7 @@ class Keyframes:
         rows = memory.rows[places]
         n = len(rows)
         model = self._model
-        motion = rows[:, 12:18], rows[:, 18:24]
-        configuration = rows[:, _THETA], rows[:, _GEARS]
-        found = model.predict_anew(constants, model.full(xi), configuration, motion, rows[:, _TWIST])
+        found = self.predict(constants, xi, rows)
         memory.rows[places, _GEARS] = found.gears
         seen = np.zeros((n, 4, 4))
         seen[:, :3] = rows[:, _POSE].reshape(n, 3, 4)
@@ -142,15 +149,12 @@ class Keyframes:
         return H.T @ weighted, weighted.T @ y.ravel()
 
 
-def keyframe_row(
-    theta: np.ndarray,
-    gears: np.ndarray,
-    motion: np.ndarray,
-    twist: np.ndarray,
-    seen: tuple[np.ndarray, float],
-) -> np.ndarray:
-    """One keyframe as numbers; ``seen`` is the pose (4, 4) and its weight in samples."""
-    row = np.empty(_ROW)
-    row[_THETA], row[_GEARS], row[_MOTION], row[_TWIST] = theta, gears, motion, twist
-    row[_POSE], row[_WEIGHT] = seen[0][:3].ravel(), seen[1]
-    return row
+def keyframe_row(means: np.ndarray, seen: tuple[np.ndarray, float]) -> np.ndarray:
+    """One keyframe as numbers.
+
+    Args:
+        means: encoder positions, deflection of the gears, joint velocity and acceleration, twist, and shapes
+            of the gears' errors behind each other.
+        seen: the pose (4, 4) and its weight in samples.
+    """
+    return np.concatenate((means[:30], seen[0][:3].ravel(), [seen[1]], means[30:]))

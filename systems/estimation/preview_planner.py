@@ -33,6 +33,7 @@ class MotorPlan(NamedTuple):
     motion: np.ndarray  # (12,), velocity and acceleration of the links
     twist: np.ndarray  # (6,), of the tip
     columns: np.ndarray  # (6, 18 + g), as `ArmGeometry.arm` gives them
+    states: np.ndarray  # (12,), of the gears' hysteresis
 
 
 class PreviewPlanner:
@@ -40,9 +41,9 @@ class PreviewPlanner:
 
     Newton's method gives the joints q behind the gears at which a stiff arm of the estimated geometry would
     be on the path, from a prediction so close that one step mostly does. The motors are then at
-    theta = q - J^-1 T phi - delta, and ahead of that by what the damping of the gears holds back. Rates
-    contain the motion of the parameters that are led in; loads do not, or they would feed back on
-    themselves through the deflections: an algebraic loop, and an unstable one.
+    theta = q - J^-1 T phi - delta, less the errors of the gears, and ahead of that by what the damping of
+    the gears holds back. Rates contain the motion of the parameters that are led in; loads do not, or they
+    would feed back on themselves through the deflections: an algebraic loop, and an unstable one.
     """
 
     def __init__(self, model: TipModel, period: float) -> None:
@@ -58,6 +59,7 @@ class PreviewPlanner:
             yields=(4, 6),  # newest first
             start_error=(6,),
             start_yield=(6,),
+            hysteresis=model.gear_errors.layout,
         )
         self._constants: Constants | None = None
 
@@ -91,18 +93,26 @@ class PreviewPlanner:
         X, arm = model.forward(constants, x, memory.q[None])
         memory.start_error[:] = pose_error(X_WE, X[0])
         memory.start_yield[:] = 0.0
-        yields = self._yields(arm, x, model.deflections(x, loads)[0])
+        yields, _ = self._yields(memory, arm, x, memory.q, loads)
         memory.start_yield[:] = theta - memory.q - yields
         memory.yields[:] = theta - memory.q
         memory.rates[:] = memory.wander[:] = 0.0
         memory.started[0] = 1.0
         return arm.columns[0, :, :6]
 
-    def _yields(self, arm: Arm, x: np.ndarray, deflection: np.ndarray) -> np.ndarray:
-        """By how much the motors have to be ahead of the links of a stiff arm, rad, (6,)."""
-        columns = arm.columns[0]
+    def _yields(
+        self, memory: SimpleNamespace, arm: Arm, x: np.ndarray, q: np.ndarray, loads: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """By how much motors have to be ahead of links at q, rad, (6,); and the gears' hysteresis, (12,)."""
+        model, columns = self._model, arm.columns[0]
+        deflection = model.deflections(x, loads)[0]
         tilt = columns[:, 6:18] @ deflection[6:]
-        return -np.linalg.solve(columns[:, :6], tilt) - deflection[:6]
+        yields = -np.linalg.solve(columns[:, :6], tilt) - deflection[:6]
+        if not model.has_gear_errors:
+            return yields, np.zeros(12)
+        states = model.gear_errors.step(memory.hysteresis, model.total_load(x, loads)[0, :6])
+        shapes = model.gear_shapes(x, q + yields, loads[0], states)
+        return yields - model.gear_error(x, shapes), states
 
     def _newton(
         self, constants: Constants, x: np.ndarray, q: np.ndarray, X_WE: np.ndarray, left: np.ndarray
@@ -152,7 +162,8 @@ class PreviewPlanner:
             arm = model.forward(constants, x, q[None])[1]
             columns = arm.columns[0]
         loads = model.loads.at(arm.frames, q[None], v[None], a[None])
-        yields = self._yields(arm, x, model.deflections(x, loads)[0]) + left * memory.start_yield
+        yields, states = self._yields(memory, arm, x, q, loads)
+        yields += left * memory.start_yield
         history = memory.yields
         history[1:] = history[:-1].copy()
         history[0] = yields
@@ -162,7 +173,7 @@ class PreviewPlanner:
         theta = q + yields - self._gear_lag * y_rate
         twist = columns[:, :6] @ velocity
         motion = np.concatenate((v, a))
-        return MotorPlan(theta, velocity + y_rate, a + y_bend, loads[0], motion, twist, columns)
+        return MotorPlan(theta, velocity + y_rate, a + y_bend, loads[0], motion, twist, columns, states)
 
 
 def _blend(since_start: float) -> tuple[float, float]:

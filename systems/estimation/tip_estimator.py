@@ -10,6 +10,7 @@ from scipy.linalg import get_lapack_funcs
 from robots.pose import pose_error
 from systems.estimation.arm_geometry import Constants
 from systems.estimation.events import LOAD_CHANGED, Event, Innovations
+from systems.estimation.gear_errors import NUM_SHAPES
 from systems.estimation.keyframes import Keyframes, keyframe_row
 from systems.estimation.memory import Layout
 from systems.estimation.tip_model import Prediction, Spread, TipModel, moved
@@ -44,6 +45,7 @@ class Pair(NamedTuple):
     twist: np.ndarray  # (6,), of the tip
     X_WE: np.ndarray  # (4, 4), seen
     unrest: float = 0.0  # m/s^2, of the tip by parameters that are led in
+    states: np.ndarray = np.zeros(12)  # of the gears' hysteresis, in -1 to 1
 
 
 class TipEstimator:
@@ -70,7 +72,9 @@ class TipEstimator:
             samples=(1,),
             weight=(1,),
             first_theta=(6,),
-            sums=(30,),  # theta, gears, motion and twist, weighted
+            sums=(
+                30 + 6 * NUM_SHAPES * model.has_gear_errors,
+            ),  # theta, gears, motion, twist, shapes, weighted
             sum_y=(6,),
             sum_H=(6, n),
             keyframes=self._keyframes.layout,
@@ -104,9 +108,16 @@ class TipEstimator:
 
     def predict(self, memory: SimpleNamespace, pair: Pair) -> Prediction:
         """The tip of one pair at the estimate."""
-        return self.model.predict(
-            self.constants(memory), self.x(memory), pair.theta[None], pair.loads[None], pair.twist[None]
+        return self._predict(memory, pair)[0]
+
+    def _predict(self, memory: SimpleNamespace, pair: Pair) -> tuple[Prediction, np.ndarray | None]:
+        x = self.x(memory)
+        shapes = self.model.gear_shapes(x, pair.theta, pair.loads, pair.states)
+        rows = pair.theta[None], pair.loads[None], pair.twist[None]
+        found = self.model.predict(
+            self.constants(memory), x, *rows, shapes[None] if shapes is not None else None
         )
+        return found, shapes
 
     def tip_covariance(self, memory: SimpleNamespace, pair: Pair) -> np.ndarray:
         """Covariance of the predicted tip, rotation (rad^2) first, shape (6, 6)."""
@@ -116,7 +127,7 @@ class TipEstimator:
     def add(self, memory: SimpleNamespace, pair: Pair) -> Event | None:
         """Learns from one pair; says if something happened to the robot."""
         config = self._config
-        found = self.predict(memory, pair)
+        found, shapes = self._predict(memory, pair)
         r, H = pose_error(pair.X_WE, found.X_WE[0]), found.H[0]
         weight = 1.0 / (1.0 + (pair.unrest / config.calm) ** 2)
         event, innovations = None, memory.innovations
@@ -135,7 +146,9 @@ class TipEstimator:
         weighted = (weight * self._weights)[:, None] * H
         memory.A_open += H.T @ weighted
         memory.b_open += weighted.T @ y
-        self._open(memory, pair, found, (y, H, weight))
+        means = [pair.theta, found.gears[0], pair.motion, pair.twist]
+        means += [shapes.ravel()] if shapes is not None else []
+        self._open(memory, np.concatenate(means), (y, H, weight))
         memory.count[0] += 1.0
         moved_away = np.abs(pair.theta - memory.first_theta).max() > config.keyframe_step
         is_long = memory.samples[0] >= config.keyframe_samples
@@ -150,13 +163,13 @@ class TipEstimator:
         if self._keyframes.work(memory.keyframes, constants, memory.xi, self._config.relinearise):
             self._solve(memory)
 
-    def _open(self, memory: SimpleNamespace, pair: Pair, found: Prediction, sample) -> None:
+    def _open(self, memory: SimpleNamespace, means: np.ndarray, sample) -> None:
         y, H, weight = sample
         if memory.samples[0] == 0.0:
-            memory.first_theta[:] = pair.theta
+            memory.first_theta[:] = means[:6]
         memory.samples[0] += 1.0
         memory.weight[0] += weight
-        memory.sums += weight * np.concatenate((pair.theta, found.gears[0], pair.motion, pair.twist))
+        memory.sums += weight * means
         memory.sum_y += weight * y
         memory.sum_H += weight * H
 
@@ -167,13 +180,9 @@ class TipEstimator:
         total = float(memory.weight[0])
         mean = memory.sums / total
         r = (memory.sum_y - memory.sum_H @ memory.xi) / total
-        theta, gears, motion, twist = mean[:6], mean[6:12], mean[12:24], mean[24:]
-        constants, x = self.constants(memory), self.x(memory)
-        found = self.model.predict_anew(
-            constants, x, (theta[None], gears[None]), (motion[None, :6], motion[None, 6:]), twist[None]
-        )
-        seen = moved(found.X_WE, r[None])[0]
-        row = keyframe_row(theta, found.gears[0], motion, twist, (seen, total))
+        row = keyframe_row(mean, (np.eye(4), total))
+        seen = moved(self._keyframes.predict(self.constants(memory), memory.xi, row[None]).X_WE, r[None])[0]
+        row = keyframe_row(mean, (seen, total))
         self._keyframes.add(memory.keyframes, row, memory.A_open, memory.b_open)
         for part in (memory.A_open, memory.b_open, memory.samples, memory.weight):
             part[:] = 0.0

@@ -11,6 +11,7 @@ from robots.description.model import load_robot
 from systems.controller_model import ControllerModel
 from systems.estimation.arm_geometry import Arm, ArmGeometry, Constants, skew
 from systems.estimation.arm_loads import ArmLoads
+from systems.estimation.gear_errors import NUM_SHAPES, GearErrors
 
 
 @dataclass
@@ -26,6 +27,7 @@ class Spread:
     payload: float = 0.5  # kg
     payload_centre: float = 0.015  # m
     clock: float = 2e-3  # s, between the stamps of the camera and those of the joints
+    gear_error: float = 5e-5  # rad, of a gear's waves, gap and hysteresis; zero for gears without
 
 
 class Prediction(NamedTuple):
@@ -44,8 +46,8 @@ class TipModel:
     c of the camera's clock. Loads are linear in the payload's mass and first moment.
 
     The vector of unknowns holds the identifiable geometric errors (m, rad), 18 factors of the compliance of
-    gears and bearings, the mass of the payload (kg), the change of its first moment (kg m, 3) and the offset
-    of the clock (s).
+    gears and bearings, the mass of the payload (kg), the change of its first moment (kg m, 3), the offset
+    of the clock (s), and the sizes of the gears' errors (rad, 7 shapes of 6 joints) unless their spread is zero.
     """
 
     def __init__(self, model: ControllerModel, spread: Spread) -> None:
@@ -58,9 +60,11 @@ class TipModel:
         self.geometry, self.loads = ArmGeometry(robot, chosen), ArmLoads(robot)
         self.parameters = error_parameters(robot)
         g = len(chosen)
-        self.size = g + 23
+        self.has_gear_errors = spread.gear_error > 0.0
+        self.gear_errors = GearErrors(robot)
+        self.size = g + 23 + 6 * NUM_SHAPES * self.has_gear_errors
         self.G, self.K = slice(0, g), slice(g, g + 18)
-        self.M, self.C = slice(g + 18, g + 22), g + 22
+        self.M, self.C, self.E = slice(g + 18, g + 22), g + 22, slice(g + 23, self.size)
         self.mean, self.sigma = np.zeros(self.size), np.zeros(self.size)
         shift, angle = spread.shift, spread.angle
         if robot.is_calibrated:
@@ -79,6 +83,7 @@ class TipModel:
         self.sigma[g + 18] = spread.payload
         self.sigma[g + 19 : g + 22] = spread.payload_centre * max(model.payload, 0.1)
         self.sigma[self.C] = spread.clock
+        self.sigma[self.E] = spread.gear_error
         self._tool = self._tool_directions()
 
     def full(self, xi: np.ndarray) -> np.ndarray:
@@ -113,6 +118,27 @@ class TipModel:
         """How gears and bearings yield in rad, (n, 18), to loads (n, 5, 18)."""
         return -x[self.K] * self.compliance * self.total_load(x, loads)
 
+    def gear_shapes(
+        self, x: np.ndarray, theta: np.ndarray, loads: np.ndarray, states: np.ndarray
+    ) -> np.ndarray | None:
+        """The shapes of gear errors at one configuration, (7, 6); None if there are none.
+
+        Args:
+            x: the unknowns.
+            theta: motor positions in rad, (6,).
+            loads: as `ArmLoads.at` gives them, (5, 18).
+            states: of hysteresis, (12,).
+        """
+        if not self.has_gear_errors:
+            return None
+        return self.gear_errors.shapes(theta, self.total_load(x, loads)[:6], states)
+
+    def gear_error(self, x: np.ndarray, shapes: np.ndarray | None) -> np.ndarray | float:
+        """What shapes (..., 7, 6) add to the angles of the joints in rad, (..., 6)."""
+        if shapes is None:
+            return 0.0
+        return (shapes * x[self.E].reshape(NUM_SHAPES, 6)).sum(-2)
+
     def predict(
         self,
         constants: Constants,
@@ -120,6 +146,7 @@ class TipModel:
         theta: np.ndarray,
         loads: np.ndarray,
         twist: np.ndarray,
+        shapes: np.ndarray | None = None,
     ) -> Prediction:
         """The tip at encoder positions.
 
@@ -129,11 +156,12 @@ class TipModel:
             theta: encoder positions in rad, (n, 6).
             loads: as `ArmLoads.at` gives them, (n, 5, 18).
             twist: of the tip, (n, 6).
+            shapes: of the gears' errors, (n, 7, 6); None if there are none.
         """
         unit = -self.compliance * self.total_load(x, loads)
         yields = x[self.K] * unit
-        X_WE, arm = self.forward(constants, x, theta + yields[:, :6])
-        return self._complete(arm, X_WE, x, (unit, yields, yields[:, 6:]), loads, twist)
+        X_WE, arm = self.forward(constants, x, theta + yields[:, :6] + self.gear_error(x, shapes))
+        return self._complete(arm, X_WE, x, (unit, yields, shapes), loads, twist)
 
     def predict_anew(
         self,
@@ -142,35 +170,42 @@ class TipModel:
         configuration: tuple[np.ndarray, np.ndarray],
         motion: tuple[np.ndarray, np.ndarray],
         twist: np.ndarray,
+        shapes: np.ndarray | None = None,
     ) -> Prediction:
         """The same with loads worked out anew at the geometry of now.
 
         Args:
-            constants, x, twist: as in `predict`.
+            constants, x, twist, shapes: as in `predict`.
             configuration: encoder positions and about by how much the gears yield, in rad, (n, 6) each.
             motion: velocities and accelerations of the joints, (n, 6) each.
         """
         theta, gears = configuration
-        X_WE, arm = self.forward(constants, x, theta + gears)
-        loads = self.loads.at(arm.frames, theta + gears, *motion)
+        q = theta + gears + self.gear_error(x, shapes)
+        X_WE, arm = self.forward(constants, x, q)
+        loads = self.loads.at(arm.frames, q, *motion)
         unit = -self.compliance * self.total_load(x, loads)
         yields = x[self.K] * unit
         change = yields[:, :6] - gears
         X_WE = moved(X_WE, (arm.columns[..., :6] @ change[..., None])[..., 0])
-        return self._complete(arm, X_WE, x, (unit, yields, yields[:, 6:]), loads, twist)
+        return self._complete(arm, X_WE, x, (unit, yields, shapes), loads, twist)
 
     def _complete(self, arm: Arm, X_WE, x, deflection, loads, twist) -> Prediction:
         """Adds the tilting bearings and the clock to a pose, and makes the columns."""
-        unit, yields, tilts = deflection
+        unit, yields, shapes = deflection
         columns = arm.columns
         springs = columns[..., :18]
-        step = (columns[..., 6:18] @ tilts[..., None])[..., 0] + twist * x[self.C]
+        step = (columns[..., 6:18] @ yields[:, 6:, None])[..., 0] + twist * x[self.C]
         H = np.empty((len(X_WE), 6, self.size))
         H[..., self.G] = columns[..., 18:]
         H[..., self.K] = springs * unit[:, None]
         by_mass = (-x[self.K] * self.compliance) * loads[:, 1:]
         H[..., self.M] = springs @ by_mass.swapaxes(-1, -2)
         H[..., self.C] = twist
+        if self.has_gear_errors and shapes is None:
+            H[..., self.E] = 0.0
+        elif self.has_gear_errors:
+            by_shape = columns[:, :, None, :6] * shapes[:, None]
+            H[..., self.E] = by_shape.reshape(len(H), 6, -1)
         H *= self.sigma
         return Prediction(moved(X_WE, step), H, yields[:, :6])
 

@@ -38,7 +38,8 @@ _LOOK_EVERY = 5  # ticks, between two searches for the dead time
 _KINDS = (TOOL_DISPLACED, LOAD_CHANGED, DEAD_TIME_CHANGED)
 _GIVE_UP = 1.6  # s after the start: what is believed of the dead time has to do
 
-# A row of the plan: motors, loads, links, tip, unrest, columns and correction of the drive model.
+# A row of the plan: motors, loads, links, tip, unrest, columns and correction of the drive model,
+# states of the gears' hysteresis.
 _PLAN = Layout(
     theta=(6,),
     velocity=(6,),
@@ -49,6 +50,7 @@ _PLAN = Layout(
     unrest=(1,),
     columns=(24,),
     correction=(6,),
+    states=(12,),
 )
 
 
@@ -246,6 +248,7 @@ class SelfCalibrating(LeafSystem):
                 lead.unrest + unrest,
                 command.columns,
                 drives.correction,
+                plan.states,
             )
         )
         self._plan.append(memory.plan, instant, row)
@@ -273,7 +276,7 @@ class SelfCalibrating(LeafSystem):
         X_WE = moved(X_WE[None], ((exposure - sample.time) * now.twist)[None])[0]
         is_settling = exposure < memory.delay.settled[0] + _SETTLING
         unrest = _UNREST if is_settling else float(now.unrest[0])
-        return Pair(encoders, then.loads, then.motion, now.twist, X_WE, unrest)
+        return Pair(encoders, then.loads, then.motion, now.twist, X_WE, unrest, then.states)
 
     def _encoders_at(self, memory: SimpleNamespace, time: float) -> np.ndarray | None:
         """Positions between two samples, a cubic through positions and velocities, rad, (6,)."""

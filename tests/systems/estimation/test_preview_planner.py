@@ -47,7 +47,8 @@ def test_the_tip_of_the_known_robot_is_on_the_path(model):
     while session.time < 3.5:
         plan, X_WE = session.step()
     lag = model.lag[:6] * plan.velocity  # what the damping of the gears holds back when they yield
-    rows = plan.theta[None], plan.loads[None], np.zeros((1, 6))
+    shapes = model.gear_shapes(x, plan.theta, plan.loads, plan.states)
+    rows = plan.theta[None], plan.loads[None], np.zeros((1, 6)), shapes[None]
     error = pose_error(X_WE, model.predict(model.constants(x), x, *rows).X_WE[0])
     assert np.abs(lag).max() > 1e-4  # it moves
     assert np.abs(error[3:]).max() < 20e-6
@@ -61,7 +62,8 @@ def test_it_begins_where_the_robot_stands_and_at_rest(model):
     assert np.abs(plan.velocity).max() < 1e-3
 
 
-def test_velocities_and_accelerations_belong_to_the_positions(model):
+def test_velocities_and_accelerations_belong_to_the_positions():
+    model = tip_model(gear_error=0.0)  # waves of a gear are too short for differences over two periods
     session = Session(true_unknowns(model, 5), model)
     plans = []
     while session.time < 3.0:
