@@ -195,3 +195,9 @@ def learnt(servo: Servo, root_context: Context) -> dict[str, Any] | None:
     """What a law that learns has found out until now, as its ``learnt(context)`` says; None for others."""
     report = getattr(servo.law, "learnt", None)
     return None if report is None else dict(report(servo.law.GetMyContextFromRoot(root_context)))
+
+
+def calibrated(servo: Servo, root_context: Context, of: str) -> RobotModel | None:
+    """The robot as a law knows it that calibrates robots, see its ``calibrated_robot(context, of)``."""
+    robot = getattr(servo.law, "calibrated_robot", None)
+    return None if robot is None else robot(servo.law.GetMyContextFromRoot(root_context), of)

@@ -47,6 +47,7 @@ from experiments.cli.prepare import Prepared, check, prepare
 from experiments.cli.staging import staged_file, staged_folder
 from experiments.cli.tables import print_summary
 from experiments.comparison.compare import compare, compared_laws, named_laws, simulating
+from experiments.comparison.learnt_file import WriteOption, calibrating_law, robot_writer
 from experiments.comparison.results import RESULTS, write_results
 from experiments.compensate.command import compensate_command
 from experiments.diagram.view import write_diagram
@@ -143,6 +144,7 @@ def compare_command(
     laps: LapsOption = None,
     jobs: JobsOption = None,
     scheduler: SchedulerOption = None,
+    write: WriteOption = None,
 ) -> None:
     """Run several laws on one scenario, by default the open loop and three others, and compare them."""
     human = human_console(json_file)
@@ -151,6 +153,8 @@ def compare_command(
         at_least("--jobs", 1, jobs)
         cycles = 1 if is_quick else cycles
         chosen = named_laws(laws)
+        if write:
+            calibrating_law(chosen)
         changes = _settings(settings, None, feedforward, camera, laps)
         name, changes = on_station(scenario, changes, station, with_cell)
         prepared = prepare(name, changes, robot, is_quick)
@@ -162,6 +166,7 @@ def compare_command(
             ask_before_moving(human, prepared, with_cell or yes)
     with json_output(json_file) as output, refusing(OSError), ExitStack() as stack:
         stage = stack.enter_context(staged_folder(out))
+        keep_robot = robot_writer(stack, write, chosen)
         stack.enter_context(output.staged())
         if is_guided:
             logs = guide(human, (stage, out), prepared, chosen, cycles, with_cell)
@@ -170,8 +175,9 @@ def compare_command(
             with progress_bar(f"{count(runs, 'run')} {where.place(runs)}") as progress:
                 logs = compare(prepared.scenario, prepared.robot, chosen, cycles, where, progress)
         result = _write(human, stage, prepared, logs)
+        keep_robot(logs)
         output.write(with_timing(result, timing(logs)))
-    _conclude(human, result, out)
+    _conclude(human, result, out, write)
 
 
 @app.command("run")
@@ -192,6 +198,7 @@ def run_command(
         float | None,
         typer.Option(metavar="RATE", help="Largest real-time factor: 1 is real time."),
     ] = None,
+    write: WriteOption = None,
 ) -> None:
     """Run one law."""
     console = Console()
@@ -201,6 +208,8 @@ def run_command(
         name, changes = on_station(scenario, changes, station, with_cell)
         prepared = prepare(name, changes, robot)
         law = prepared.scenario.law
+        if write:
+            calibrating_law([law])
         check(prepared, [law])
         print_note(console, prepared.note)
         is_guided = prepared.scenario.station.kind == "egm"
@@ -210,9 +219,12 @@ def run_command(
             ask_before_moving(console, prepared, with_cell or yes)
     with refusing(OSError), ExitStack() as stack:
         stage = stack.enter_context(staged_folder(out))
+        keep_robot = robot_writer(stack, write, [law])
         if is_guided:
             logs = guide(console, (stage, out), prepared, [law], 1, with_cell)
-            _conclude(console, _write(console, stage, prepared, logs), out)
+            result = _write(console, stage, prepared, logs)
+            keep_robot(logs)
+            _conclude(console, result, out, write)
             return
         experiment = Experiment(prepared.scenario, law, prepared.robot)
         view = LiveView(experiment, prepared.nominal_robot) if meshcat else None
@@ -226,8 +238,10 @@ def run_command(
                 advance_live(experiment, view, progress)
             else:
                 experiment.advance(progress=progress)
-        result = _write(console, stage, prepared, {law: [experiment.log()]})
-    _conclude(console, result, out)
+        logs = {law: [experiment.log()]}
+        result = _write(console, stage, prepared, logs)
+        keep_robot(logs)
+    _conclude(console, result, out, write)
     if view:
         wait_for_interrupt(console, f"Still at {view.address}; Ctrl-C ends it")
 
@@ -314,12 +328,14 @@ def _write(
         return write_results(stage, prepared, logs)
 
 
-def _conclude(console: Console, result: Mapping[str, Any], out: Path) -> None:
+def _conclude(console: Console, result: Mapping[str, Any], out: Path, robot_file: str | None = None) -> None:
     print_summary(console, result)
     console.print(escape(verdict(result)))
     console.print()
     for name, purpose in RESULTS.items():
         console.print(f"{escape(str(out / name))}  [dim]{purpose}[/dim]", soft_wrap=True)
+    if robot_file:
+        console.print(f"{escape(robot_file)}  [dim]the calibrated robot[/dim]", soft_wrap=True)
 
 
 if __name__ == "__main__":

@@ -5,6 +5,8 @@ from typing import Any
 
 import numpy as np
 
+from robots.description.model import RobotModel
+
 
 @dataclass(frozen=True)
 class GuardEvent:
@@ -42,6 +44,8 @@ class RunLog:
     path_end: float  # s
     lap_starts: tuple[float, ...] = ()  # s, of the laps if the path is run several times, else empty
     learnt: dict[str, Any] | None = None  # what the law says that it has learnt; None of others
+    # the robot as a law knows it that calibrates robots
+    calibrated: RobotModel | None = field(default=None, compare=False)
     # s, wall time of each update of the law
     tick_seconds: np.ndarray = field(default_factory=lambda: np.empty(0), compare=False)
     wall_time: float = field(default=0.0, compare=False)  # s, of the simulation alone

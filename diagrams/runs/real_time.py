@@ -16,7 +16,7 @@ from diagrams.record.log import RunLog
 from diagrams.record.packed_log import PackedLog
 from diagrams.runs.simulation import guard_events, measured_along, start_position
 from diagrams.scenario.scenario import Scenario, ScenarioError
-from diagrams.servo import Servo, law_name
+from diagrams.servo import Servo, calibrated, law_name, learnt
 from robots.description.model import NUM_JOINTS, RobotModel, load_robot
 from systems.guard.guard import KINDS
 from systems.link.clock import ClockQuality, steady_time
@@ -255,6 +255,8 @@ class RealTimeRun:
             dwell_start=self.path.dwell_start,
             path_end=self.path.duration,
             lap_starts=tuple(self.path.lap_starts.tolist()) if len(self.path.lap_starts) > 1 else (),
+            learnt=learnt(self.servo, self._context),
+            calibrated=calibrated(self.servo, self._context, self.scenario.robot),
             wall_time=float(times[-1]) if n else 0.0,
         )
         report = camera.report() if camera else None

@@ -12,7 +12,7 @@ from diagrams.integration import Integration
 from diagrams.record.log import GuardEvent, RunLog
 from diagrams.record.packed_log import PackedLog
 from diagrams.scenario.scenario import Scenario, ScenarioError
-from diagrams.servo import Servo, law_name, learnt
+from diagrams.servo import Servo, calibrated, law_name, learnt
 from diagrams.station import SimulatedStation
 from diagrams.tick_clock import tick_seconds
 from robots.description.model import RobotModel, load_robot
@@ -155,6 +155,7 @@ class Experiment:
             path_end=self.path.duration,
             lap_starts=tuple(self.path.lap_starts.tolist()) if len(self.path.lap_starts) > 1 else (),
             learnt=learnt(self.servo, self.context),
+            calibrated=calibrated(self.servo, self.context, self.scenario.robot),
             tick_seconds=tick_seconds(self.servo.law),
             wall_time=self._wall_time,
         )

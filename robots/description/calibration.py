@@ -15,7 +15,8 @@ class Calibration:
 
     The placements of the file have the errors in them already. ``values`` says by which parameters of
     `robots.calibration.error_model` they differ from the robot that was calibrated, and how well these are
-    known, for whoever goes on measuring.
+    known, for whoever goes on measuring. A robot that was learnt at work has the parameters of
+    `robots.description.error_parameters`, and factors of the compliance of gears and bearings.
     """
 
     of: str = ""  # the robot that was calibrated: what stood in its scenario

@@ -5,6 +5,8 @@ from typing import Any
 
 import numpy as np
 
+from robots.description.model import RobotModel
+from systems.estimation.learnt_robot import BEARING_NAMES, GEAR_NAMES, learnt_robot
 from systems.estimation.tip_estimator import TipEstimator
 
 
@@ -23,9 +25,7 @@ def findings(estimator: TipEstimator, memory: SimpleNamespace) -> dict[str, Any]
     model = estimator.model
     x = estimator.x(memory)
     sigma = model.sigma * np.sqrt(np.diag(estimator.covariance(memory)))
-    names = [model.parameters[i].name for i in model.chosen]
-    names += [f"gear_{i}" for i in range(1, 7)]
-    names += [f"bearing_{side}_{i}" for i in range(1, 7) for side in "ab"]
+    names = _names(estimator)
     return {
         "clock_offset_s": float(x[model.C]),
         "mass_kg": float(x[model.M][0]),
@@ -34,3 +34,22 @@ def findings(estimator: TipEstimator, memory: SimpleNamespace) -> dict[str, Any]
             for name, value, spread in zip(names, x, sigma, strict=False)
         },
     }
+
+
+def calibrated_robot(estimator: TipEstimator, memory: SimpleNamespace, of: str) -> RobotModel:
+    """The robot as it is known now, for a robot file: geometry, springs, and how well these are known.
+
+    Args:
+        estimator, memory: as of `findings`.
+        of: the robot that was calibrated, as `robots.description.model.load_robot` takes it.
+    """
+    model, names = estimator.model, _names(estimator)
+    x, count = estimator.x(memory), len(names)
+    covariance = (np.outer(model.sigma, model.sigma) * estimator.covariance(memory))[:count, :count]
+    known = names, x[:count], covariance
+    return learnt_robot(model.robot, model.geometric_errors(x), x[model.K], known, of)
+
+
+def _names(estimator: TipEstimator) -> list[str]:
+    model = estimator.model
+    return [*(model.parameters[i].name for i in model.chosen), *GEAR_NAMES, *BEARING_NAMES]

@@ -1,4 +1,4 @@
-"""What gears add to the angle of a joint beyond their springs: waves, a gap and hysteresis, as linear columns."""
+"""What gears add to the angle of a joint beyond their springs, as linear columns: waves, gap, hysteresis."""
 
 from types import SimpleNamespace
 

@@ -113,7 +113,7 @@ class Keyframes:
         if leaving > first:
             # Old knowledge fades as new knowledge joins it.
             fading = 1.0 - (leaving - first) / 3000.0
-            memory.A_old[:] = fading * memory.A_old + (1.0 - fading) * np.eye(self._model.size)
+            memory.A_old[:] = fading * memory.A_old + (1.0 - fading) * self._model.prior
             memory.A_old += memory.A_leaving
             memory.b_old[:] = fading * memory.b_old + memory.b_leaving
             memory.first[0] = leaving

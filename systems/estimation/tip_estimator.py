@@ -51,7 +51,8 @@ class Pair(NamedTuple):
 class TipEstimator:
     """Recursive least squares in information form, on keyframes that are linearised again.
 
-    With A = I + sum w H^T W H and b = sum w H^T W (r + H xi) the estimate is A^-1 b, in units of the spreads.
+    With A = A_0 + sum w H^T W H and b = sum w H^T W (r + H xi) the estimate is A^-1 b, in units of the
+    spreads; A_0 is what is known before.
     """
 
     def __init__(self, model: TipModel, config: TipEstimatorConfig) -> None:
@@ -86,7 +87,7 @@ class TipEstimator:
         """Writes what is known before the first sample."""
         memory.x_geometry[:] = self.model.mean
         memory.event_at[0] = -np.inf
-        self._keyframes.reset(memory.keyframes, np.eye(self.model.size), np.zeros(self.model.size))
+        self._keyframes.reset(memory.keyframes, self.model.prior, np.zeros(self.model.size))
 
     def x(self, memory: SimpleNamespace) -> np.ndarray:
         """The unknowns in their units."""
@@ -181,8 +182,9 @@ class TipEstimator:
         mean = memory.sums / total
         r = (memory.sum_y - memory.sum_H @ memory.xi) / total
         row = keyframe_row(mean, (np.eye(4), total))
-        seen = moved(self._keyframes.predict(self.constants(memory), memory.xi, row[None]).X_WE, r[None])[0]
-        row = keyframe_row(mean, (seen, total))
+        found = self._keyframes.predict(self.constants(memory), memory.xi, row[None])
+        mean[6:12] = found.gears[0]
+        row = keyframe_row(mean, (moved(found.X_WE, r[None])[0], total))
         self._keyframes.add(memory.keyframes, row, memory.A_open, memory.b_open)
         for part in (memory.A_open, memory.b_open, memory.samples, memory.weight):
             part[:] = 0.0

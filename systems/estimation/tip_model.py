@@ -12,6 +12,9 @@ from systems.controller_model import ControllerModel
 from systems.estimation.arm_geometry import Arm, ArmGeometry, Constants, skew
 from systems.estimation.arm_loads import ArmLoads
 from systems.estimation.gear_errors import NUM_SHAPES, GearErrors
+from systems.estimation.learnt_robot import known_before
+
+_STAYS = 0.02  # of the spread, by which what was measured of a robot may have changed since
 
 
 @dataclass
@@ -20,14 +23,16 @@ class Spread:
 
     shift: float = 0.012  # m, of a frame
     angle: float = 0.03  # rad, of a joint's zero, an axis or a frame
-    calibrated_shift: float = 1e-4  # m, the same of a calibrated robot
+    calibrated_shift: float = 1e-4  # m, the same of a calibrated robot whose file does not say
     calibrated_angle: float = 2e-4  # rad
     gear: float = 0.3  # of the compliance of a gear, as a factor
     bearing: float = 0.5  # the same of a bearing
     payload: float = 0.5  # kg
     payload_centre: float = 0.015  # m
     clock: float = 2e-3  # s, between the stamps of the camera and those of the joints
-    gear_error: float = 5e-5  # rad, of a gear's waves, gap and hysteresis; zero for gears without
+    gear_error: float = (
+        0.0  # rad, of a gear's waves, gap and hysteresis; 5e-5 is a good guess where there are
+    )
 
 
 class Prediction(NamedTuple):
@@ -47,7 +52,8 @@ class TipModel:
 
     The vector of unknowns holds the identifiable geometric errors (m, rad), 18 factors of the compliance of
     gears and bearings, the mass of the payload (kg), the change of its first moment (kg m, 3), the offset
-    of the clock (s), and the sizes of the gears' errors (rad, 7 shapes of 6 joints) unless their spread is zero.
+    of the clock (s), and the sizes of the gears' errors (rad, 7 shapes of 6 joints) unless their spread is
+    zero.
     """
 
     def __init__(self, model: ControllerModel, spread: Spread) -> None:
@@ -58,7 +64,7 @@ class TipModel:
         self.identifiable: IdentifiableParameters = identifiable_parameters(drawn)
         chosen = self.chosen = self.identifiable.independent
         self.geometry, self.loads = ArmGeometry(robot, chosen), ArmLoads(robot)
-        self.parameters = error_parameters(robot)
+        self.robot, self.parameters = robot, error_parameters(robot)
         g = len(chosen)
         self.has_gear_errors = spread.gear_error > 0.0
         self.gear_errors = GearErrors(robot)
@@ -85,6 +91,21 @@ class TipModel:
         self.sigma[self.C] = spread.clock
         self.sigma[self.E] = spread.gear_error
         self._tool = self._tool_directions()
+        self.prior = np.eye(self.size)  # information, in units of the spreads
+        known = known_before(robot, drawn, chosen) if robot.is_calibrated else None
+        if known is not None:
+            self._take_over(*known)
+
+    def _take_over(self, covariance: np.ndarray, is_known: np.ndarray) -> None:
+        """Makes what a file says of geometry and springs the prior."""
+        entries = np.flatnonzero(is_known)
+        springs = entries[entries >= self.K.start]
+        self.mean[springs] = np.where(self.mean[springs] > 0.0, 1.0, 0.0)
+        scaled = covariance[np.ix_(entries, entries)] / np.outer(self.sigma[entries], self.sigma[entries])
+        # Nothing is known better than a robot stays as it was.
+        P = np.eye(self.size)
+        P[np.ix_(entries, entries)] = scaled + _STAYS**2 * np.eye(len(entries))
+        self.prior = np.linalg.inv(P)
 
     def full(self, xi: np.ndarray) -> np.ndarray:
         """The unknowns in their units from what is in units of their spread."""

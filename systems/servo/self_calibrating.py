@@ -7,12 +7,12 @@ import numpy as np
 from pydrake.common.value import Value
 from pydrake.systems.framework import Context, DiscreteValues, LeafSystem
 
-from robots.description.model import NUM_JOINTS
+from robots.description.model import NUM_JOINTS, RobotModel
 from systems.controller_model import ControllerModel
 from systems.estimation.command_delay import CommandDelay
 from systems.estimation.drive_model import DEAD_TIME, DriveModel
 from systems.estimation.events import DEAD_TIME_CHANGED, LOAD_CHANGED, TOOL_DISPLACED, Event
-from systems.estimation.findings import findings
+from systems.estimation.findings import calibrated_robot, findings
 from systems.estimation.memory import History, Layout
 from systems.estimation.parameter_lead import ParameterLead
 from systems.estimation.preview_planner import PreviewPlanner, Wanted
@@ -162,6 +162,10 @@ class SelfCalibrating(LeafSystem):
             **findings(self.estimator, memory.estimator),
             "events": self._events(memory),
         }
+
+    def calibrated_robot(self, context: Context, of: str) -> RobotModel:
+        """The robot as it is known now, see `systems.estimation.findings.calibrated_robot`."""
+        return calibrated_robot(self.estimator, self.memory(context).estimator, of)
 
     def _tick(self, context: Context, discrete_state: DiscreteValues) -> None:
         time = context.get_time()

@@ -98,6 +98,24 @@ def test_another_seed_gives_other_numbers(tmp_path):
     assert numbers[0] != numbers[1]
 
 
+def test_only_a_law_that_calibrates_can_write_a_robot(tmp_path):
+    ended = truetip("run", "--law", "open_loop", "--write", tmp_path / "robot.yaml", "--out", tmp_path)
+    assert "--write: needs one law that calibrates the robot" in refusal(ended)
+    assert not files(tmp_path)
+
+
+@pytest.mark.slow
+def test_what_was_learnt_at_work_serves_a_law_without_a_camera(tmp_path):
+    robot, numbers = tmp_path / "robot.yaml", []
+    learning = "compare", "--quick", "--laws", "self_calibrating", "--scenario", "everything"
+    assert truetip(*learning, "--write", robot, "--out", tmp_path).exit_code == 0
+    for known in ([], ["--robot", robot]):
+        blind = "compare", "--quick", "--laws", "open_loop", "--scenario", "everything"
+        ended = truetip(*blind, *known, "--out", tmp_path, "--json=-")
+        numbers.append(json.loads(ended.stdout)["runs"]["open_loop"]["true"]["max_norm_mm"])
+    assert numbers[1] < 0.2 * numbers[0]  # what is left: nobody inverts springs and delays
+
+
 def test_quick_takes_one_cycle_of_a_faster_path_and_says_so(tmp_path):
     ended = truetip("compare", "--quick", *SHORT[:1], *SHORT[2:], "--json=-")
     assert ended.exit_code == 0

@@ -7,7 +7,6 @@ from robots.description.model import load_robot
 from robots.pose import pose_error
 from systems.estimation.gear_errors import GearErrors
 from systems.estimation.tip_estimator import TipEstimator, TipEstimatorConfig
-from systems.estimation.tip_model import Spread
 from tests.systems.estimation.arms import PERIOD, MovingArm, tip_model
 
 
@@ -56,13 +55,13 @@ def test_hysteresis_tells_from_which_side_a_load_was_reached(robot):
 
 
 def test_columns_for_gear_errors_find_what_waves_and_gap_do_to_the_tip():
-    true = tip_model()
+    true = tip_model(gear_error=5e-5)
     x = true.mean.copy()
     rng = np.random.default_rng(0)
     x[true.E] = 4e-5 * rng.choice([-1.0, 1.0], 42)
     arm = MovingArm(true, x)
     errors = []
-    for spread in (Spread().gear_error, 0.0):
+    for spread in (5e-5, 0.0):
         model = tip_model(gear_error=spread)
         estimator = TipEstimator(model, TipEstimatorConfig())
         memory = estimator.layout.view(np.zeros(estimator.layout.size))

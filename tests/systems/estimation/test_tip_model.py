@@ -12,12 +12,13 @@ from tests.systems.estimation.arms import MovingArm, tip_model, true_unknowns
 
 
 def test_columns_are_the_derivatives_of_the_tip():
-    model = tip_model()
+    model = tip_model(gear_error=5e-5)
     x = true_unknowns(model, 1)
     pair = MovingArm(model, x).pair(0.7, noise=0.0)
+    shapes = np.random.default_rng(0).uniform(-1.0, 1.0, (1, 7, 6))
 
     def tip(unknowns):
-        rows = pair.theta[None], pair.loads[None], pair.twist[None]
+        rows = pair.theta[None], pair.loads[None], pair.twist[None], shapes
         return model.predict(model.constants(unknowns), unknowns, *rows)
 
     H, step = tip(x).H[0], 1e-4
