@@ -9,7 +9,7 @@ from pydrake.systems.framework import Context, DiscreteValues, LeafSystem
 
 from robots.description.model import NUM_JOINTS, RobotModel
 from systems.controller_model import ControllerModel
-from systems.estimation.command_delay import CommandDelay
+from systems.estimation.dead_time import CommandDelay
 from systems.estimation.drive_model import DEAD_TIME, DriveModel
 from systems.estimation.events import DEAD_TIME_CHANGED, LOAD_CHANGED, TOOL_DISPLACED, Event
 from systems.estimation.findings import calibrated_robot, findings

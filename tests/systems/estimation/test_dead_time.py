@@ -3,8 +3,7 @@
 import numpy as np
 import pytest
 
-from systems.estimation.command_delay import CommandDelay
-from systems.estimation.dead_time import DeadTime, DeadTimeConfig
+from systems.estimation.dead_time import CommandDelay, DeadTime, DeadTimeConfig
 
 PERIOD = 4e-3
 
