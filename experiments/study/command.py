@@ -178,8 +178,8 @@ def study_verdict(study: Study, rows: Rows) -> str:
         return f"All {count(len(rows['row']), 'run')} failed."
     best = ranked[0]
     return (
-        f"Over {count(len(rows['row']), 'run')} {law_title(best)} is best in its worst run: "
-        f"{FIGURES[metric]} {found[best]['worst']:.3g}, in the median {found[best]['median']:.3g}."
+        f"Over {count(len(rows['row']), 'run')} {law_title(best)} is best in its worst run, with "
+        f"{found[best]['worst']:.3g} (median {found[best]['median']:.3g}): {FIGURES[metric]}."
         + (f" {count(failed, 'run')} failed." if failed else "")
     )
 

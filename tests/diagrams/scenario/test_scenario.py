@@ -34,6 +34,7 @@ def test_the_shipped_scenarios_load_by_name_and_say_what_they_are():
         "everything-realistic",
         "misaligned",
         "nominal",
+        "probst-6-7",
     ]
     for name in shipped_scenarios():
         assert len(load_scenario(name).description) > 40
