@@ -23,7 +23,8 @@ from experiments.calibration.calibrate import (
     validation_configurations,
 )
 from experiments.calibration.noise_option import ESTIMATE, noise_option
-from experiments.calibration.report import calibration_json, print_calibration, write_calibration_page
+from experiments.calibration.page import write_calibration_page
+from experiments.calibration.report import calibration_json, print_calibration
 from experiments.calibration.urdf_option import urdf_robot, urdf_sag
 from experiments.cli.console import print_files, progress_bar, refusing
 from experiments.cli.json_output import human_console, json_output
@@ -120,7 +121,7 @@ def calibrate_command(
         measured = _read(wanted) if measurements else _simulated(prepared, wanted)
         study = _study(prepared, wanted, measured)
         path = None if measurements else _path(prepared.scenario, study)
-        output.write(calibration_json(study, path))
+        output.write(calibration_json(study, path, measured.problems))
         _write_tables(stage, measured.sets)
         write_calibration_page(stage / "report.html", prepared.title, study, path, measured.problems)
         if robot_file:

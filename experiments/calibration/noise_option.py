@@ -8,7 +8,7 @@ import yaml
 from robots.calibration.measurements import SOURCE_NOISE, MeasurementNoise
 
 ESTIMATE = "estimate"
-_NAMED = {ESTIMATE: MeasurementNoise(), "none": MeasurementNoise(), "source": SOURCE_NOISE}
+_NAMED = {ESTIMATE: MeasurementNoise(), "source": SOURCE_NOISE}
 _KEYS = ("joint_deg", "position_mm", "rotation_deg")
 
 

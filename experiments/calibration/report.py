@@ -1,40 +1,33 @@
-"""Results of a calibration as JSON, as terminal tables and as a page."""
+"""Results of a calibration as JSON and as terminal tables."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict
-from pathlib import Path
 from typing import Any
 
 import numpy as np
-import plotly.graph_objects as go
 from rich import box
 from rich.console import Console
 from rich.markup import escape
 from rich.table import Table
 
 from experiments.calibration.calibrate import CalibrationStudy
-from experiments.metrics.run_metrics import path_window, pose_errors
-from experiments.report.plot_page import Section, html_table, write_plot_page
-from experiments.report.robot_plot import tips_figure
 from robots.calibration.identifiability import completeness
 from robots.calibration.identified import Identified
 from robots.calibration.measurement_file import RowProblem
-from robots.calibration.prior import CENTRE_OF_MASS, MASS
 from robots.calibration.repeatability import repeatability
-from robots.calibration.validation import ErrorStatistics, prediction_errors
+from robots.calibration.validation import ErrorStatistics
 from robots.pose import zyx_from_rotation
 
 Problems = Sequence[tuple[str, RowProblem]]
-_AXES = ("Δx mm", "Δy mm", "Δz mm", "ρx °", "ρy °", "ρz °")
-_COLORS = {"before": "#9aa5b4", "after": "#0f7cc0"}
+AXES = ("Δx mm", "Δy mm", "Δz mm", "ρx °", "ρy °", "ρz °")
 _WEAK = 0.5  # share of the data in what is known of a parameter, below which it is said
 _MISFIT = 1.3  # of residuals, in units of the known noise, from which it is said
 _NO_NOISE_MM = 1e-6
-_LEAST_MM = 1e-13  # rounding, where it happens to be nothing
-_CONFIDENCE = 1.96  # standard deviations to either side hold 95 %
 
 
-def calibration_json(study: CalibrationStudy, path: Mapping[str, Any] | None) -> dict[str, Any]:
+def calibration_json(
+    study: CalibrationStudy, path: Mapping[str, Any] | None, problems: Problems = ()
+) -> dict[str, Any]:
     """The numbers of a calibration; what was not done is None."""
     design = study.design
     errors, found = None, study.identified
@@ -55,6 +48,7 @@ def calibration_json(study: CalibrationStudy, path: Mapping[str, Any] | None) ->
         "outliers": list(study.identified.outliers),
         "validation_outliers": list(study.validation_outliers),
         "converged": True,  # what has not converged is refused
+        "left_out": rows_left_out(study, problems),
         "rank": found.rank,
         "names": list(found.names),
         "values": found.values.tolist(),
@@ -79,6 +73,17 @@ def calibration_json(study: CalibrationStudy, path: Mapping[str, Any] | None) ->
         },
         "path": path and {name: path[name]["errors"] for name in ("before", "after")},
     }
+
+
+def rows_left_out(study: CalibrationStudy, problems: Problems) -> list[dict[str, Any]]:
+    """Rows that were not used: where they stand and why."""
+    left_out = [{"file": name, "row": problem.row, "why": problem.what} for name, problem in problems]
+    for file, rows in (
+        ("identification", study.identified.outliers),
+        ("validation", study.validation_outliers),
+    ):
+        left_out += [{"file": file, "row": int(row), "why": "gross error"} for row in rows]
+    return left_out
 
 
 def residual_rows(found: Identified) -> list[dict[str, Any]]:
@@ -117,9 +122,9 @@ def print_calibration(
     if study.validation_outliers:
         rows = ", ".join(map(str, study.validation_outliers))
         console.print(f"[yellow]Outliers, left out of the validation: rows {rows}[/yellow]")
-    _print(console, "Validation: errors on fresh configurations", _validation_rows(study))
+    _print(console, "Validation: errors on fresh configurations", validation_rows(study))
     if path:
-        _print(console, "Path without a camera: true errors", _path_rows(path))
+        _print(console, "Path without a camera: true errors", path_rows(path))
     console.print(escape(calibration_verdict(study, path)))
     source_set = completeness(study.nominal, study.identified.residuals.shape[1] == 3)
     if source_set.missed:
@@ -185,14 +190,15 @@ def _print(console: Console, title: str, rows: Sequence[Sequence[str]]) -> None:
     table = Table(
         box=box.SIMPLE_HEAD, title=title, title_justify="left", title_style="italic", pad_edge=False
     )
-    for head in ("", "", *_AXES):
+    for head in ("", "", *AXES):
         table.add_column(head, justify="right" if head else "left", no_wrap=True)
     for row in rows:
         table.add_row(*row)
     console.print(table)
 
 
-def _validation_rows(study: CalibrationStudy) -> list[list[str]]:
+def validation_rows(study: CalibrationStudy) -> list[list[str]]:
+    """Statistics of each stage on fresh configurations."""
     rows = []
     stages = {
         "uncalibrated": study.before,
@@ -216,7 +222,8 @@ def _digits(millimetres: Sequence[float], degrees: Sequence[float]) -> list[str]
     return [f"{value:.4f}" for value in millimetres] + [f"{value:.3f}" for value in degrees]
 
 
-def _path_rows(path: Mapping[str, Any]) -> list[list[str]]:
+def path_rows(path: Mapping[str, Any]) -> list[list[str]]:
+    """Errors on the path before and after."""
     rows = []
     for stage, name in (("uncalibrated", "before"), ("calibrated", "after")):
         errors = path[name]["errors"]
@@ -224,86 +231,3 @@ def _path_rows(path: Mapping[str, Any]) -> list[list[str]]:
             numbers = _digits(errors[f"{kind}_mm"], errors[f"{kind}_deg"])
             rows.append([stage if kind == "max" else "", kind, *numbers])
     return rows
-
-
-def write_calibration_page(
-    page: Path, title: str, study: CalibrationStudy, path: Mapping[str, Any] | None, problems: Problems
-) -> None:
-    """The page of a calibration; opens offline."""
-    head = ["", "", *_AXES]
-    sections = [
-        Section(
-            "Validation", "Mean, largest and 90 % absolute errors.", html_table(head, _validation_rows(study))
-        )
-    ]
-    if study.sets.validation is not None:
-        note = "Distances between measured and predicted positions on the validation set."
-        sections.append(Section("How the errors are spread", note, _histogram(study), 320))
-    if path:
-        note = "No camera: the path is planned with the nominal and with the calibrated robot. True errors."
-        sections.append(Section("Path", note, html_table(head, _path_rows(path))))
-        sections.append(Section("Distance from the path", "", _path_figure(path), 360))
-    note = (
-        "With 95 % confidence. Placements are displaced along (x, y, z) and turned about (rx, ry, rz) the "
-        "axes of their frame; zero is the zero point of a joint. A dependent parameter is zero, its effect "
-        "is in the ones shown."
-        f" Intervals of compliances contain masses known to {100.0 * MASS:.0f} % and centres known to "
-        f"{1e3 * CENTRE_OF_MASS:.0f} mm."
-    )
-    sections.append(Section("Parameters", note, html_table(*_parameter_table(study))))
-    q, rows = study.sets.calibration.q, study.sets.calibration.rows
-    names = [f"row {row}" for row in rows]
-    sections.append(Section("Measured configurations", "", tips_figure(study.nominal, q, names), 560))
-    left_out = [[name, str(problem.row), problem.what] for name, problem in problems]
-    left_out += [
-        ["", str(row), "outlier, left out of the identification"] for row in study.identified.outliers
-    ]
-    if left_out:
-        sections.append(Section("Rows left out", "", html_table(["file", "row", "why"], left_out)))
-    write_plot_page(page, f"Calibration, {title}", calibration_verdict(study, path), sections)
-
-
-def _histogram(study: CalibrationStudy) -> go.Figure:
-    assert study.sets.validation is not None
-    figure = go.Figure()
-    for name, robot in (("before", study.nominal), ("after", study.calibrated)):
-        distance = np.linalg.norm(prediction_errors(robot, study.sets.validation)[:, -3:], axis=1)
-        size = np.log10(np.maximum(1e3 * distance, _LEAST_MM))
-        trace = go.Histogram(x=size, name=name, opacity=0.7, marker_color=_COLORS[name])
-        figure.add_trace(trace)
-    ticks = list(range(-4, 3))
-    axis = {"title": "error in mm", "tickvals": ticks, "ticktext": [f"{10.0**tick:g}" for tick in ticks]}
-    figure.update_layout(barmode="overlay", xaxis=axis, yaxis={"title": "configurations"})
-    return figure
-
-
-def _path_figure(path: Mapping[str, Any]) -> go.Figure:
-    figure = go.Figure()
-    for name in ("before", "after"):
-        log = path[name]["log"]
-        keep = path_window(log)
-        distance = 1e3 * np.linalg.norm(pose_errors(log, "true")[keep, 3:], axis=1)
-        time = log.time[keep] - log.path_start
-        figure.add_trace(go.Scatter(x=time, y=distance, name=name, line={"color": _COLORS[name]}))
-    figure.update_layout(xaxis={"title": "time in s"}, yaxis={"title": "mm", "type": "log"})
-    return figure
-
-
-def _parameter_table(study: CalibrationStudy) -> tuple[list[str], list[list[str]]]:
-    """Each parameter in mm, degrees or rad per N m, with its confidence, and with the truth where known."""
-    identified, truth = study.identified, study.truth
-    rows = []
-    for number, name in enumerate(identified.names):
-        unit, factor = ("deg", 180.0 / np.pi)
-        if name.startswith("c_"):
-            unit, factor = "rad / N m", 1.0
-        elif name.endswith(("_x", "_y", "_z")):
-            unit, factor = "mm", 1e3
-        value, sigma = factor * identified.values[number], factor * identified.sigmas[number]
-        share = f"{100.0 * identified.shares[number]:.1f} %"
-        row = [name, unit, f"{value:.6g}", f"{_CONFIDENCE * sigma:.2g}", share]
-        if truth is not None:
-            row.append(f"{factor * truth[number]:.6g}")
-        rows.append(row)
-    head = ["parameter", "unit", "value", "±", "from the data"]
-    return [*head, *(["truth"] if truth is not None else [])], rows

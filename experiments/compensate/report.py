@@ -7,7 +7,7 @@ import numpy as np
 import plotly.graph_objects as go
 
 from experiments.compensate.study import CompensationStudy
-from experiments.report.plot_page import Section, html_table, write_plot_page
+from experiments.report.plot_page import Section, html_table, sortable_table, write_plot_page
 from experiments.report.robot_plot import joint_origins
 from robots.programs.compensation import FalseTarget
 from robots.programs.configuration import in_words
@@ -76,7 +76,7 @@ def write_compensation_page(page: Path, study: CompensationStudy) -> None:
     names = ["line", "target", "tool", "base", "kg", "Δx mm", "Δy mm", "Δz mm", "shift mm", "turn °"]
     names += ["configuration", "to limit °", "before mm", "after mm", ""]
     note = "Shifts along the axes of the base, of joint targets of the tool. Configuration as it is written."
-    sections.append(Section("Targets", note, html_table(names, _rows(study))))
+    sections.append(Section("Targets", note, sortable_table("targets", names, _rows(study))))
     left = [[str(note.line), note.text] for note in study.corrected.notes]
     left += [["", text] for text in study.notes]
     if left:

@@ -2,11 +2,10 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from html import escape
 from pathlib import Path
 
 import plotly.graph_objects as go
-from markupsafe import Markup
+from markupsafe import Markup, escape
 
 from experiments.report.page import write_page
 
@@ -48,8 +47,25 @@ def write_plot_page(path: str | Path, title: str, verdict: str, sections: Sequen
 
 
 def html_table(head: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
-    """A table; all cells are text."""
+    """A table; cells are text unless they are marked as HTML."""
+    return f"<div class=scroll><table>{_inside(head, rows)}</table></div>"
+
+
+def sortable_table(name: str, head: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
+    """A long table that sorts by a click on a head, with a button that saves it.
+
+    Args:
+        name: of the file, without its suffix; unlike all others of the page.
+        head: names of the columns.
+        rows: cells, text unless they are marked as HTML.
+    """
+    button = f'<button class=csv data-table="{name}">Save as CSV</button>'
+    table = f'<table class=sortable id="{name}">{_inside(head, rows)}</table>'
+    return f'{button}<div class="scroll tall">{table}</div>'
+
+
+def _inside(head: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
     cells = ["".join(f"<td>{escape(cell)}</td>" for cell in row) for row in rows]
     titles = "".join(f"<th>{escape(name)}</th>" for name in head)
     lines = "".join(f"<tr>{line}</tr>" for line in cells)
-    return f"<div class=scroll><table><thead><tr>{titles}</tr></thead><tbody>{lines}</tbody></table></div>"
+    return f"<thead><tr>{titles}</tr></thead><tbody>{lines}</tbody>"

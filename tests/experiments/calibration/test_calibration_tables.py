@@ -57,6 +57,7 @@ def test_a_robot_without_analytic_inverse_is_calibrated_from_a_tracker(
         (["--count", "30"], "--count is for simulated measurements; with --measurements it has no effect"),
         (["--urdf-payload", "3"], "--urdf-payload needs --urdf"),
         (["--urdf", "x.urdf", "--urdf-payload", "3"], "--urdf-payload needs --compliance"),
+        (["--noise", "none"], "--noise must be estimate, source or the path of a YAML file, got 'none'"),
         (["--noise", "noise.yaml"], "--noise noise.yaml: position_mm must be positive, got 0"),
         (["--validation", "empty.csv"], "measurements empty.csv: no row but the header"),
         (["--validation", "heavy.csv"], "no usable row; payload_kg must not be negative, got -1"),
