@@ -16,6 +16,7 @@ from robots.dynamics.compliant_kinematics import controller_kinematics
 from robots.dynamics.newton_inverse import inverse_kinematics
 from robots.kinematics.analytic_inverse import InverseKinematics
 from robots.kinematics.forward import Kinematics
+from robots.kinematics.numeric_inverse import NumericInverse
 from robots.pose import pose_error, rotation_from_zyx, zyx_from_rotation
 from robots.programs.configuration import Branch, differences, rewritten, says_configuration, turns_within
 from robots.programs.program import Literal, Program, Target
@@ -65,7 +66,7 @@ class Compensation:
             payload: kg, for all targets; None for what the program says, and zero where it says nothing.
 
         Raises:
-            ValueError: if the controller's inverse kinematics cannot be solved in closed form.
+            ValueError: if the inverse kinematics of one of them cannot be solved.
         """
         self._nominal, self._true, self._payload = nominal, _in_world(calibrated), payload
         self._arms: dict[tuple[bytes, float], _Arm] = {}
@@ -188,7 +189,9 @@ class _Arm:
         self._robot = nominal
         self.nominal = Kinematics(nominal)
         self.true = controller_kinematics(true, payload)
-        self._inverse = InverseKinematics(nominal)
+        inverse = inverse_kinematics(nominal)
+        assert isinstance(inverse, InverseKinematics | NumericInverse)
+        self._inverse = inverse
         self.inverse_of_true = inverse_kinematics(true, payload)
 
     def choose(self, target: Target, q_near: np.ndarray) -> tuple[np.ndarray, bool]:
@@ -199,11 +202,14 @@ class _Arm:
         """
         X_WT = target.base.X @ target.X_BT
         best, least = None, (99, 99, np.inf)
-        for branch, q in zip(_BRANCHES, self._inverse.all_branches(X_WT), strict=True):
+        found = self._inverse.all_branches(X_WT)
+        # Only of arms with a wrist in one point do makers number the branches.
+        branches = _BRANCHES if isinstance(self._inverse, InverseKinematics) else [None] * len(found)
+        for branch, q in zip(branches, found, strict=True):
             if np.isnan(q).any():
                 continue
             for turned in turns_within(q, self._robot.lower, self._robot.upper):
-                sign = (branch[0], branch[1], turned[4] < 0.0)
+                sign = branch and (branch[0], branch[1], turned[4] < 0.0)
                 far = float(np.sum((np.array(turned) - q_near) ** 2))
                 rank = (*differences(target, turned, sign), far)
                 if rank < least:

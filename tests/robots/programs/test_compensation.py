@@ -85,10 +85,12 @@ def test_a_kuka_keeps_its_status_and_its_turns_follow_the_axes():
     assert np.abs(reached - flange(nominal, q))[:, :3, 3].max() < 1e-9
 
 
-@pytest.mark.parametrize("kind", ["joints", "poses"])
-def test_tables_have_the_tool_of_the_robot_file(kind: str):
-    nominal = load_robot("irb1200")
+@pytest.mark.parametrize(("name", "kind"), [("irb1200", "joints"), ("irb1200", "poses"), ("ur10", "joints")])
+def test_tables_have_the_tool_of_the_robot_file(name: str, kind: str):
+    nominal = load_robot(name)
     true, q = with_random_errors(nominal, 5), configurations(10, 3)
+    if name == "ur10":
+        q[:, 2] = 1.2 + 0.3 * q[:, 2]  # not stretched
     poses = Kinematics(nominal).forward(q)
     if kind == "joints":
         head = ";".join(f"q{number}_deg" for number in range(1, 7))
