@@ -36,6 +36,14 @@ def read_scenario_nodes(name: str, settings: list[str], schema: type) -> Node:
     return node
 
 
+def stated_keys(node: Node, path: str = "") -> set[str]:
+    """All that files and settings say, by their places, such as ``station.camera.delay``."""
+    if not isinstance(node.value, dict):
+        return {path}
+    inside = (stated_keys(each, f"{path}.{key}".lstrip(".")) for key, each in node.value.items())
+    return {path}.union(*inside)
+
+
 def _folder():
     return files("diagrams.scenario") / "data"
 

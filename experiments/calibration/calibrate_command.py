@@ -111,7 +111,7 @@ def calibrate_command(
     with json_output(json_file) as output, refusing(ValueError, OSError), ExitStack() as stack:
         baked = urdf_sag(urdf, urdf_payload, urdf_pose, compliance)
         wanted.check()
-        prepared = prepare(scenario, settings or [], robot)
+        prepared = prepare(scenario, settings or [], robot, needs_path=not measurements)
         if not measurements:  # of tables nothing but the kinematics is asked
             check(prepared, ["open_loop"])
         stage = stack.enter_context(staged_folder(out))

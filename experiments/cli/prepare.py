@@ -5,7 +5,9 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from diagrams.runs.simulation import Experiment, nominal_robot
+from diagrams.scenario.carried import HOME, PATH, carried_over
 from diagrams.scenario.scenario import Scenario, ScenarioError, load_scenario, scenario_text
+from diagrams.scenario.scenario_file import read_scenario_nodes, stated_keys
 from robots.description.foreign_sources import foreign_sources_note
 from robots.description.model import RobotModel, load_robot
 
@@ -20,6 +22,7 @@ class Prepared:
     title: str  # the scenario's name and how this one differs from it
     scenario: Scenario
     robot: RobotModel  # as the controller knows it
+    carried: str = ""  # what of the scenario was made to fit this robot
 
     @property
     def nominal_robot(self) -> RobotModel:
@@ -35,7 +38,7 @@ class Prepared:
                 f"the feedforward compensates an elastic structure that the robot does not have with "
                 f"station.elasticity={true}"
             )
-        return foreign_sources_note(self.robot)
+        return "; ".join(filter(None, (self.carried, foreign_sources_note(self.robot))))
 
     @property
     def text(self) -> str:
@@ -44,7 +47,11 @@ class Prepared:
 
 
 def prepare(
-    name: str, settings: Sequence[str] = (), robot: str | None = None, is_quick: bool = False
+    name: str,
+    settings: Sequence[str] = (),
+    robot: str | None = None,
+    is_quick: bool = False,
+    needs_path: bool = True,
 ) -> Prepared:
     """Reads a scenario and its robot.
 
@@ -54,6 +61,7 @@ def prepare(
         robot: a shipped robot or the path of a robot file; None for the scenario's. A calibrated robot serves
             the controller alone.
         is_quick: whether to make it `quick`.
+        needs_path: whether the path of the scenario is carried over to a robot for which it was not written.
 
     Raises:
         ValueError: if something is missing, unknown, out of range or not readable.
@@ -68,11 +76,34 @@ def prepare(
         belief = replace(scenario.servo.model, robot="")
         scenario = replace(scenario, servo=replace(scenario.servo, model=belief))
         differences.append(f"robot={robot}")
+    scenario, carried = _fitted(name, settings, scenario, robot, needs_path)
     if is_quick:
         scenario, note = quick(scenario, settings)
         differences.append(f"quick: {note}")
     title = Path(name).stem + (f" ({'; '.join(differences)})" if differences else "")
-    return Prepared(title, scenario, model)
+    return Prepared(title, scenario, model, carried)
+
+
+def _fitted(
+    name: str, settings: Sequence[str], scenario: Scenario, robot: str | None, needs_path: bool
+) -> tuple[Scenario, str]:
+    """The scenario `carried_over` from the robot for which its path was written, and what has changed.
+
+    A path that the scenario says itself belongs to its robot; else it is the default one and its robot's.
+    """
+    written = read_scenario_nodes(name, list(settings), Scenario)
+    by_scenario = stated_keys(written)
+    named = str(load_scenario(name, list(settings)).robot)
+    own = PATH in by_scenario
+    before = named if own else Scenario().robot
+    if scenario.robot == before:
+        return scenario, ""
+    stated = {setting.partition("=")[0].strip() for setting in settings}
+    if robot is None or robot == named:
+        stated |= by_scenario
+    if not needs_path:
+        stated |= {PATH, HOME}
+    return carried_over(scenario, load_robot(before), load_robot(scenario.robot), stated)
 
 
 def quick(scenario: Scenario, settings: Sequence[str] = ()) -> tuple[Scenario, str]:

@@ -41,13 +41,14 @@ def feedforward_command(
     payload: PayloadOption = None,
     grid: GridOption = 7,
     plant: Annotated[
-        str,
+        str | None,
         typer.Option(
             "--plant",
             metavar="|".join(PLANTS),
             help="What is driven: the robot of the models, or the one named after it with -realistic.",
+            show_default="realistic, where there is such a file",
         ),
-    ] = "realistic",
+    ] = None,
     stiffness_error: Annotated[
         float,
         typer.Option(
@@ -68,9 +69,9 @@ def feedforward_command(
     human = human_console(json_file)
     with json_output(json_file) as output, refusing(ValueError, OSError), ExitStack() as stack:
         at_least("--jobs", 1, jobs)
-        if plant not in PLANTS:
+        if plant not in (None, *PLANTS):
             raise ValueError(f"--plant must be one of {', '.join(PLANTS)}, got '{plant}'")
-        model, realistic = load_robot(robot), realistic_robot(robot) if plant == "realistic" else None
+        model, realistic = load_robot(robot), _driven(robot, plant)
         mass = model.payload.largest_mass if payload is None else payload
         page = stack.enter_context(staged_file(out / PAGE))
         stack.enter_context(output.staged())
@@ -88,13 +89,25 @@ def feedforward_command(
     print_files(human, out / PAGE)
 
 
+def _driven(name: str, plant: str | None) -> RobotModel | None:
+    """The realistic variant where it is asked for, or nothing is said and there is one; else None."""
+    if plant == "exact":
+        return None
+    try:
+        return realistic_robot(name)
+    except RobotFileError:
+        if plant is None:
+            return None
+        raise
+
+
 def realistic_robot(name: str) -> RobotModel:
     """The realistic variant of a robot: the file that is named after it.
 
     Raises:
         RobotFileError: if there is none.
     """
-    stem = name.removesuffix(".yaml").removesuffix(".yml")
+    stem = name.removesuffix(".yaml").removesuffix(".yml").removesuffix(".urdf")
     try:
         return load_robot(f"{stem}-realistic{name[len(stem) :]}")
     except RobotFileError as error:

@@ -9,18 +9,23 @@ from diagrams.runs.simulation import run
 from diagrams.scenario.scenario import Scenario, load_scenario
 from experiments.cli.workers import Progress
 from robots.description.model import NUM_JOINTS, RobotModel
-from robots.kinematics.arm_structure import seen_from_base
+from robots.dynamics.newton_inverse import inverse_kinematics
+from robots.kinematics.arm_structure import AXES, seen_from_base
 from robots.kinematics.forward import Kinematics
+from robots.kinematics.workspace import working_positions
 from robots.pose import zyx_from_rotation
 from systems.feedforward import FeedforwardConfig
 from systems.feedforward.arm_correction import reach
-from systems.reference.paths import ReferenceConfig
+from systems.reference.paths import ReferenceConfig, make_path
 from systems.reference.shapes import Rectangle, Waypoint
 
 LAW = "open_loop"  # no camera: the feedforward has to do it alone
 PACE = 8.0  # 1/s^2, k_a: an edge takes 1.2 s, with sin^2 timing a second
+_FASTEST = 0.95  # share of the largest joint speeds: a robot that is too slow for the pace takes longer
+_SAMPLES = 400  # of the path, for that
 DEPTH, WIDTH = 0.2, 0.4  # of the reach, the edges away from the robot and across
 SETTLE, DWELL = 1.0, 0.5  # s at rest: the arm is first wound up, at the end it rings
+_ALONG = 0.9  # cosine of an axis that points nearly along a direction
 _LEANING = np.deg2rad(30.0)  # of the upper arm from the vertical
 
 
@@ -100,13 +105,38 @@ def rectangle_scenario(trial: RectangleTrial) -> Scenario:
         dwell=DWELL,
         preview=drive.command_delay + drive.dead_time,
     )
+    reference = replace(reference, acceleration=feasible_pace(trial.robot, home, reference))
     servo = replace(scenario.servo, feedforward=trial.config)
     return replace(scenario, home_deg=np.rad2deg(home), reference=reference, servo=servo)
 
 
+def feasible_pace(robot: RobotModel, home: np.ndarray, reference: ReferenceConfig) -> float:
+    """The acceleration along a path, in 1/s^2, lowered where a joint would be too slow for it.
+
+    Args:
+        robot: which follows it.
+        home: near where it begins, rad, shape (6,).
+        reference: the path; one out of reach is left as it is, for the simulation to refuse.
+    """
+    path = make_path(reference)
+    times = np.linspace(path.path_start, path.dwell_start, _SAMPLES)
+    try:
+        q = inverse_kinematics(robot).along(path.sample(times)[0], home)
+    except ValueError:
+        return reference.acceleration
+    used = float((np.abs(np.diff(q, axis=0)) / np.diff(times)[:, None] / robot.speed).max())
+    return reference.acceleration * min(1.0, _FASTEST / used) ** 2
+
+
 def working_position(robot: RobotModel) -> np.ndarray:
-    """Upper arm leaning forward, forearm level, tool down; rad, shape (6,)."""
+    """Upper arm leaning forward, forearm level, tool down; rad, shape (6,).
+
+    Of an arm whose axes do not point along z, y, y, x, y, x at zero it is where it moves most freely.
+    """
     axes, offsets, _ = seen_from_base(robot)
+    along = [axis["xyz".index(letter)] for axis, letter in zip(axes, AXES, strict=True)]
+    if np.abs(along).min() < _ALONG:
+        return np.deg2rad(robot.home_deg) if robot.home_deg else working_positions(robot, 1)[0]
     upper_arm = np.arctan2(offsets[2, 0], offsets[2, 2])  # from z towards x, at zero joint angles
     wrist = offsets[3] + offsets[4]
     forearm = np.arctan2(wrist[0], wrist[2])

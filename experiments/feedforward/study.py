@@ -73,7 +73,9 @@ def study_feedforward(
     for each in configs.values():  # what is impossible is refused here and not in a process
         FEEDFORWARDS[each.kind](ControllerModel(robot, payload), each)
     # From everywhere there is room for the largest motion.
-    axis_2, axis_3 = np.linspace(robot.lower[1:3], robot.upper[1:3] - np.deg2rad(max(ANGLES_DEG)), grid).T
+    # Of a range of more than a turn, one turn.
+    lower, upper = np.maximum(robot.lower, -np.pi), np.minimum(robot.upper, np.pi)
+    axis_2, axis_3 = np.linspace(lower[1:3], upper[1:3] - np.deg2rad(max(ANGLES_DEG)), grid).T
     starts = [np.array([0.0, q2, q3, 0.0, 0.0, 0.0]) for q2 in axis_2 for q3 in axis_3]
     jobs: list[RectangleTrial | Trial] = [
         RectangleTrial(robot, payload, configs[kind], realistic, timing) for kind in KINDS

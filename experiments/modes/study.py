@@ -80,7 +80,9 @@ def study_modes(
         raise ValueError(f"--grid must be at least 2, got {grid}")
     analysis = ModalAnalysis(robot, elasticity, payload)
     theta = stretched(robot)
-    axis_2, axis_3 = np.linspace(robot.lower[1:3], robot.upper[1:3], grid).T
+    # Of a range of more than a turn, one turn.
+    lower, upper = np.maximum(robot.lower, -np.pi), np.minimum(robot.upper, np.pi)
+    axis_2, axis_3 = np.linspace(lower[1:3], upper[1:3], grid).T
     workspace = []
     for q2 in axis_2:
         workspace.append([analysis.at(np.array([0.0, q2, q3, 0.0, 0.0, 0.0])) for q3 in axis_3])

@@ -119,6 +119,7 @@ class RobotModel:
     base_link: Link = field(default_factory=Link)
     links: list[Link] = field(default_factory=list)
     payload: PayloadLimits = field(default_factory=PayloadLimits)
+    home_deg: list[float] = numbers((), (0, NUM_JOINTS), unit="deg")  # where it works best; empty: found
     calibration: Calibration = field(default_factory=Calibration)
     counterbalance: CounterbalanceSpring | None = None
 

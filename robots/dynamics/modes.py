@@ -16,9 +16,13 @@ from scipy.linalg import eigh
 from robots.description.model import NUM_JOINTS, RobotModel
 from robots.dynamics.plant import add_robot
 from robots.kinematics.arm_structure import seen_from_base
+from robots.kinematics.forward import Kinematics
+from robots.kinematics.workspace import shoulder
 
 # rad; central differences of a load that changes over radians are then right to eight digits.
 _STEP = 1e-4
+_ALONG = 0.9  # cosine of an axis that points nearly along a direction
+_STEPS = 61  # of joints 2 and 3, among which the longest reach is looked for
 _UNBALANCED = 1e-6  # of the load; an arm that its springs can carry comes to rest far better
 
 
@@ -132,9 +136,12 @@ class ModalAnalysis:
 def stretched(robot: RobotModel) -> np.ndarray:
     """Upper arm and forearm level ahead of the robot, as far as its limits allow; rad, shape (6,).
 
-    This is the longest reach. There the load has the longest levers, so the modes are slowest.
+    This is the longest reach. There the load has the longest levers, so the modes are slowest. Of an arm
+    whose axes 2 and 3 do not point along y at zero it is the position with the tool farthest from axis 1.
     """
     axes, offsets, _ = seen_from_base(robot)
+    if np.abs(axes[1:3, 1]).min() < _ALONG:
+        return _farthest(robot)
     wrist = offsets[3] + offsets[4]
     upper_arm = np.arctan2(offsets[2, 0], offsets[2, 2])  # from z towards x, at zero joint angles
     forearm = np.arctan2(wrist[0], wrist[2])
@@ -143,3 +150,14 @@ def stretched(robot: RobotModel) -> np.ndarray:
     q[1] = np.clip(sign_2 * (0.5 * np.pi - upper_arm), robot.lower[1], robot.upper[1])
     q[2] = sign_3 * (0.5 * np.pi - forearm - sign_2 * q[1])
     return np.clip(q, robot.lower, robot.upper)
+
+
+def _farthest(robot: RobotModel) -> np.ndarray:
+    """The positions of joints 2 and 3 with the tool farthest from axis 1, all others at or next to zero."""
+    ranges = [np.linspace(max(robot.lower[i], -np.pi), min(robot.upper[i], np.pi), _STEPS) for i in (1, 2)]
+    second, third = (each.ravel() for each in np.meshgrid(*ranges, indexing="ij"))
+    q = np.tile(np.clip(0.0, robot.lower, robot.upper), (len(second), 1))
+    q[:, 1], q[:, 2] = second, third
+    origin, axis = shoulder(robot)
+    away = np.linalg.norm(np.cross(Kinematics(robot).forward(q)[:, :3, 3] - origin, axis), axis=1)
+    return q[int(np.argmax(away))]

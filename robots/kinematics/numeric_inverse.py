@@ -18,6 +18,8 @@ from robots.kinematics.forward import Kinematics, robust_solve
 from robots.pose import pose_error, wrap_angle
 
 CLOSE = 0.05  # rad and m; from no farther than this the steps begin where the robot is
+_NEAR = 0.5  # rad and m; a branch is followed over steps up to this
+_FOLLOWED = 0.5  # rad, by which a joint may move in such a step
 _CONVERGED = 1e-10  # rad; a step of this size leaves an error of its square
 _MOST_STEPS = 25
 _ACCURATE = 1e-9  # m, or rad: what a solution may be off
@@ -113,7 +115,7 @@ class NumericInverse:
         q_near = np.asarray(q_near, dtype=float)
         if not (np.isfinite(X_WE).all() and np.isfinite(q_near).all()):
             raise ValueError(f"inverse kinematics: not finite: pose {X_WE.tolist()} or {q_near.tolist()}")
-        q = self._newton(X_WE, q_near, CLOSE)
+        q = self.followed(X_WE, q_near)
         if q is not None:
             return self._wrap_into_limits(q)
         branches = self.all_branches(np.vstack([X_WE[:3], [0.0, 0.0, 0.0, 1.0]]))
@@ -132,6 +134,19 @@ class NumericInverse:
             assert refusal is not None
             raise refusal
         return min(fitted, key=lambda q: float(np.sum((q - q_near) ** 2)))
+
+    def followed(self, X_WE: np.ndarray, q_near: np.ndarray) -> np.ndarray | None:
+        """The solution on the branch of a configuration, whether within the limits or not.
+
+        Args:
+            X_WE: pose of the tool, shape (4, 4) or without the last row (3, 4).
+            q_near: joint positions in rad, shape (6,), at which the tool is nearly there.
+
+        Returns:
+            Joint positions in rad, shape (6,); None if Newton's steps do not lead to any nearby.
+        """
+        q = self._newton(X_WE, q_near, _NEAR)
+        return None if q is None or np.abs(q - q_near).max() > _FOLLOWED else q
 
     def along(self, X_WE: np.ndarray, q_start: np.ndarray) -> np.ndarray:
         """The joint path for a path of the tool: each sample nearest to the one before.

@@ -158,7 +158,7 @@ REFUSED = {
     "robot": ("--robot=kr211", "robot 'kr211': no file"),
     "payload": ("--payload=17", "payload of KUKA KR 16-2 must be between 0 and 16.0 kg, got 17.0 kg"),
     "plant": ("--plant=worn", "--plant must be one of exact, realistic, got 'worn'"),
-    "variant": ("--robot=kr16-realistic", "no file"),
+    "variant": ("--robot=kr16-realistic --plant=realistic", "no file"),
     "grid": ("--grid=1", "--grid must be at least 2, got 1"),
     "jobs": ("--jobs=0", "--jobs must be at least 1, got 0"),
     "error": ("--stiffness-error=-1", "stiffness_error must be above -1 and finite, got -1"),
@@ -167,5 +167,5 @@ REFUSED = {
 
 @pytest.mark.parametrize(("option", "message"), REFUSED.values(), ids=REFUSED)
 def test_wrong_input_is_refused_in_one_line_and_leaves_nothing(tmp_path: Path, option: str, message: str):
-    assert message in refusal(run(tmp_path, option))
+    assert message in refusal(run(tmp_path, *option.split()))
     assert files(tmp_path) == set()

@@ -1,0 +1,240 @@
+"""A scenario carried over to a robot for which it was not written.
+
+Path, load and home position of a scenario fit one robot. Another one gets the same path at its own size:
+turned and moved so that the middle of the path, with the tool's orientation there, is a place where this
+robot moves freely, and smaller where it would not reach all of it. Its load is the same share of what it may
+carry. What is said explicitly, as by ``--set``, stays.
+"""
+
+from collections.abc import Collection, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from diagrams.scenario.scenario import Scenario, ScenarioError
+from robots.description.model import RobotModel
+from robots.kinematics.forward import Kinematics
+from robots.kinematics.numeric_inverse import NumericInverse
+from robots.kinematics.workspace import arm_length, dexterity, front, shoulder, working_positions
+from robots.measurement_design.constraints import AdmissibleConfig, AdmissibleConfigurations
+from robots.pose import rotation_from_zyx, zyx_from_rotation
+from systems.cell.events.station_events import PayloadChange
+from systems.reference.paths import ReferenceConfig, make_path
+from systems.reference.shapes import Circle, FigureEight, Points, Rectangle, Shape, Waypoint
+
+PATH, HOME, PAYLOAD = "reference.path", "home_deg", "station.payload"  # what is carried over
+_SAME = 0.05  # m, and of direction cosines: robots that are one machine with errors differ by less
+_SIZES = (1.0, 0.8, 0.6, 0.45, 0.3, 0.2, 0.12)  # of the path, over what the lengths of the arms say
+_SAMPLES = 120  # of a path, at which it is tried
+_JUMP = 0.6  # rad between two of them: another branch
+_MARGIN = np.deg2rad(3.0)  # from the limits of the joints
+_SPEED = 0.4  # share of the largest joint speeds: a quick comparison is twice as fast
+_UPRIGHT, _NO_FLOOR = 0.99, 100.0  # cosine, and m
+_DEXTERITY = 0.25  # on the path, over that of the best position
+
+
+def is_alike(robot: RobotModel, other: RobotModel) -> bool:
+    """Whether two robots are one machine, or one with errors: the tools are at nearly the same places."""
+    q = np.random.default_rng(0).uniform(-1.0, 1.0, (8, 6))
+    return bool(np.abs(Kinematics(robot).forward(q) - Kinematics(other).forward(q)).max() < _SAME)
+
+
+def carried_over(
+    scenario: Scenario, before: RobotModel, robot: RobotModel, stated: Collection[str] = ()
+) -> tuple[Scenario, str]:
+    """The scenario for another robot.
+
+    Args:
+        scenario: as it was written.
+        before: the robot for which it was written.
+        robot: the one that is to run it.
+        stated: which of `PATH`, `HOME`, `PAYLOAD`, or fields of them, are said for this very robot.
+
+    Returns:
+        The scenario, and what has changed in words; the same scenario and nothing if the robots are alike.
+
+    Raises:
+        ScenarioError: if no place for the path is found.
+    """
+    if is_alike(before, robot):
+        return scenario, ""
+    notes = []
+    if not _is_stated(PAYLOAD, stated):
+        scenario = _with_load(scenario, before, robot)
+        notes.append(f"payload {scenario.station.payload:g} kg")
+    if not _is_stated(PATH, stated):
+        placed = _place(scenario, before, robot)
+        reference = replace(scenario.reference, path=placed.path)
+        scenario = replace(scenario, reference=reference)
+        if not _is_stated(HOME, stated):
+            scenario = replace(scenario, home_deg=np.round(np.rad2deg(placed.start), 3))
+        notes.append(f"path {placed.scale:.2g} times as large, at {_metres(placed.middle)} m")
+    return scenario, f"carried over from {before.name} to {robot.name}: {', '.join(notes)}" if notes else ""
+
+
+def _is_stated(key: str, stated: Collection[str]) -> bool:
+    return any(each == key or each.startswith(f"{key}.") for each in stated)
+
+
+def _metres(p: np.ndarray) -> str:
+    return ", ".join(f"{value:.2f}" for value in p)
+
+
+def _with_load(scenario: Scenario, before: RobotModel, robot: RobotModel) -> Scenario:
+    """The same share of the largest payload, also in what the controller believes and in what happens."""
+    largest = before.payload.largest_mass
+    share = robot.payload.largest_mass / largest if largest > 0.0 else 0.0
+    station, model = scenario.station, scenario.servo.model
+
+    def carried(mass: float) -> float:
+        return round(share * mass, 4)
+
+    events = [
+        replace(event, payload=carried(event.payload)) if isinstance(event, PayloadChange) else event
+        for event in station.events
+    ]
+    station = replace(station, payload=carried(station.payload), events=events)
+    if model.payload is not None:
+        model = replace(model, payload=carried(model.payload))
+    return replace(scenario, station=station, servo=replace(scenario.servo, model=model))
+
+
+@dataclass(frozen=True)
+class _Placed:
+    """A path where a robot can follow it."""
+
+    path: Shape
+    start: np.ndarray  # rad, shape (6,)
+    middle: np.ndarray  # m, shape (3,)
+    scale: float
+
+
+class _Motion:
+    """Turns, moves and scales a path; the tool at its middle gets a new orientation."""
+
+    def __init__(self, frames: Sequence[np.ndarray], middles: Sequence[np.ndarray], scale: float) -> None:
+        """From the old to the new: ``frames`` at the fronts (3, 3), ``middles`` of the path (4, 4)."""
+        self.turn = frames[1] @ frames[0].T
+        self._old, self._new, self.scale = middles[0], middles[1], scale
+
+    def point_mm(self, p: np.ndarray) -> np.ndarray:
+        moved = self._new[:3, 3] + self.scale * self.turn @ (1e-3 * np.asarray(p) - self._old[:3, 3])
+        return np.round(1e3 * moved, 4)
+
+    def tool(self, zyx_deg: np.ndarray) -> np.ndarray:
+        relative = rotation_from_zyx(np.deg2rad(zyx_deg)) @ self._old[:3, :3].T
+        return _degrees(self.turn @ relative @ self.turn.T @ self._new[:3, :3])
+
+    def plane(self, zyx_deg: np.ndarray) -> np.ndarray:
+        return _degrees(self.turn @ rotation_from_zyx(np.deg2rad(zyx_deg)))
+
+    def of(self, path: Shape) -> Shape:
+        """The path where it now is."""
+        if isinstance(path, (Rectangle, Points)):
+            points = [Waypoint(self.point_mm(w.translation_mm), self.tool(w.zyx_deg)) for w in path.waypoints]
+            return replace(path, waypoints=points)
+        moved: dict[str, Any] = {
+            "center_mm": self.point_mm(path.center_mm),
+            "plane_zyx_deg": self.plane(path.plane_zyx_deg),
+            "zyx_deg": self.tool(path.zyx_deg),
+        }
+        if isinstance(path, Circle):
+            return replace(path, radius_mm=self.scale * path.radius_mm, **moved)
+        assert isinstance(path, FigureEight)
+        lengths = {"length_mm": self.scale * path.length_mm, "width_mm": self.scale * path.width_mm}
+        return replace(path, **lengths, **moved)
+
+
+def _degrees(rotation: np.ndarray) -> np.ndarray:
+    return np.round(np.rad2deg(zyx_from_rotation(rotation)), 6)
+
+
+def _place(scenario: Scenario, before: RobotModel, robot: RobotModel) -> _Placed:
+    old = _middle(scenario.reference)
+    _, old_front = front(before, old[:3, 3])
+    candidates = np.deg2rad([robot.home_deg]) if robot.home_deg else working_positions(robot)
+    admissible = AdmissibleConfigurations(robot, AdmissibleConfig(floor=_floor(robot)))
+    candidates = candidates[admissible(candidates)] if admissible(candidates).any() else candidates
+    X_WE, best = Kinematics(robot).forward(candidates), dexterity(robot, candidates).max()
+    larger = arm_length(robot) / arm_length(before)
+    trial = _Trial(scenario.reference, robot, admissible, _DEXTERITY * float(best))
+    for size in _SIZES:
+        for q, X in zip(candidates, X_WE, strict=True):
+            motion = _Motion([old_front, front(robot, X[:3, 3])[1]], [old, X], size * larger)
+            path = motion.of(scenario.reference.path)
+            start = trial.start(path, q)
+            if start is not None:
+                return _Placed(path, start, X[:3, 3], size * larger)
+    raise ScenarioError(
+        f"no place was found where {robot.name} can follow the path '{scenario.reference.path.kind}' of "
+        f"{before.name}; say where it is: --set reference.path=... and home_deg"
+    )
+
+
+def _floor(robot: RobotModel) -> float:
+    """The height in m of the floor on which a robot stands; far below where it hangs or stands on a wall."""
+    _, up = shoulder(robot)
+    return float(robot.base.translation[2]) if up[2] > _UPRIGHT else -_NO_FLOOR
+
+
+def _middle(reference: ReferenceConfig) -> np.ndarray:
+    """The middle of a path: its mean position, and the mean of its orientations; (4, 4)."""
+    path = make_path(reference)
+    X = path.sample(np.linspace(path.path_start, path.dwell_start, _SAMPLES))[0]
+    middle = X.mean(axis=0)
+    U, _, Vt = np.linalg.svd(middle[:3, :3])
+    middle[:3, :3] = U @ np.diag([1.0, 1.0, np.linalg.det(U @ Vt)]) @ Vt
+    return middle
+
+
+def _waypoint(X: np.ndarray) -> Waypoint:
+    return Waypoint(1e3 * X[:3, 3], np.rad2deg(zyx_from_rotation(X[:3, :3])))
+
+
+class _Trial:
+    """Whether a robot can follow a path freely."""
+
+    def __init__(
+        self,
+        reference: ReferenceConfig,
+        robot: RobotModel,
+        admissible: AdmissibleConfigurations,
+        dexterity: float,
+    ) -> None:
+        self._reference, self._robot, self._admissible = reference, robot, admissible
+        self._inverse, self._dexterity = NumericInverse(robot), dexterity
+        self._kinematics = Kinematics(robot)
+
+    def start(self, path: Shape, q_middle: np.ndarray) -> np.ndarray | None:
+        """Where the path begins in rad, (6,), if it is followed from its middle to both ends; else None."""
+        robot, timed = self._robot, make_path(replace(self._reference, path=path, laps=1))
+        times = np.linspace(timed.path_start, timed.dwell_start, _SAMPLES)
+        X = timed.sample(times)[0]
+        # A straight way from the middle to the first pose, so that the branch is that of the middle.
+        middle = _waypoint(self._kinematics.forward(q_middle))
+        approach = make_path(ReferenceConfig(Rectangle([middle, _waypoint(X[0])]), dwell=0.0))
+        way = approach.sample(np.linspace(0.0, approach.duration, _SAMPLES // 4))[0]
+        q = self._followed(np.concatenate([way, X]), q_middle)
+        if q is None:
+            return None
+        q = q[len(way) :]
+        step = np.abs(np.diff(q, axis=0))
+        is_free = (
+            step.max() < _JUMP
+            and np.all(step / np.diff(times)[:, None] < _SPEED * robot.speed)
+            and np.all((q > robot.lower + _MARGIN) & (q < robot.upper - _MARGIN))
+            and dexterity(robot, q).min() > self._dexterity
+            and self._admissible(q[::8]).all()
+        )
+        return q[0] if is_free else None
+
+    def _followed(self, X_WE: np.ndarray, q: np.ndarray) -> np.ndarray | None:
+        """Joint positions along poses (n, 4, 4) from a configuration on, (n, 6); None if it ends or jumps."""
+        path = np.empty((len(X_WE), len(q)))
+        for k, X in enumerate(X_WE):
+            found = self._inverse.followed(X, q)
+            if found is None:
+                return None
+            q = path[k] = found
+        return path

@@ -1,0 +1,116 @@
+"""A scenario on a robot for which it was not written: its path at another size, freely followed."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from diagrams.scenario.carried import carried_over, is_alike
+from diagrams.scenario.scenario import Scenario, ScenarioError, load_scenario, scenario_text
+from robots.description.model import RobotModel, load_robot
+from robots.dynamics.newton_inverse import inverse_kinematics
+from robots.kinematics.error_kinematics import ErrorKinematics
+from robots.kinematics.forward import Kinematics
+from robots.kinematics.workspace import arm_length, dexterity
+from robots.pose import rotation_vector
+from systems.cell.events.station_events import PayloadChange
+from systems.reference.paths import make_path
+from tests.robots.urdfs import published
+
+IRB1200 = load_robot("irb1200")
+
+
+def robot_of(name: str) -> RobotModel:
+    return load_robot(str(published(name)) if name.endswith(".urdf") else name)
+
+
+def poses(scenario: Scenario) -> tuple[np.ndarray, np.ndarray]:
+    path = make_path(scenario.reference)
+    times = np.linspace(path.path_start, path.dwell_start, 300)
+    return times, path.sample(times)[0]
+
+
+@pytest.mark.parametrize("name", ["ur10_robot.urdf", "puma560", "kr16"])
+def test_the_path_is_followed_on_one_branch_within_limits_and_speeds(name: str):
+    robot = robot_of(name)
+    scenario, note = carried_over(load_scenario("misaligned"), IRB1200, robot)
+    assert f"carried over from {IRB1200.name} to {robot.name}" in note
+    times, X = poses(scenario)
+    q = inverse_kinematics(robot).along(X, np.deg2rad(scenario.home_deg))
+    np.testing.assert_allclose(Kinematics(robot).forward(q), X, atol=1e-8)
+    assert np.abs(np.diff(q, axis=0)).max() < 0.3
+    assert (np.abs(np.diff(q, axis=0)).max(axis=0) / np.diff(times)[0] < robot.speed).all()
+    assert ((q > robot.lower) & (q < robot.upper)).all()
+    assert dexterity(robot, q).min() > 0.02
+    assert scenario.station.payload == pytest.approx(robot.payload.largest_mass, rel=1e-3)
+
+
+def test_the_path_keeps_its_shape_and_its_turns():
+    robot = robot_of("ur10_robot.urdf")
+    scenario = load_scenario("misaligned")
+    carried, _ = carried_over(scenario, IRB1200, robot)
+    before, after = poses(scenario)[1], poses(carried)[1]
+    lengths = [np.linalg.norm(np.diff(X[:, :3, 3], axis=0), axis=1) for X in (before, after)]
+    scale = lengths[1].sum() / lengths[0].sum()
+    np.testing.assert_allclose(lengths[1], scale * lengths[0], rtol=1e-4, atol=1e-7)
+    assert 0.1 < scale <= arm_length(robot) / arm_length(IRB1200)
+    turns = [
+        np.linalg.norm(rotation_vector(X[1:, :3, :3] @ X[:-1, :3, :3].swapaxes(1, 2)), axis=-1)
+        for X in (before, after)
+    ]
+    np.testing.assert_allclose(turns[1], turns[0], atol=1e-6)
+
+
+@pytest.mark.parametrize("path", ["circle", "figure_eight", "points"])
+def test_every_shape_is_carried_and_can_be_written(path: str, tmp_path: Path):
+    scenario, _ = carried_over(
+        load_scenario("nominal", [f"reference.path={path}"]), IRB1200, robot_of("puma560")
+    )
+    assert type(scenario.reference.path).kind == path
+    (tmp_path / "carried.yaml").write_text(scenario_text(scenario))
+    read = load_scenario(str(tmp_path / "carried.yaml"))
+    np.testing.assert_allclose(poses(read)[1], poses(scenario)[1], atol=1e-12)
+
+
+def test_what_is_stated_stays():
+    scenario = load_scenario("misaligned")
+    kept, note = carried_over(
+        scenario, IRB1200, load_robot("kr16"), {"reference.path.waypoints", "home_deg", "station.payload"}
+    )
+    assert (kept, note) == (scenario, "")
+
+
+def test_the_same_machine_with_errors_keeps_the_scenario():
+    p = np.random.default_rng(0).uniform(-3e-3, 3e-3, 48)
+    wrong = ErrorKinematics(IRB1200).robot_with_errors(p)
+    assert is_alike(IRB1200, wrong)
+    assert is_alike(IRB1200, load_robot("irb1200-realistic"))
+    scenario = load_scenario("everything")
+    assert carried_over(scenario, IRB1200, wrong) == (scenario, "")
+
+
+def test_a_load_is_the_same_share_wherever_it_is_named():
+    events = "station.events=[!PayloadChange {at: 8, payload: 3.5}]"
+    scenario, _ = carried_over(load_scenario("everything", [events]), IRB1200, load_robot("kr16"))
+    assert scenario.station.payload == pytest.approx(16.0)
+    assert scenario.servo.model.payload == pytest.approx(6.65 / 7.0 * 16.0)
+    (event,) = scenario.station.events
+    assert isinstance(event, PayloadChange)
+    assert event.payload == pytest.approx(8.0)
+
+
+def test_the_home_position_of_a_robot_file_counts():
+    robot = load_robot("kr16")
+    robot.home_deg = [0.0, -60.0, 90.0, 10.0, 60.0, 0.0]
+    scenario, _ = carried_over(load_scenario("nominal", ["reference.path=circle"]), IRB1200, robot)
+    middle = poses(scenario)[1][:, :3, 3].mean(axis=0)
+    home = Kinematics(robot).forward(np.deg2rad(robot.home_deg))[:3, 3]
+    np.testing.assert_allclose(middle, home, atol=0.01)
+
+
+def test_a_robot_that_can_follow_no_path_is_refused():
+    robot = load_robot("kr16")
+    for joint in robot.joints:
+        joint.limits.speed_deg_s = 0.01
+    with pytest.raises(ScenarioError, match="no place was found where KUKA KR 16-2 can follow the path"):
+        carried_over(load_scenario("misaligned"), IRB1200, robot)

@@ -1,0 +1,79 @@
+"""Every command on a UR10 from its URDF and on a Puma 560, without a further word."""
+
+import json
+from pathlib import Path
+
+import pytest
+
+from experiments.cli.prepare import prepare
+from tests.experiments.commands import RESULTS, truetip
+from tests.robots.urdfs import published
+
+ROBOTS = {"ur10": "ur10_robot.urdf", "puma560": "puma560"}
+
+
+@pytest.fixture(params=ROBOTS)
+def robot(request: pytest.FixtureRequest, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> str:
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv("COLUMNS", "200")
+    name = ROBOTS[request.param]
+    return str(published(name)) if name.endswith(".urdf") else name
+
+
+def test_a_scenario_is_carried_over_unless_it_says_otherwise(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    monkeypatch.chdir(tmp_path)
+    robot = str(published("ur10_robot.urdf"))
+    named = prepare("misaligned", robot=robot)
+    Path("mine.yaml").write_text(f"extends: misaligned\nrobot: {robot}\n")
+    written = prepare("mine.yaml")
+    assert repr(named.scenario.reference) == repr(written.scenario.reference)
+    assert written.scenario.station.payload == 7.0  # what a file says for its own robot stays
+    own = prepare("misaligned", ["reference.path=circle", "station.payload=1"], robot=robot)
+    assert own.scenario.station.payload == 1.0
+    assert own.scenario.reference.path.kind == "circle"
+    assert "carried over" not in own.note
+    assert "carried over from ABB IRB 1200" in named.note
+    free = prepare("misaligned", robot=robot, needs_path=False)
+    assert free.scenario.reference.path.kind == "rectangle"
+
+
+def test_the_diagram_is_drawn(robot: str):
+    assert truetip("diagram", "--robot", robot).exit_code == 0
+    assert Path("diagram.svg").is_file()
+
+
+@pytest.mark.slow
+def test_laws_are_compared(robot: str):
+    result = truetip("compare", "--quick", "--robot", robot, "--jobs=1")
+    assert result.exit_code == 0, result.output
+    assert set(RESULTS) <= {path.name for path in Path("out").iterdir()}
+    laws = json.loads(Path("out/summary.json").read_text())["laws"]
+    assert "carried over" in result.stdout
+    assert "Guard: no intervention" in result.stdout
+    assert {"open_loop", "numerical_ik", "pbvs", "position_level"} <= set(laws)
+
+
+@pytest.mark.slow
+def test_modes_are_found(robot: str):
+    result = truetip("modes", "--robot", robot, "--grid=3", "--json", "-")
+    assert result.exit_code == 0, result.output
+    frequency = json.loads(result.stdout)["stretched"]["frequency_hz"]
+    assert 3.0 < frequency[0] < 30.0  # Hz, where robots of this size have it
+
+
+@pytest.mark.slow
+def test_feedforwards_are_compared(robot: str):
+    """The plant is that of the models, so the model with an elastic structure leaves hardly anything."""
+    result = truetip("feedforward", "--robot", robot, "--grid=2", "--json", "-", "--jobs=1")
+    assert result.exit_code == 0, result.output
+    relative = json.loads(result.stdout)["path"]["max"]
+    assert relative["elastic_structure"] < 0.1 * relative["flexible_joint"] < 0.1
+
+
+@pytest.mark.slow
+def test_the_simulated_robot_is_calibrated(robot: str):
+    result = truetip("calibrate", "--robot", robot, "--count=30", "--write=found.yaml", "--json=numbers.json")
+    assert result.exit_code == 0, result.output
+    numbers = json.loads(Path("numbers.json").read_text())
+    assert numbers["converged"]
+    assert numbers["rank"] == 30
