@@ -7,7 +7,7 @@ from pydrake.systems.primitives import Adder, ConstantVectorSource
 
 from diagrams.scenario.controller_model import controller_model
 from diagrams.scenario.scenario import Scenario, ScenarioError
-from diagrams.tick_clock import timed
+from diagrams.tick_clock import TickClock
 from robots.description.model import NUM_JOINTS, RobotModel
 from systems.controller_model import ControllerModel
 from systems.feedforward import FEEDFORWARDS
@@ -40,6 +40,7 @@ class Servo(Diagram):
         model: what the controller believes.
         drive: the drive that it commands, ``"position"``, ``"velocity"`` or ``"cascade"``.
         has_torque: whether there is a torque to feed forward.
+        tick_clock: of the law's updates, if the servo has made the law.
     """
 
     def __init__(self, robot: RobotModel, scenario: Scenario, law: str | type[System] | System) -> None:
@@ -59,7 +60,10 @@ class Servo(Diagram):
         self.traits = law_traits(law)
         config = law_config(scenario, law)
         self.drive = config.drive
-        self.law = _built(law, self.model, config, scenario.servo.guard) if isinstance(law, type) else law
+        self.tick_clock = TickClock()
+        if isinstance(law, type):
+            law = _built(self.tick_clock.timed(law), self.model, config, scenario.servo.guard)
+        self.law = law
         check_ports(self.law)
         if self.traits.uses_camera:
             _refuse_slow_camera(scenario)
@@ -183,7 +187,7 @@ def law_name(law: str | type[System] | System) -> str:
 def _built(law: type[System], model: ControllerModel, config: LawConfig, guard: GuardConfig) -> System:
     """The law's system. Raises ValueError if the class is not made as a law is."""
     try:
-        built = timed(law)(model, config, guard)
+        built = law(model, config, guard)
     except TypeError as error:
         raise ValueError(f"law {law.__name__}: {' '.join(str(error).split())}") from error
     if not isinstance(built, System):

@@ -7,32 +7,36 @@ import numpy as np
 from pydrake.systems.framework import System
 
 
-class _Timed:
-    """Stands before a law in the order of its bases and times the updates that it declares."""
+class TickClock:
+    """Times the updates of one law.
 
-    tick_seconds: list[float]
+    The times are no state: in the context they would make two runs of the same seed differ. The law does not
+    have them either, its updates are handed to Drake through the clock.
+    """
 
-    def DeclarePeriodicDiscreteUpdateEvent(  # noqa: N802  the name that Drake gives it
-        self, period_sec: float, offset_sec: float, update: Any
-    ) -> Any:
-        """Declares an update that is timed."""
-        seconds = self.__dict__.setdefault("tick_seconds", [])
+    def __init__(self) -> None:
+        """Has timed nothing."""
+        self._seconds: list[float] = []
 
-        def timed(context, discrete_state):
-            started = time.perf_counter()
-            status = update(context, discrete_state)
-            seconds.append(time.perf_counter() - started)
-            return status
+    @property
+    def seconds(self) -> np.ndarray:
+        """Wall time of every update so far in s, in order."""
+        return np.array(self._seconds)
 
-        declare: Any = super()
-        return declare.DeclarePeriodicDiscreteUpdateEvent(period_sec, offset_sec, timed)
+    def timed(self, law: type[System]) -> type[System]:
+        """A law whose updates are timed; otherwise it is the same. For a diagram there is nothing to time."""
+        taken = self._seconds.append
 
+        def declare(system: Any, period_sec: float, offset_sec: float, update: Any) -> Any:
+            def timed_update(context, discrete_state):
+                started = time.perf_counter()
+                status = update(context, discrete_state)
+                taken(time.perf_counter() - started)
+                return status
 
-def timed(law: type[System]) -> type[System]:
-    """A law whose updates are timed; otherwise it is the same. For a diagram there is nothing to time."""
-    return type(law.__name__, (_Timed, law), {"__doc__": law.__doc__, "__module__": law.__module__})
+            declare_untimed = super(kind, system).DeclarePeriodicDiscreteUpdateEvent
+            return declare_untimed(period_sec, offset_sec, timed_update)
 
-
-def tick_seconds(law: System) -> np.ndarray:
-    """Wall time of every update of a law in s, in order; empty if it was not made by `timed`."""
-    return np.array(getattr(law, "tick_seconds", []))
+        members = {"__doc__": law.__doc__, "__module__": law.__module__}
+        kind: Any = type(law.__name__, (law,), members | {"DeclarePeriodicDiscreteUpdateEvent": declare})
+        return kind

@@ -14,7 +14,6 @@ from diagrams.record.packed_log import PackedLog
 from diagrams.scenario.scenario import Scenario, ScenarioError
 from diagrams.servo import Servo, calibrated, law_name, learnt
 from diagrams.station import SimulatedStation
-from diagrams.tick_clock import tick_seconds
 from robots.description.model import RobotModel, load_robot
 from robots.dynamics.newton_inverse import inverse_kinematics
 from systems.cell.events.station_events import check_events
@@ -156,7 +155,7 @@ class Experiment:
             lap_starts=tuple(self.path.lap_starts.tolist()) if len(self.path.lap_starts) > 1 else (),
             learnt=learnt(self.servo, self.context),
             calibrated=calibrated(self.servo, self.context, self.scenario.robot),
-            tick_seconds=tick_seconds(self.servo.law),
+            tick_seconds=self.servo.tick_clock.seconds,
             wall_time=self._wall_time,
         )
 

@@ -9,6 +9,7 @@ Drake's continuous MultibodyPlant has no body whose deformation is a field, so t
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cache
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -93,8 +94,13 @@ class ModalBeam:
 
     def zeros(self, xi: float) -> Zeros:
         """From the torque of the joint to the displacement at xi, Reiner (2010), section 3.5.1."""
-        M, K = self.mass_matrix(), self.stiffness_matrix()
-        return transmission_zeros(M, np.zeros_like(M), K, self.input_column(), self.displacement(xi)[None])
+        return self._zeros()(xi)
+
+    def _zeros(self) -> Callable[[float], Zeros]:
+        """`zeros` as a function of xi alone: the matrices do not depend on it."""
+        M, K, B = self.mass_matrix(), self.stiffness_matrix(), self.input_column()
+        D = np.zeros_like(M)
+        return lambda xi: transmission_zeros(M, D, K, B, self.displacement(xi)[None])
 
     def largest_stable_xi(self, tolerance: float = 1e-5) -> float:
         """Up to which xi the exact inverse is stable; 1 if it is for the whole beam.
@@ -102,10 +108,10 @@ class ModalBeam:
         The first output, seen from the joint, with a zero in the right half-plane: a scan in steps of 1/400
         and bisection.
         """
-        grid = np.linspace(0.0025, 1.0, 400)
+        grid, zeros = np.linspace(0.0025, 1.0, 400), self._zeros()
         stable = grid[0]
         for xi in grid:
-            if not self.zeros(xi).is_minimum_phase:
+            if not zeros(xi).is_minimum_phase:
                 break
             stable = xi
         else:
@@ -113,7 +119,7 @@ class ModalBeam:
         unstable = xi
         while unstable - stable > tolerance:
             middle = 0.5 * (stable + unstable)
-            stable, unstable = (middle, unstable) if self.zeros(middle).is_minimum_phase else (stable, middle)
+            stable, unstable = (middle, unstable) if zeros(middle).is_minimum_phase else (stable, middle)
         return float(stable)
 
     def _modes(self) -> list[tuple[Field, Field, float]]:
@@ -122,11 +128,13 @@ class ModalBeam:
         return [make(number) for number in range(1, self.num_modes + 1)]
 
 
+@cache
 def _quadrature() -> tuple[np.ndarray, np.ndarray]:
     nodes, weights = np.polynomial.legendre.leggauss(_QUADRATURE_NODES)
     return 0.5 * (nodes + 1.0), 0.5 * weights
 
 
+@cache
 def _clamped_mode(number: int) -> tuple[Field, Field, float]:
     """cos(b) cosh(b) = -1."""
     about = (number - 0.5) * np.pi
@@ -142,6 +150,7 @@ def _clamped_mode(number: int) -> tuple[Field, Field, float]:
     return shape, second, 0.0
 
 
+@cache
 def _supported_mode(number: int) -> tuple[Field, Field, float]:
     """tan(b) = tanh(b)."""
     about = (number + 0.25) * np.pi

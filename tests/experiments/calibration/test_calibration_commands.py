@@ -6,22 +6,30 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from experiments.calibration import calibrate_command
 from robots.calibration.measurement_file import read_measurements
 from robots.description.model import load_robot
 from tests.experiments.browser import open_page
 from tests.experiments.commands import files, refusal, truetip
 
-SMALL = ["--set", "station.elasticity=rigid", "--set", "reference.settle=0.2", "--set", "reference.dwell=0.6"]
+SMALL = [
+    "--set=station.elasticity=rigid",
+    "--set=reference.settle=0.2",
+    "--set=reference.dwell=1.5",
+    "--set=reference.acceleration=3",
+]
 QUIET = ["--set", "station.camera.position_sigma=0", "--set", "station.camera.orientation_sigma_deg=0"]
 
 
 @pytest.fixture(scope="module")
 def calibrated(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A folder with all that a calibration of a rigid robot without noise leaves."""
+    """A folder with all that a calibration of a rigid robot without noise leaves, validated at few poses."""
     folder = tmp_path_factory.mktemp("calibration")
     options = ["--count", "20", "--out", str(folder), "--json", str(folder / "result.json")]
     files = ["--write", str(folder / "robot.yaml"), "--urdf", str(folder / "robot.urdf")]
-    result = truetip("calibrate", *SMALL, *QUIET, *options, *files)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(calibrate_command, "VALIDATION_COUNT", 10)
+        result = truetip("calibrate", *SMALL, *QUIET, *options, *files)
     assert result.exit_code == 0, result.output
     return folder
 

@@ -39,14 +39,19 @@ def report(logs, tmp_path_factory):
 
 
 @pytest.fixture(scope="module")
+def opened(report):
+    """The report in a browser, until its pictures for printing are drawn too."""
+    return open_page(report, milliseconds=20000)
+
+
+@pytest.fixture(scope="module")
 def replay(logs, tmp_path_factory):
     path = tmp_path_factory.mktemp("replay") / "replay.html"
     write_replay(path, load_robot("irb1200"), {law: cycles[0] for law, cycles in logs.items()})
     return path
 
 
-def test_the_report_draws_every_plot_without_an_error(report, logs):
-    opened = open_page(report)
+def test_the_report_draws_every_plot_without_an_error(opened, logs):
     assert not [line for line in opened.console if SERIOUS.search(line)]
     for plot in ("path", "distance", "position", "orientation", "bars-mm", "bars-deg", "events"):
         # plotly gives an element this class once it has drawn into it.
@@ -61,17 +66,16 @@ def test_the_report_draws_every_plot_without_an_error(report, logs):
     )  # the scenario's script did not run
 
 
-def test_no_figure_can_be_uploaded(report):
+def test_no_figure_can_be_uploaded(opened):
     """The library's own button would send what the robot did to its maker."""
-    opened = open_page(report)
     assert 'data-title="Download plot' in opened.dom  # there are buttons
     assert 'data-title="Share' not in opened.dom
 
 
-def test_every_plot_has_a_picture_for_printing_with_its_whole_width_and_a_legend(report, logs):
+def test_every_plot_has_a_picture_for_printing_with_its_whole_width_and_a_legend(opened, logs):
     """A browser prints neither what WebGL has drawn nor a plot that is wider than the paper."""
-    dom = open_page(report, milliseconds=20000).dom
-    pictures = dict(re.findall(r'<img class="paper-only" id="([\w-]+)-on-paper"[^>]* src="([^"]*)"', dom))
+    found = re.findall(r'<img class="paper-only" id="([\w-]+)-on-paper"[^>]* src="([^"]*)"', opened.dom)
+    pictures = dict(found)
     assert set(pictures) == {"path", "distance", "position", "orientation", "bars-mm", "bars-deg", "events"}
     for name in ("distance", "position", "orientation"):
         svg = unquote(pictures[name])
