@@ -32,6 +32,7 @@ from robots.drivetrain.stiffness import SpringRow
 from robots.drivetrain.train import DriveTrains
 
 NUM_JOINTS = 6
+SPEED_UP = 0.035  # s, assumed: from rest to the largest speed, where a file says no acceleration
 
 
 class RobotFileError(ConfigurationError):
@@ -40,12 +41,14 @@ class RobotFileError(ConfigurationError):
 
 @dataclass
 class JointLimits:
-    """Range and largest speed of one joint."""
+    """Range, largest speed and largest acceleration of one joint."""
 
     lower_deg: float = 0.0
     upper_deg: float = 0.0
     speed_deg_s: float = positive(0.0, "deg/s")
     source: str = ""
+    # Of a command; 0 where it is not known: the largest speed is then reached within `SPEED_UP`
+    acceleration_deg_s2: float = quantity(0.0, 0.0, unit="deg/s^2")
 
 
 @dataclass
@@ -153,6 +156,12 @@ class RobotModel:
     def speed(self) -> np.ndarray:
         """Largest joint speeds in rad/s, shape (6,)."""
         return self._limit("speed_deg_s")
+
+    @property
+    def acceleration(self) -> np.ndarray:
+        """Largest accelerations of a joint's command in rad/s^2, shape (6,)."""
+        known = self._limit("acceleration_deg_s2")
+        return np.where(known > 0.0, known, self.speed / SPEED_UP)
 
     @property
     def gear_ratio(self) -> np.ndarray:

@@ -7,32 +7,41 @@ import numpy as np
 from pydrake.common.value import Value
 from pydrake.systems.framework import BasicVector, Context, DiscreteValues, LeafSystem, ValueProducer
 
-from robots.configuration.quantity import quantity
+from robots.configuration.quantity import choice, quantity
 from robots.description.model import NUM_JOINTS, RobotModel
+from robots.kinematics.forward import Kinematics, robust_solve
+from systems.guard.joint_limits import JointLimits, is_allowed
+from systems.guard.way_back import shortest_way, way_left
 from systems.samples import JointSample
 
 KINDS = (
     "velocity_limit",  # a joint would have moved faster than it may; all joints are slowed alike
+    "acceleration_limit",  # a joint would have changed its speed faster than it may
     "position_limit",  # a joint would have left its range
     "correction_limit",  # the law's correction stands at its limit
-    "no_command",  # the law gave no finite command; the last one is held
+    "no_command",  # the law gave no finite command, or the joints are not known; the robot is slowed down
     "measurement_refused",  # a sample too far from the path to be true
     "measurement_held",  # no usable sample for a while; the law holds its correction
     "stopped",  # no usable sample or no command for too long, or the robot does not run; it is at rest
     "resumed",  # the robot is led from rest back to the law's command
 )
-_VELOCITY, _POSITION, _CORRECTION, _NO_COMMAND, _REFUSED, _HELD, _STOPPED, _RESUMED = range(len(KINDS))
+_VELOCITY, _ACCELERATION, _POSITION, _CORRECTION, _NO_COMMAND, _REFUSED, _HELD, _STOPPED, _RESUMED = range(
+    len(KINDS)
+)
 
 # The state beside the counts: what was issued last (NaN before the first command), the velocity from which
 # a braking began, the mode, the times of the first tick and of the last command, the refused samples seen,
 # and the way back after a stop: how long it is in s, how much of it is done, where it began as seen from the
-# law's command, position and velocity, and where it is now; and where the joints were at the last tick.
+# law's command, position and velocity, and where it is now; where the joints were at the last tick; and what
+# was issued before the last.
 _POSITIONS, _VELOCITIES, _ISSUED, _BRAKING_FROM = slice(0, 6), slice(6, 12), slice(0, 12), slice(12, 18)
 _MODE, _FIRST_TICK, _LAST_COMMAND, _REFUSED_SEEN, _WAY, _DONE = range(18, 24)
 _OFFSET, _OFFSET_RATE, _ASIDE, _WERE_AT = slice(24, 30), slice(30, 36), slice(36, 42), slice(42, 48)
-_WIDTH = 48
-_GOING, _HOLDING, _STOPPING, _RESUMING, _IDLE = 0.0, 1.0, 2.0, 3.0, 4.0
-_RESUME_SPEED = 0.25  # share of the largest joint speed that the way back may add
+_BEFORE = slice(48, 54)
+_WIDTH = 54
+_GOING, _HOLDING, _STOPPING, _RESUMING, _IDLE, _AWAY = 0.0, 1.0, 2.0, 3.0, 4.0, 5.0
+_ABSURD = 1e6  # rad and rad/s in sum: no command, and squares of it would not be numbers
+_GRACE = 1.05  # times its limit that a correction may reach: where a law stops it, it may overshoot by a step
 _NO_DEVIATION = np.zeros(NUM_JOINTS)
 
 
@@ -44,9 +53,12 @@ class GuardConfig:
     hold_after: float = quantity(0.05, 1e-3, 10.0, "s")
     stop_after: float = quantity(0.5, 1e-3, 60.0, "s")  # without a usable sample or command: smooth stop
     stop_time: float = quantity(0.25, 1e-3, 10.0, "s")  # from full motion to rest
-    resume: bool = False  # whether to go on when what caused a stop is over
+    # Whether to go on when what caused a stop is over, be it camera, law or controller
+    resume: bool = False
     resume_time: float = quantity(1.0, 1e-3, 60.0, "s")  # at least, from rest back to the law's command
     speed_share: float = quantity(1.0, 0.0, 1.0, is_open=True)  # of the robot's largest joint speeds
+    # What becomes of a law that corrects by more than its limit
+    on_correction_limit: str = choice("limit", ("limit", "stop"))
     # From the path: a sample further away is taken for a false detection
     largest_deviation: float = quantity(0.2, 1e-4, 2.0, "m")
     largest_deviation_deg: float = quantity(40.0, 0.01, 180.0, "deg")
@@ -62,7 +74,7 @@ class CommandGuard(LeafSystem):
         in  ``measurement``       vector 3: when the last usable sample arrived (s), how many were refused,
                                   when the newest one was exposed (s)
         in  ``joint_sample``      JointSample
-        out ``position_command``  vector 6 in rad: always finite, in range, within the speed limits
+        out ``position_command``  vector 6 in rad: finite, in range, within speed and acceleration
         out ``velocity_command``  vector 6 in rad/s, likewise
     and where torques are fed forward:
         in  ``torque_feedforward``  vector 6 in N m
@@ -74,7 +86,8 @@ class CommandGuard(LeafSystem):
 
     The command that was issued last is the state; the output is computed from it and the law's newest
     command, without delay. Before the first command, and while the robot does not run, the output is the
-    measured position; when it runs again it is led smoothly from there to what the law commands then.
+    measured position (NaN as long as that was never known); when it runs again it is led smoothly from there
+    to what the law commands then, and likewise after a law or its joints have been silent.
     """
 
     def __init__(
@@ -116,12 +129,9 @@ class CommandGuard(LeafSystem):
             )
         self._config, self._period, self._uses_camera = config, period, uses_camera
         self._is_speed_only = is_speed_only
-        self._lower, self._upper = robot.lower, robot.upper
-        self._speed = speed = config.speed_share * robot.speed
-        # Of each joint: its range, its largest speed, its largest step in a tick.
-        self._limits = list(
-            zip(*(a.tolist() for a in (robot.lower, robot.upper, speed, period * speed)), strict=True)
-        )
+        self._limits = JointLimits(robot, config.speed_share)
+        self._rows = self._limits.rows(period)
+        self._kinematics = Kinematics(robot)
         # A hundred-thousandth below, because a law's own clipping rounds.
         self._correction_limit = (1.0 - 1e-5) * correction_limit
         self._correction_angle = (1.0 - 1e-5) * np.deg2rad(correction_limit_deg)
@@ -168,36 +178,45 @@ class CommandGuard(LeafSystem):
     def _calc_torque(self, context: Context, output: BasicVector) -> None:
         kinds, torque = self._next.Eval(context)[1], self._torque.Eval(context)
         # A torque belongs to the motion that it was computed for.
-        follows = not {_NO_COMMAND, _STOPPED, _VELOCITY, _POSITION}.intersection(kinds)
+        follows = not {_NO_COMMAND, _STOPPED, _VELOCITY, _ACCELERATION, _POSITION}.intersection(kinds)
         output.set_value(torque if follows and np.isfinite(torque).all() else np.zeros(NUM_JOINTS))
 
     def _calc_next(self, context: Context, value) -> None:
         """The next state, which kinds of intervention it takes, and when the last sample arrived."""
         joints: JointSample = self._joints.Eval(context)
         has_issued = not math.isnan(context.get_discrete_state(0).value()[0])
-        if not (joints.running and has_issued):
+        if not math.isfinite(joints.position.sum()):
+            value.set_value(self._decided(context, None, are_joints_known=False))
+        elif not (joints.running and has_issued):
             value.set_value(self._decided(context, joints))
-            return
-        state, kinds, last_sample = self._next_in_motion.Eval(context)
-        state = state.copy()
-        state[_WERE_AT] = joints.position
-        value.set_value((state, kinds, last_sample))
+        else:
+            state, kinds, last_sample = self._next_in_motion.Eval(context)
+            state = state.copy()
+            state[_WERE_AT] = joints.position
+            value.set_value((state, kinds, last_sample))
 
     def _calc_next_in_motion(self, context: Context, value) -> None:
         value.set_value(self._decided(context, None))
 
-    def _decided(self, context: Context, joints: JointSample | None) -> tuple[np.ndarray, list[int], float]:
+    def _decided(
+        self, context: Context, joints: JointSample | None, are_joints_known: bool = True
+    ) -> tuple[np.ndarray, list[int], float]:
         """What `_calc_next` says; no joints stand for a robot that runs and has been commanded before."""
         state = context.get_discrete_state(0).value().copy()
         position, velocity, correction, measurement = (port.Eval(context).tolist() for port in self._inputs)
         kinds = []
         if joints is not None:
-            if state[_MODE] in (_GOING, _HOLDING):
-                state[_ASIDE] = 0.0
-            if not math.isnan(state[0]):
-                state[_ASIDE] += joints.position - state[_WERE_AT]
-            state[_POSITIONS], state[_VELOCITIES] = joints.position, 0.0
-            state[_WERE_AT] = joints.position
+            _take_from(state, joints)
+        if not are_joints_known:
+            kinds.append(_REFUSED)
+            position, state[_VELOCITIES] = [math.nan] * NUM_JOINTS, np.nan_to_num(state[_VELOCITIES])
+        excess = self._excess(correction)
+        if excess > 0.0:
+            kinds.append(_CORRECTION)
+            if excess > _GRACE and self._config.on_correction_limit == "stop":
+                state[_MODE] = _STOPPING
+            elif excess > _GRACE:
+                position, velocity = self._within_correction(position, velocity, correction)
         if joints is not None and not joints.running and state[_LAST_COMMAND] > -math.inf:
             kinds.append(_STOPPED)
             state[_BRAKING_FROM] = 0.0
@@ -205,17 +224,19 @@ class CommandGuard(LeafSystem):
         elif state[_MODE] == _STOPPING:
             kinds.append(_STOPPED)
             self._brake(state)
-            if math.isfinite(sum(velocity)):
+            if sum(map(abs, velocity)) < _ABSURD:
                 state[_ASIDE] += self._period * (state[_VELOCITIES] - velocity)
-        elif not math.isfinite(sum(position) + sum(velocity)):
+        elif not sum(map(abs, position + velocity)) < _ABSURD:  # as no number is
             # Before the first command a law is silent by right.
             if state[_LAST_COMMAND] > -math.inf:
                 kinds.append(_NO_COMMAND)
             self._brake(state)
         else:
-            if state[_MODE] in (_IDLE, _RESUMING):
+            if state[_MODE] in (_IDLE, _RESUMING) or (
+                state[_MODE] == _AWAY and not self._may_follow(state, position, velocity)
+            ):
                 kinds.append(_RESUMED)
-                position, velocity = self.blend_back(state, position, velocity)
+                position, velocity = self._back(state, position, velocity)
             self._follow(state, position, velocity, kinds)
         if state[_MODE] == _HOLDING:
             kinds.append(_HELD)
@@ -223,87 +244,117 @@ class CommandGuard(LeafSystem):
         if refused > state[_REFUSED_SEEN]:
             kinds.append(_REFUSED)
             state[_REFUSED_SEEN] = refused
-        a, b, c, x, y, z = correction
-        if (
-            a * a + b * b + c * c > self._correction_angle**2
-            or x * x + y * y + z * z > self._correction_limit**2
-        ):
-            kinds.append(_CORRECTION)
         return state, kinds, measurement[0]
+
+    def _excess(self, correction: list[float]) -> float:
+        """A correction as a share of its limit, if it has come there; else 0."""
+        a, b, c, x, y, z = correction
+        turn, shift = a * a + b * b + c * c, x * x + y * y + z * z
+        if turn > self._correction_angle**2 or shift > self._correction_limit**2:
+            share = max(turn / self._correction_angle**2, shift / self._correction_limit**2)
+            return math.sqrt(share) if math.isfinite(share) else math.inf
+        return 0.0
+
+    def _within_correction(
+        self, position: list[float], velocity: list[float], correction: list[float]
+    ) -> tuple[list[float], list[float]]:
+        """A command without the part of its correction that is beyond the limit; NaN if there is none."""
+        q, excess = np.array(position), np.array(correction)
+        if not (np.isfinite(q).all() and np.isfinite(excess).all()):
+            return [math.nan] * NUM_JOINTS, velocity
+        for part, limit in ((slice(0, 3), self._correction_angle), (slice(3, 6), self._correction_limit)):
+            size = float(np.linalg.norm(excess[part]))
+            excess[part] *= max(0.0, 1.0 - _GRACE * limit / size) if size else 0.0
+        too_far = robust_solve(self._kinematics.jacobian(q), excess)
+        if self._is_speed_only:
+            return position, (np.array(velocity) - too_far / self._config.stop_time).tolist()
+        return (q - too_far).tolist(), velocity
+
+    def _places(
+        self, state: np.ndarray, position: list[float], velocity: list[float]
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """From where the next step begins and from where the last one did, (6,) each in rad."""
+        if not self._is_speed_only:
+            return state[_POSITIONS], state[_BEFORE]
+        # Such a law commands from where the robot is, which what was issued before does not tell.
+        now = np.array(position) - self._period * np.array(velocity)
+        return now, now - self._period * state[_VELOCITIES]
+
+    def _may_follow(self, state: np.ndarray, position: list[float], velocity: list[float]) -> bool:
+        start, before = self._places(state, position, velocity)
+        last = state[_VELOCITIES].tolist()
+        return is_allowed(self._rows, position, velocity, start.tolist(), before.tolist(), last)
 
     def _follow(
         self, state: np.ndarray, position: list[float], velocity: list[float], kinds: list[int]
     ) -> None:
-        """Goes to the law's command as far as the limits allow. Plain floats: this runs every tick."""
-        start = state[_POSITIONS].tolist()
-        if all(
-            lower <= wanted <= upper and abs(rate) <= speed and abs(wanted - last) <= stride
-            for wanted, rate, last, (lower, upper, speed, stride) in zip(
-                position, velocity, start, self._limits, strict=True
-            )
-        ):
+        """Goes to the law's command as far as the limits allow."""
+        if self._may_follow(state, position, velocity):
+            state[_BEFORE] = state[_POSITIONS]
             state[_ISSUED], state[_BRAKING_FROM] = position + velocity, velocity
             return
-        steps, rates = [], []
-        excess, is_outside = 0.0, False
-        for wanted, rate, last, (lower, upper, speed, stride) in zip(
-            position, velocity, start, self._limits, strict=True
-        ):
-            # Into the range first: the way to where a joint must not go is not to slow the others down.
-            if wanted < lower or wanted > upper:
-                is_outside = True
-                if (wanted > upper) == (rate > 0.0):
-                    rate = 0.0
-                wanted = lower if wanted < lower else upper
-            step = wanted - last
-            excess = max(excess, abs(rate) / speed, abs(step) / stride)
-            steps.append(step)
-            rates.append(rate)
-        if is_outside:
+        limits, period = self._limits, self._period
+        start, before = self._places(state, position, velocity)
+        goal, rate = np.array(position), np.array(velocity)
+        excess = max(1.0, float((np.abs(rate) / limits.speed).max()))
+        mean, faster = limits.step(start, (start - before) / period, goal, rate / excess, period)
+        issued = limits.moved(start, mean, period)
+        if ((goal < limits.lower) | (goal > limits.upper)).any():
             kinds.append(_POSITION)
-        if excess > 1.0 + 1e-9:
+        if max(excess, faster) > 1.0 + 1e-9:
             kinds.append(_VELOCITY)
-            steps, rates = [step / excess for step in steps], [rate / excess for rate in rates]
-        state[_ISSUED] = [last + step for last, step in zip(start, steps, strict=True)] + rates
-        state[_BRAKING_FROM] = rates
+        has_arrived = np.abs(issued - goal) < 1e-12
+        if not (has_arrived.all() or {_POSITION, _VELOCITY}.intersection(kinds)):
+            kinds.append(_ACCELERATION)
+        change = period * limits.acceleration
+        last = state[_VELOCITIES]
+        rate = np.where(has_arrived, rate / excess, mean)
+        state[_BEFORE] = state[_POSITIONS]
+        state[_POSITIONS] = issued
+        state[_VELOCITIES] = np.minimum(np.maximum(rate, last - change), last + change)
+        state[_BRAKING_FROM] = state[_VELOCITIES]
 
-    def blend_back(
+    def _back(
         self, state: np.ndarray, position: list[float], velocity: list[float]
     ) -> tuple[list[float], list[float]]:
-        """The law's command and what is left of the distance to it, a polynomial of fifth degree in time."""
+        """The law's command and what is left of the distance to it after a stop or a silence."""
         law_position, law_velocity = np.array(position), np.array(velocity)
-        if state[_MODE] == _IDLE:
+        if state[_MODE] != _RESUMING:
             # As it was a tick ago, when the robot was where it is.
             offset = state[_POSITIONS] - (law_position - self._period * law_velocity)
             if self._is_speed_only:
                 offset = state[_ASIDE].copy()
-            state[_OFFSET], state[_OFFSET_RATE] = offset, -law_velocity
-            # The steepest part of the polynomial is 1.875 times its mean slope.
-            longest = float(np.max(1.875 * np.abs(offset) / (_RESUME_SPEED * self._speed)))
-            state[_WAY], state[_DONE], state[_MODE] = max(self._config.resume_time, longest), 0.0, _RESUMING
+            rate = state[_VELOCITIES] - law_velocity
+            state[_OFFSET], state[_OFFSET_RATE] = offset, rate
+            state[_WAY] = max(self._config.resume_time, shortest_way(self._limits, offset, rate))
+            state[_DONE], state[_MODE] = 0.0, _RESUMING
         state[_DONE] = min(1.0, state[_DONE] + self._period / state[_WAY])
-        s, T = state[_DONE], state[_WAY]
-        offset, rate = state[_OFFSET], state[_OFFSET_RATE]
-        left = 1.0 - s**3 * (10.0 - s * (15.0 - 6.0 * s))
-        drift = T * s * (1.0 - s**2 * (6.0 - s * (8.0 - 3.0 * s)))
-        left_rate = -30.0 * (s * (1.0 - s)) ** 2 / T
-        drift_rate = 1.0 - s**2 * (18.0 - s * (32.0 - 15.0 * s))
-        if s >= 1.0:
+        left, left_rate = way_left(state[_DONE], state[_WAY], state[_OFFSET], state[_OFFSET_RATE])
+        if state[_DONE] >= 1.0:
             state[_MODE] = _GOING
-        state[_ASIDE] = left * offset + drift * rate
-        velocity = (law_velocity + left_rate * offset + drift_rate * rate).tolist()
-        return position if self._is_speed_only else (law_position + state[_ASIDE]).tolist(), velocity
+        state[_ASIDE] = left
+        velocity = (law_velocity + left_rate).tolist()
+        return position if self._is_speed_only else (law_position + left).tolist(), velocity
 
     def _brake(self, state: np.ndarray) -> None:
-        """Slows all joints down evenly, from full motion to rest in ``stop_time``."""
-        start, last = state[_BRAKING_FROM], state[_VELOCITIES].copy()
+        """Slows all joints down evenly, from full motion to rest in ``stop_time``, or as fast as they may."""
+        limits, period = self._limits, self._period
+        start, last, position = state[_BRAKING_FROM], state[_VELOCITIES].copy(), state[_POSITIONS].copy()
         top = float(np.abs(start).max())
-        share = (
-            max(0.0, float(np.abs(last).max()) / top - self._period / self._config.stop_time) if top else 0.0
+        share = 0.0
+        if top > 0.0:
+            hardest = float((limits.acceleration / np.maximum(np.abs(start), 1e-12)).min())
+            less = period * min(1.0 / self._config.stop_time, hardest)
+            share = max(0.0, float(np.abs(last).max()) / top - less)
+        mean = (position - state[_BEFORE]) / period
+        if math.isnan(mean[0]):
+            return
+        velocity = limits.bounded(position, last, share * start, period, period)
+        wanted = mean if self._is_speed_only else 0.5 * (last + velocity)
+        state[_BEFORE] = position
+        state[_POSITIONS] = limits.moved(
+            position, limits.bounded(position, mean, wanted, period, period), period
         )
-        velocity = share * start
-        position = state[_POSITIONS] + 0.5 * self._period * (last + velocity)
-        state[_POSITIONS] = np.minimum(np.maximum(position, self._lower), self._upper)
         state[_VELOCITIES] = velocity
 
     def _remember(self, context: Context, discrete_state: DiscreteValues) -> None:
@@ -323,7 +374,9 @@ class CommandGuard(LeafSystem):
                 state[_MODE] = _IDLE
         elif max(age, silence) >= self._config.stop_after - 1e-9:
             state[_MODE] = _STOPPING
-        elif state[_MODE] not in (_IDLE, _RESUMING):
+        elif _NO_COMMAND in kinds:
+            state[_MODE] = _AWAY
+        elif state[_MODE] not in (_IDLE, _RESUMING, _AWAY):
             state[_MODE] = _HOLDING if age >= self._config.hold_after - 1e-9 else _GOING
         discrete_state.set_value(0, state)
         if kinds or any(context.get_discrete_state(2).value().tolist()):
@@ -334,3 +387,13 @@ class CommandGuard(LeafSystem):
             counts = context.get_discrete_state(1).value().copy()
             counts[kinds] += 1.0
             discrete_state.set_value(1, counts)
+
+
+def _take_from(state: np.ndarray, joints: JointSample) -> None:
+    """Puts the state where the joints are, at rest."""
+    if state[_MODE] in (_GOING, _HOLDING):
+        state[_ASIDE] = 0.0
+    if not math.isnan(state[0]):
+        state[_ASIDE] += joints.position - state[_WERE_AT]
+    state[_POSITIONS], state[_VELOCITIES] = joints.position, 0.0
+    state[_BEFORE] = state[_WERE_AT] = joints.position

@@ -146,6 +146,15 @@ class _Wanted:
         return PathMoment(X_WD[:3].tolist(), V_WD.tolist(), [0.0] * 6)
 
 
+def assert_within_limits(robot: RobotModel, positions: np.ndarray, velocities: np.ndarray) -> None:
+    """Speed and acceleration of every joint from each command to the next; (n, 6) in rad and rad/s."""
+    slack, steps = 1.0 + 1e-8, np.diff(positions, axis=0)
+    assert (np.abs(velocities) <= robot.speed * slack).all()
+    assert (np.abs(steps) <= robot.speed * PERIOD * slack + 1e-12).all()
+    assert (np.abs(np.diff(velocities, axis=0)) <= robot.acceleration * PERIOD * slack).all()
+    assert (np.abs(np.diff(steps, axis=0)) <= robot.acceleration * PERIOD**2 * slack + 1e-12).all()
+
+
 class LawRig:
     """A law on a perfect robot: what it commands at a tick is where the joints are at the next.
 

@@ -1,0 +1,150 @@
+"""The last look at every message to a robot: what it changes, in the time that really passed."""
+
+import numpy as np
+
+from robots.description.model import NUM_JOINTS
+from systems.guard.joint_limits import JointLimits
+
+MOST_BRIDGED = 8  # periods; after a longer gap a robot may stand still, so no motion is owed to it
+_NO_TIME = 1e-5  # s, in which nothing may change
+_SLACK = 1.0 + 1e-6
+
+
+class PassedTime:
+    """The time from message to message: what the sender's stamps say, but never more than has passed here.
+
+    Messages come early and late. What one is late by is left to those that come early after it, up to
+    `MOST_BRIDGED` periods; in sum the time is never ahead of the own clock.
+    """
+
+    def __init__(self, period: float) -> None:
+        """Starts with the time of one message, ``period`` in s."""
+        self._most, self._credit = MOST_BRIDGED * period, period
+        self._stamp: float | None = None
+        self._now = 0.0
+
+    def until(self, stamp: float | None, now: float) -> float:
+        """The time in s since the last call.
+
+        Args:
+            stamp: of the message on the sender's clock in s; None if that cannot be believed.
+            now: the own clock in s.
+        """
+        if self._stamp is None and stamp is not None:
+            self._stamp, self._now = stamp, now
+            return self._credit
+        self._credit = min(self._credit + max(0.0, now - self._now), self._most)
+        passed = self._credit
+        if stamp is not None:
+            assert self._stamp is not None
+            passed = min(max(0.0, stamp - self._stamp), passed)
+            self._stamp = stamp
+        self._credit, self._now = self._credit - passed, now
+        return passed
+
+
+class MessageGuard:
+    """Keeps what is sent to a robot within the joints' limits, from each message to the next.
+
+    The guard of the servo does the same from tick to tick. Between the two lie a wire and a clock: messages
+    are lost, and clocks are set. What was sent last is the only thing that the robot knows.
+    """
+
+    def __init__(self, limits: JointLimits, period: float, is_speed_only: bool) -> None:
+        """Knows nothing that was sent.
+
+        Args:
+            limits: of the joints.
+            period: between two messages in s.
+            is_speed_only: whether the robot follows velocities alone.
+        """
+        self._limits, self._period, self._is_speed_only = limits, period, is_speed_only
+        self.interventions = 0
+        self.forget(np.full(NUM_JOINTS, np.nan))
+
+    def forget(self, position: np.ndarray) -> None:
+        """The robot stands at a position, (6,) rad, whatever was sent before."""
+        self._position, self._speed, self._velocity = position, np.zeros(NUM_JOINTS), np.zeros(NUM_JOINTS)
+        self._braking_from, self._span, self._owed = self._velocity, self._period, 0.0
+
+    @property
+    def knows_nothing(self) -> bool:
+        """Whether nothing has been sent, or said to be the place of the robot."""
+        return bool(np.isnan(self._position[0]))
+
+    @property
+    def is_at_rest(self) -> bool:
+        """Whether the last message was to stand still where the one before was."""
+        return not (self._speed.any() or self._velocity.any())
+
+    def judged(
+        self, position: np.ndarray, velocity: np.ndarray, passed: float
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """What may be sent.
+
+        Args:
+            position: wanted, (6,) rad.
+            velocity: wanted, (6,) rad/s.
+            passed: time since the last message in s.
+
+        Returns:
+            The same if it is within the limits, or as near as they allow; NaN if nothing is known.
+        """
+        passed += self._owed
+        if not (np.isfinite(position).all() and np.isfinite(velocity).all()):
+            return self.braking(passed, self._period)
+        if self.knows_nothing:
+            return position, velocity
+        if passed < _NO_TIME:
+            self._owed = passed
+            return self._position, self._velocity
+        limits, span = self._limits, 0.5 * (passed + self._span)
+        start, speed = self._position, self._speed
+        if self._is_speed_only:
+            start, speed = position - passed * velocity, self._velocity
+        mean = (position - start) / passed
+        change, turn = _SLACK * passed * limits.acceleration, _SLACK * span * limits.acceleration
+        top = _SLACK * limits.speed
+        is_allowed = (np.abs(velocity - self._velocity) <= change) & (np.abs(mean - speed) <= turn)
+        is_allowed &= (np.abs(velocity) <= top) & (np.abs(mean) <= top)
+        is_allowed &= (position >= limits.lower) & (position <= limits.upper)
+        if not is_allowed.all():
+            self.interventions += 1
+            velocity = np.minimum(np.maximum(velocity, -limits.speed), limits.speed)
+            mean, _ = limits.step(start, speed, position, velocity, passed, span)
+            issued = limits.moved(start, mean, passed)
+            rate = np.where(np.abs(issued - position) < 1e-12, velocity, mean)
+            position = issued
+            velocity = np.minimum(np.maximum(rate, self._velocity - change), self._velocity + change)
+        self._note(position, velocity, mean, passed)
+        self._braking_from = velocity
+        return position, velocity
+
+    def braking(self, passed: float, stop_time: float) -> tuple[np.ndarray, np.ndarray]:
+        """What may be sent on the way to rest: all joints slow down evenly, or as fast as they may.
+
+        Args:
+            passed: time since the last message in s.
+            stop_time: from the motion before to rest, in s.
+        """
+        if self.knows_nothing or passed < _NO_TIME:
+            self._owed = 0.0 if self.knows_nothing else self._owed + passed
+            return self._position, self._velocity
+        limits, start = self._limits, self._braking_from
+        top = float(np.abs(start).max())
+        share = 0.0
+        if top > 0.0:
+            hardest = float((limits.acceleration / np.maximum(np.abs(start), 1e-12)).min())
+            less = passed * min(1.0 / max(stop_time, 1e-6), hardest)
+            share = max(0.0, float(np.abs(self._velocity).max()) / top - less)
+        span, velocity = 0.5 * (passed + self._span), share * start
+        wanted = self._speed if self._is_speed_only else 0.5 * (self._velocity + velocity)
+        if self._is_speed_only and share == 0.0:
+            wanted = velocity
+        mean = limits.bounded(self._position, self._speed, wanted, passed, span)
+        self._note(limits.moved(self._position, mean, passed), velocity, mean, passed)
+        return self._position, self._velocity
+
+    def _note(self, position: np.ndarray, velocity: np.ndarray, mean: np.ndarray, passed: float) -> None:
+        self._position, self._velocity, self._speed = position.copy(), velocity.copy(), mean
+        self._span, self._owed = passed, 0.0

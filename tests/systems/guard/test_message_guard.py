@@ -1,0 +1,145 @@
+"""Whatever is to be sent and however messages come, from one to the next no joint exceeds its limits."""
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from robots.description.model import load_robot
+from systems.guard.joint_limits import JointLimits
+from systems.guard.message_guard import MOST_BRIDGED, MessageGuard, PassedTime
+
+ROBOT = load_robot("irb1200")
+LIMITS = JointLimits(ROBOT)
+MIDDLE = 0.5 * (ROBOT.lower + ROBOT.upper)
+PERIOD = 4e-3  # s
+
+
+class Stream:
+    """A guard before a stream of messages with stamps and a clock of its own."""
+
+    def __init__(self, is_speed_only: bool = False) -> None:
+        self.guard = MessageGuard(LIMITS, PERIOD, is_speed_only)
+        self.guard.forget(MIDDLE)
+        self.passed = PassedTime(PERIOD)
+        self.stamp, self.now = 1000.0, 5.0
+        self.rows = [(PERIOD, MIDDLE, np.zeros(6))]
+
+    def send(self, position, velocity, stamp: float = PERIOD, own: float = PERIOD, brakes: bool = False):
+        """A message; the clocks have gone on by two times in s."""
+        self.stamp, self.now = self.stamp + stamp, self.now + own
+        passed = self.passed.until(self.stamp, self.now)
+        sent = self.guard.braking(passed, 0.1) if brakes else self.guard.judged(position, velocity, passed)
+        self.rows.append((passed, *(part.copy() for part in sent)))
+        return sent
+
+    def check(self) -> None:
+        passed, position, velocity = (np.array(part) for part in zip(*self.rows, strict=True))
+        # What was sent without time for it is as what was sent before.
+        kept = np.flatnonzero((passed > 1e-5) | (np.arange(len(passed)) == 0))
+        time = np.diff(np.cumsum(passed)[kept])[:, None]
+        step, turn = np.diff(position[kept], axis=0), np.diff(velocity[kept], axis=0)
+        slack = 1.0 + 2e-6
+        assert (np.abs(velocity) <= ROBOT.speed * slack).all()
+        assert (np.abs(step) <= ROBOT.speed * time * slack + 1e-12).all()
+        assert (np.abs(turn) <= ROBOT.acceleration * time * slack + 1e-12).all()
+        mean, spans = step / time, 0.5 * (time[1:] + time[:-1])
+        assert (np.abs(np.diff(mean, axis=0)) <= ROBOT.acceleration * spans * slack + 1e-9).all()
+        assert ((position >= ROBOT.lower) & (position <= ROBOT.upper)).all()
+
+
+times = st.sampled_from([0.0, 1e-4, 1e-3, PERIOD, PERIOD, PERIOD, 2 * PERIOD, 0.05, 1.0, -1.0])
+messages = st.lists(
+    st.tuples(
+        st.lists(st.floats(-10.0, 10.0), min_size=6, max_size=6).map(np.array),
+        st.lists(st.floats(-10.0, 10.0), min_size=6, max_size=6).map(np.array),
+        times,
+        times.map(abs),
+        st.sampled_from([False, False, False, True]),
+    ),
+    min_size=3,
+    max_size=40,
+)
+
+
+@settings(max_examples=60)
+@given(messages=messages)
+def test_whatever_is_sent_stays_within_speed_and_acceleration(messages):
+    stream = Stream()
+    for message in messages:
+        stream.send(*message)
+    stream.check()
+
+
+def cruise(stream: Stream, count: int, speed: float = 0.3, start: int = 0) -> None:
+    for k in range(start + 1, start + count + 1):
+        stream.send(MIDDLE + k * PERIOD * speed * ROBOT.speed, speed * ROBOT.speed)
+
+
+def test_ordinary_motion_passes_unchanged():
+    stream = Stream()
+    for k in range(250):
+        phase = 5.0 * k * PERIOD
+        position = MIDDLE + 0.1 * ROBOT.speed / 5.0 * (1.0 - np.cos(phase))
+        velocity = 0.1 * ROBOT.speed * np.sin(phase)
+        sent = stream.send(position, velocity)
+        np.testing.assert_array_equal(sent, (position, velocity))
+    assert stream.guard.interventions == 0
+
+
+def test_jitter_of_three_milliseconds_changes_nothing():
+    """What comes late is followed by something early; the stamps are those of a clock."""
+    stream, random = Stream(), np.random.default_rng(1)
+    late = 0.003 * random.random(500)
+    for k in range(1, 500):
+        phase = 3.0 * k * PERIOD
+        position = MIDDLE + 0.3 * ROBOT.speed / 3.0 * (1.0 - np.cos(phase))
+        stream.send(position, 0.3 * ROBOT.speed * np.sin(phase), own=PERIOD + late[k] - late[k - 1])
+    # Only until the first late one has paid for the early ones.
+    assert stream.guard.interventions <= 10
+
+
+def test_a_clock_that_steps_forward_allows_no_more_than_has_passed_here():
+    stream = Stream()
+    cruise(stream, 50, 0.1)
+    before = stream.guard._position.copy()
+    sent, _ = stream.send(MIDDLE + 0.5, 0.1 * ROBOT.speed, stamp=1.0)
+    assert (np.abs(sent - before) <= ROBOT.speed * PERIOD * (1.0 + 1e-6)).all()
+    stream.check()
+
+
+def test_after_a_second_without_messages_no_more_than_a_few_periods_are_made_good():
+    stream = Stream()
+    cruise(stream, 50, 0.1)
+    before = stream.guard._position.copy()
+    sent, _ = stream.send(MIDDLE + 1.0, 0.1 * ROBOT.speed, stamp=1.0, own=1.0)
+    assert (np.abs(sent - before) <= MOST_BRIDGED * ROBOT.speed * PERIOD).all()
+    stream.check()
+
+
+@pytest.mark.parametrize("is_speed_only", [False, True])
+def test_a_stop_is_even_and_ends_where_the_robot_is(is_speed_only: bool):
+    stream = Stream(is_speed_only)
+    for k in range(1, 51):
+        share = min(1.0, k / 20)
+        way = 0.3 * PERIOD * ROBOT.speed * (k * k / 40 if k <= 20 else k - 10)
+        stream.send(MIDDLE + (0.0 if is_speed_only else way), 0.3 * share * ROBOT.speed)
+    assert stream.guard.interventions <= 2
+    while not stream.guard.is_at_rest:
+        stream.send(None, None, brakes=True)
+        assert len(stream.rows) < 120
+    velocity = np.array([row[2] for row in stream.rows])[51:]
+    np.testing.assert_allclose(
+        velocity / ROBOT.speed, (velocity / ROBOT.speed)[:, :1].repeat(6, 1), atol=1e-9
+    )
+    assert (np.diff(velocity[:, 0]) <= 1e-12).all()
+    assert len(velocity) * PERIOD == pytest.approx(0.1, abs=3 * PERIOD)
+    if not is_speed_only:
+        stream.check()
+
+
+def test_without_anything_known_nothing_is_judged():
+    guard = MessageGuard(LIMITS, PERIOD, False)
+    position, velocity = guard.judged(np.full(6, np.nan), np.zeros(6), PERIOD)
+    assert np.isnan(position).all()
+    assert not velocity.any()
