@@ -5,8 +5,11 @@ from collections.abc import Callable
 
 import numpy as np
 
+from diagrams.host_lateness import HostLateness
 from diagrams.scenario.scenario import Scenario
 from robots.description.model import RobotModel
+from systems.guard.joint_limits import JointLimits
+from systems.guard.message_guard import MOST_BRIDGED, MessageGuard, PassedTime
 from systems.link.clock import ClockConfig, StampClock, steady_time
 from systems.link.protocols import PoseSource, RobotLink, RobotReport
 from systems.reference.joint_mover import smooth_motion
@@ -24,10 +27,21 @@ _WARM_UP = 7e-4  # s before the next report is due
 _CLOSE = 3e-4  # s about the time at which it is due: a frame of the camera would delay the reply
 _WATCH = 1e-3  # s after it was due, until which one looks all the time: who sleeps wakes late and cold
 _CYCLE_TOLERANCE = 5e-3  # relative
+_CLOCK_STEP = 0.02  # s by which stamps may run ahead of arrivals: jitter, and a stall before
+_RESTS = 25  # messages at rest that end a stop
+
+
+def never() -> bool:
+    """Nobody wants an end."""
+    return False
 
 
 class StationError(RuntimeError):
     """A station that is not there, or not the one that the scenario describes."""
+
+
+class EndedOnRequest(Exception):  # noqa: N818 - as KeyboardInterrupt, no error
+    """Somebody wanted an end before the path began; the robot is at rest."""
 
 
 class HardwareLink:
@@ -41,6 +55,7 @@ class HardwareLink:
         robot: RobotModel,
         is_speed_only: bool,
         now: Callable[[], float] = steady_time,
+        is_asked_to_end: Callable[[], bool] = never,
     ) -> None:
         """Takes over connections that are open.
 
@@ -51,8 +66,10 @@ class HardwareLink:
             robot: whose speeds count on the way to the start.
             is_speed_only: whether the controller is sent speeds without positions.
             now: the clock of the client's arrivals, in s.
+            is_asked_to_end: whether somebody wants an end, while one waits or approaches.
         """
         self._client, self._camera, self._now = client, camera, now
+        self._is_asked_to_end = is_asked_to_end
         self._link, self._speed, self._period = scenario.station.link, robot.speed, scenario.station.period
         self._is_speed_only = is_speed_only
         self.robot_clock = StampClock(ClockConfig())
@@ -61,6 +78,15 @@ class HardwareLink:
         self.turn_around: list[float] = []  # s, from a report in to its reply out
         self._sample = PoseSample()
         self._phase = 0.0  # s, of the newest stamp against its tick
+        self._time = PassedTime(self._period)
+        limits = JointLimits(robot, scenario.servo.guard.speed_share)
+        self._guard = MessageGuard(limits, self._period, is_speed_only)
+        self._stop_time = scenario.servo.guard.stop_time
+        self.passed = self._period  # s from the report before the newest one to it, on the slower clock
+        self.gap = 0.0  # s, the same without an upper limit
+        self.clock_step = 0.0  # s by which the stamp of the newest report ran ahead of its arrival
+        self.host = HostLateness()
+        self._heard = self._sent = 0.0  # s of the steady clock, when the newest report came and was answered
         self._origin = 0.0  # s of the steady clock: samples exposed before are not of this path
 
     @property
@@ -93,6 +119,8 @@ class HardwareLink:
         link = self._link
         deadline = self._now() + link.connect
         if self.wait_until_ready(link.connect) is None:
+            if self._is_asked_to_end():
+                raise EndedOnRequest
             what, place = self._client.why_not_ready(), self._client.place
             raise StationError(f"{what}: waited {link.connect:g} s on {place}")
         while needs_camera and self._camera is not None and not self._sample.valid:
@@ -121,9 +149,10 @@ class HardwareLink:
     def wait_until_ready(self, within: float) -> RobotReport | None:
         """The first report of a robot that follows commands; None if it does not come in time."""
         deadline = self._now() + within
-        while self._now() < deadline:
+        while self._now() < deadline and not self._is_asked_to_end():
             report = self.next_report(wait=min(0.2, within))
             if report is not None and report.is_ready:
+                self._guard.forget(report.position)
                 return report
         return None
 
@@ -145,8 +174,13 @@ class HardwareLink:
         is_prepared = False
         self._learn_clock()
         self._poll_camera()
-        while (report := self._client.poll(_pause(now, expected, deadline, is_prepared))) is None:
+        while True:
+            pause = _pause(now, expected, deadline, is_prepared)
+            began, report = now, self._client.poll(pause)
+            if report is not None:
+                break
             now = self._now()
+            self.host.note(now - began - pause, now)
             if now >= deadline:
                 return None
             if not -_CLOSE < now - expected < _CLOSE:
@@ -155,18 +189,41 @@ class HardwareLink:
                 warm_up()
                 self._client.warm_up()
                 warm_up, is_prepared = None, True
+        self.host.note(self._now() - began - pause, self._now(), is_message=True)
+        self._note_time(report)
         self.last = report
         self._unlearned = (report.time, self._client.arrived)
         return report
 
-    def ticks_since(self, last: RobotReport) -> int:
-        """How many ticks lie between a report and the newest one.
+    def _note_time(self, report: RobotReport) -> None:
+        """How much time has really passed since the last report, and whether a clock has been set."""
+        arrived = self._client.arrived
+        if self.last is not None:
+            stamped, here = report.time - self.last.time, arrived - self._heard
+            self.gap = max(0.0, min(stamped, here))
+            self.clock_step = stamped - here if stamped - here > _CLOCK_STEP + self._period else 0.0
+            if self.clock_step:
+                self.robot_clock.restart()
+        self._heard = arrived
+        self.passed = self._time.until(report.time, arrived)
+
+    @property
+    def was_interrupted(self) -> bool:
+        """Whether the newest report came after so long a gap that the robot may stand still."""
+        return self.gap > (MOST_BRIDGED + 0.5) * self._period
+
+    @property
+    def trouble(self) -> str:
+        """Why the controller's newest messages are refused, or why commands had to start anew; else empty."""
+        return self._client.trouble
+
+    def ticks_since_last(self) -> int:
+        """How many ticks lie between the report before and the newest one, in the time that really passed.
 
         The number follows the stamps, but the phase between stamps and ticks may drift: a controller whose
         cycle is a few ppm off does not skip a tick for it.
         """
-        assert self.last is not None
-        exact = (self.last.time - last.time) / self._period + self._phase
+        exact = self.passed / self._period + self._phase
         ticks = max(1, round(exact))
         self._phase = (1.0 - _PHASE_SHARE) * min(0.5, max(-0.5, exact - ticks))
         return ticks
@@ -187,25 +244,56 @@ class HardwareLink:
         return PoseSample(time + sample.time - reported, sample.X_WE, sample.valid, sample.residual)
 
     def send_command(self, position: np.ndarray, velocity: np.ndarray) -> None:
-        """Replies to the newest report, if it may be answered."""
+        """Replies to the newest report, if it may be answered, with what the limits allow."""
+        position, velocity = self._guard.judged(position, velocity, self.passed)
         if self._client.send(position, velocity, self._is_speed_only):
-            self.turn_around.append(self._now() - self.arrived)
+            self._sent = self._now()
+            self.turn_around.append(self._sent - self.arrived)
+        else:
+            self._guard.take_back()
+
+    @property
+    def limited_messages(self) -> int:
+        """How many messages were not sent as the servo wanted them."""
+        return self._guard.interventions
+
+    def stop_smoothly(self) -> None:
+        """Brings the robot to rest as long as its controller speaks, also if what it says is refused."""
+        if self._guard.knows_nothing:  # the robot has not been told anything
+            return
+        at_rest, answered = 0, self._now()
+        before = -math.inf
+        while at_rest < _RESTS and self._now() - answered < self._link.break_after:
+            if self._client.heard == before:
+                self._client.poll(self._period)
+                if self._client.heard == before:
+                    continue
+            before = self._client.heard
+            now = self._now()
+            passed = min(self._time.until(None, now), now - self._sent)
+            if self._client.stop(*self._guard.braking(passed, self._stop_time), self._is_speed_only):
+                answered = self._sent = self._now()
+                at_rest += self._guard.is_at_rest
+            else:
+                self._guard.take_back()
 
     def approach(self, goal: np.ndarray) -> None:
         """Moves the robot smoothly to joint positions and waits until it is there. Raises StationError."""
         deadline = self._now() + _LONGEST_APPROACH
-        epoch, start, begin = -1, goal, 0.0
+        epoch, start, passed = -1, goal, 0.0
         while self._now() < deadline:
+            if self._is_asked_to_end():
+                self.stop_smoothly()
+                raise EndedOnRequest
             report = self.next_report()
+            passed += self.passed
             if report is None or not report.is_ready:
                 report = self.wait_until_ready(self._link.connect)
                 if report is None:
                     raise StationError("the controller stopped while the robot was on its way to the start")
-            if self.epoch != epoch:
-                epoch, start, begin = self.epoch, report.position, report.time
-            position, velocity, left = smooth_motion(
-                start, goal, report.time - begin, _APPROACH_SHARE * self._speed
-            )
+            if self.epoch != epoch or self.was_interrupted:
+                epoch, start, passed = self.epoch, report.position, 0.0
+            position, velocity, left = smooth_motion(start, goal, passed, _APPROACH_SHARE * self._speed)
             if self._is_speed_only:
                 velocity = velocity + _APPROACH_GAIN * (position - report.position)
             self.send_command(position, velocity)

@@ -161,12 +161,20 @@ class Servo(Diagram):
 
 
 def _refuse_slow_camera(scenario: Scenario) -> None:
-    """Refuses a camera between two samples of which the guard would hold every correction."""
+    """Refuses a camera between two samples, or before the first one, of which the guard would intervene."""
     period, patience = scenario.station.camera.period, scenario.servo.guard.hold_after
     if period > patience:
         raise ScenarioError(
             f"station.camera.period={period:g} s must be at most servo.guard.hold_after={patience:g} s: "
             "the guard holds the correction when no sample comes for so long"
+        )
+    # The first sample is exposed at once, and is late by the delay.
+    delay, longest = scenario.station.camera.delay, scenario.servo.guard.stop_after
+    if delay + period >= longest:
+        raise ScenarioError(
+            f"station.camera.delay={delay:g} s and station.camera.period={period:g} s must be below "
+            f"servo.guard.stop_after={longest:g} s together: the guard stops the robot when no sample comes "
+            "for so long"
         )
 
 

@@ -118,6 +118,7 @@ def measure_latency(
             progress(time / config.duration)
         following = wire.next_report()
         if following is None or not following.is_ready:
+            wire.stop_smoothly()
             raise StationError(
                 "the controller fell silent" if following is None else "the controller stopped"
             )

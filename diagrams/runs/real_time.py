@@ -11,8 +11,9 @@ import numpy as np
 from pydrake.systems.framework import Context, Diagram, DiagramBuilder, System
 
 from diagrams.hardware import HardwareStation
-from diagrams.hardware_link import HardwareLink, StationError
-from diagrams.record.log import RunLog
+from diagrams.hardware_link import EndedOnRequest, HardwareLink, StationError, never
+from diagrams.host_lateness import HostLateness
+from diagrams.record.log import GuardEvent, RunLog
 from diagrams.record.packed_log import PackedLog
 from diagrams.runs.simulation import guard_events, measured_along, start_position
 from diagrams.scenario.scenario import Scenario, ScenarioError
@@ -24,9 +25,11 @@ from systems.link.protocols import PoseSource, RobotLink, RobotReport
 from systems.reference.paths import CartesianPath
 from systems.samples import JointSample, PoseSample
 
-__all__ = ["RealTimeRecord", "RealTimeRun", "StationError"]
+__all__ = ["REQUESTED", "RealTimeRecord", "RealTimeRun", "StationError"]
 
 _WARM_UP = 60  # ticks
+REQUESTED = "ended on request"  # why a run ended that somebody wanted to end
+_WORTH_SAYING = 0.01  # s by which this machine was late
 _SWITCH = 5e-4  # s after which another thread, such as that of a progress bar, gives way
 
 
@@ -42,7 +45,10 @@ class RealTimeRecord:
     turn_around: np.ndarray  # (m,) s, from a message in to its reply out
     camera_clock: ClockQuality | None
     robot_clock: ClockQuality
+    host: HostLateness
     pauses: list[tuple[float, float]] = field(default_factory=list)  # s: path time, how long it stood still
+    events: list[GuardEvent] = field(default_factory=list)  # of the wire, by path time
+    limited_messages: int = 0  # that were not sent as the servo wanted them
 
 
 class RealTimeRun:
@@ -88,6 +94,7 @@ class RealTimeRun:
         self._joint_rows: list[tuple[int, float, np.ndarray, np.ndarray]] = []
         self._exposures: list[tuple[float, np.ndarray]] = []
         self._pauses: list[tuple[float, float]] = []
+        self._events: list[GuardEvent] = []
 
     @property
     def uses_camera(self) -> bool:
@@ -100,14 +107,18 @@ class RealTimeRun:
         camera: PoseSource | None,
         progress: Callable[[float], None] | None = None,
         now: Callable[[], float] = steady_time,
+        is_asked_to_end: Callable[[], bool] = never,
     ) -> RealTimeRecord:
         """Runs the law on the station at the other end.
+
+        However it ends before its end, the robot is sent a smooth stop as long as its controller speaks.
 
         Args:
             client: to the controller.
             camera: to the camera server; None for laws that do without.
             progress: is called now and then with the share that is done, 0 to 1.
             now: the clock of the client's arrivals, in s.
+            is_asked_to_end: whether somebody wants the run to end now.
 
         Raises:
             StationError: if there is no controller or camera, or its cycle is not the scenario's.
@@ -120,10 +131,20 @@ class RealTimeRun:
         sys.setswitchinterval(_SWITCH)
         before = client.counters()
         try:
-            wire = HardwareLink(client, camera, self.scenario, self.robot, self._is_speed_only, now)
-            wire.connect(self.uses_camera)
-            wire.approach(self.start)
-            ended = self._follow(wire, progress or (lambda share: None), now)
+            wire = HardwareLink(
+                client, camera, self.scenario, self.robot, self._is_speed_only, now, is_asked_to_end
+            )
+            try:
+                wire.connect(self.uses_camera)
+                wire.approach(self.start)
+                began = now()
+                ended = self._follow(wire, progress or (lambda share: None), now, is_asked_to_end)
+            except EndedOnRequest:
+                began, ended = now(), REQUESTED
+            if ended != "path":
+                wire.stop_smoothly()
+                if ended != REQUESTED and wire.host.worst > _WORTH_SAYING:
+                    ended = f"{ended}; {wire.host.sentence(began)}"
         finally:
             sys.setswitchinterval(switching)
             gc.unfreeze()
@@ -132,36 +153,57 @@ class RealTimeRun:
         counters = {name: number - before[name] for name, number in client.counters().items()}
         return self._record(counters, camera, wire, ended)
 
-    def _follow(self, wire: HardwareLink, progress: Callable[[float], None], now: Callable[[], float]) -> str:
+    def _follow(
+        self,
+        wire: HardwareLink,
+        progress: Callable[[float], None],
+        now: Callable[[], float],
+        is_asked_to_end: Callable[[], bool],
+    ) -> str:
         """Runs the path to its end; returns why it ended."""
         epoch, tick, shown = wire.epoch, -1, 0.0
         end = round(self.path.duration / self.period)
-        is_seeding = False
-        last: RobotReport | None = None  # the first message of the path is its tick 0
         wire.start_path()
         while tick < end:
+            if is_asked_to_end():
+                return REQUESTED
             report = wire.next_report(warm_up=self._warm_up_next)
+            is_seeding = False
             if report is None or not report.is_ready or wire.epoch != epoch:
-                if self.scenario.station.link.on_break == "end":
-                    return "the controller fell silent" if report is None else "the controller stopped"
+                why = wire.trouble or (
+                    "the controller fell silent" if report is None else "the controller stopped"
+                )
+                if not self.scenario.servo.guard.resume:
+                    return why
+                self._note(max(tick, 0), "interrupted", why)
+                wire.stop_smoothly()
                 began = now()
                 report = wire.wait_until_ready(self.scenario.station.link.resume_within)
                 if report is None:
-                    return "the controller did not come back"
+                    return REQUESTED if is_asked_to_end() else "the controller did not come back"
                 self._pauses.append((tick * self.period, now() - began))
                 epoch, is_seeding = wire.epoch, True
+            elif tick >= 0 and wire.was_interrupted:
+                # Shorter than a break, but the robot may have come to rest: it is led on from where it is.
+                self._note(tick, "interrupted", f"no message for {1e3 * wire.gap:.0f} ms")
+                is_seeding = True
+            if is_seeding:
                 wire.start_path()
                 tick += 1
             else:
-                tick += wire.ticks_since(last) if last else 1
-            last = report
+                tick += wire.ticks_since_last() if tick >= 0 else 1  # the first one is its tick 0
+            if wire.clock_step:
+                self._note(tick, "clock_step", f"the controller's clock went {wire.clock_step:.3g} s ahead")
+                wire.start_path()
             self._tick(wire, report, tick, is_running=not is_seeding)
-            is_seeding = False
             # Telling people takes time that belongs to the next message.
             if tick * self.period - shown > 0.5:
                 shown = tick * self.period
                 progress(min(1.0, tick / end))
         return "path"
+
+    def _note(self, tick: int, kind: str, detail: str) -> None:
+        self._events.append(GuardEvent(tick * self.period, kind, detail))
 
     def _tick(self, wire: HardwareLink, report: RobotReport, tick: int, is_running: bool) -> None:
         """One message in, one tick, one reply out."""
@@ -249,8 +291,8 @@ class RealTimeRun:
             position_command=data["position_command"],
             velocity_command=data["velocity_command"],
             correction=data["correction"],
-            guard_counts=dict(zip(KINDS, counts[-1].tolist(), strict=True)),
-            guard_events=guard_events(times, counts),
+            guard_counts=dict(zip(KINDS, counts[-1].tolist() if n else [0] * len(KINDS), strict=True)),
+            guard_events=sorted([*guard_events(times, counts), *self._events], key=lambda event: event.time),
             path_start=self.path.path_start,
             dwell_start=self.path.dwell_start,
             path_end=self.path.duration,
@@ -269,7 +311,10 @@ class RealTimeRun:
             turn_around=np.array(wire.turn_around),
             camera_clock=report.clock if report else None,
             robot_clock=wire.robot_clock.quality(),
+            host=wire.host,
             pauses=self._pauses,
+            events=self._events,
+            limited_messages=wire.limited_messages,
         )
 
 

@@ -76,7 +76,7 @@ class VirtualCell:
         """
         config = replace(scenario.station, interface=scenario.station.link.kind)
         self.period = config.period
-        self._camera = config.camera
+        self._camera, self._faults = config.camera, config.faults
         builder = DiagramBuilder()
         self._station = builder.AddNamedSystem("station", SimulatedStation(robot, config, "cascade"))
         ports = {name: self._station.GetOutputPort(name) for name in self._station.LOGGED}
@@ -113,12 +113,13 @@ class VirtualCell:
     @property
     def stamp(self) -> float:
         """What the controller's clock shows at `time`, in s."""
-        return CLOCK_START + self.time
+        return CLOCK_START + self.time + self._faults.clock_offset(self.time)
 
     @property
     def joints(self) -> JointSample:
         """What the joints say at `time`."""
-        return self._joints.Eval(self._station_context)
+        sample: JointSample = self._joints.Eval(self._station_context)
+        return replace(sample, position=sample.position + self._faults.joint_offset(self.time))
 
     def advance(self, controller: VirtualController) -> list[Exposure]:
         """Computes the next cycle with the controller's references; returns what the camera saw in it."""
@@ -140,4 +141,5 @@ class VirtualCell:
         if self._log is None:
             raise RuntimeError("the cell was built without a log")
         record = self._station.record(*self._log.read(self._context))
-        return CellRecord(CLOCK_START + record.time, record.X_WE_true, record.link_position)
+        set_by = np.array([self._faults.clock_offset(time) for time in record.time])
+        return CellRecord(CLOCK_START + record.time + set_by, record.X_WE_true, record.link_position)

@@ -20,6 +20,10 @@ _MOVED = {
 }
 
 
+# From a choice that was made with a name to the switch that it is now: on for that name.
+_SWITCHES = {("station", "link", "on_break"): ("resume", ("servo", "guard", "resume"))}
+
+
 def renamed(node: Node) -> Node:
     """A tree in which entries that stand under a former name stand under the present one.
 
@@ -41,16 +45,33 @@ def renamed(node: Node) -> Node:
             node = replace(node, value={**node.value, group: replace(inside, value=entries)})
     for former, present in _MOVED.items():
         node = _moved(node, former, present)
+    for former, (name, present) in _SWITCHES.items():
+        node = _switched(node, former, name, present)
+    return node
+
+
+def _switched(node: Node, former: tuple[str, ...], name: str, present: tuple[str, ...]) -> Node:
+    """A tree whose choice at one path is the switch at another."""
+    found = _found(node, former)
+    if found is None:
+        return node
+    node = _without(node, former)
+    return _with(node, present, replace(found, value=True)) if found.value == name else node
+
+
+def _found(node: Node, path: tuple[str, ...]) -> Node | None:
+    for key in path:
+        if not isinstance(node.value, dict) or key not in node.value:
+            return None
+        node = node.value[key]
     return node
 
 
 def _moved(node: Node, former: tuple[str, ...], present: tuple[str, ...]) -> Node:
     """A tree whose group at one path is part of the one at another path; what stands there already counts."""
-    found = node
-    for key in former:
-        if not isinstance(found.value, dict) or key not in found.value:
-            return node
-        found = found.value[key]
+    found = _found(node, former)
+    if found is None:
+        return node
     return _with(_without(node, former), present, found)
 
 
@@ -68,5 +89,7 @@ def _with(node: Node, path: tuple[str, ...], group: Node) -> Node:
         return replace(node, value=group.value | node.value) if both else node
     key, *rest = path
     inside = node.value if isinstance(node.value, dict) else {}
+    if not rest and key not in inside:
+        return replace(node, value={**inside, key: group})
     below = inside.get(key, replace(group, value={}))
     return replace(node, value={**inside, key: _with(below, tuple(rest), group)})

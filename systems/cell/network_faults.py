@@ -23,6 +23,10 @@ class FaultConfig:
     stall_at: float = -1.0  # s of the cell's time at which nothing gets through any more; negative: never
     stall_for: float = 1.0  # s
     stop_at: float = -1.0  # s at which the controller's program is stopped; negative: never
+    clock_step_at: float = -1.0  # s at which the controller's clock is set; negative: never
+    clock_step: float = quantity(1.0, -100.0, 100.0, "s")  # by which it is set
+    joint_jump_at: float = -1.0  # s at which a joint is suddenly measured elsewhere; negative: never
+    joint_jump_deg: float = quantity(20.0, -360.0, 360.0, "deg")  # of joint 1
     lost_body_at: float = -1.0  # s from which the camera does not see the body; negative: never
     lost_body_for: float = 1.0  # s
     clock_drift_ppm: float = quantity(0.0, -1e5, 1e5, "ppm")  # of the camera's clock against the controller's
@@ -30,6 +34,15 @@ class FaultConfig:
     def is_stalled(self, time: float) -> bool:
         """Whether nothing gets through."""
         return 0.0 <= self.stall_at <= time < self.stall_at + self.stall_for
+
+    def clock_offset(self, time: float) -> float:
+        """By how much the controller's clock has been set, in s."""
+        return self.clock_step if 0.0 <= self.clock_step_at <= time else 0.0
+
+    def joint_offset(self, time: float) -> np.ndarray:
+        """By how much the joints are measured elsewhere, (6,) in rad."""
+        jump = self.joint_jump_deg if 0.0 <= self.joint_jump_at <= time else 0.0
+        return np.deg2rad([jump, 0.0, 0.0, 0.0, 0.0, 0.0])
 
     def is_body_lost(self, time: float) -> bool:
         """Whether the camera does not see the body."""

@@ -66,6 +66,15 @@ class MessageGuard:
         """The robot stands at a position, (6,) rad, whatever was sent before."""
         self._position, self._speed, self._velocity = position, np.zeros(NUM_JOINTS), np.zeros(NUM_JOINTS)
         self._braking_from, self._span, self._owed = self._velocity, self._period, 0.0
+        self._keep(0.0)
+
+    def _keep(self, passed: float) -> None:
+        state = self._position, self._speed, self._velocity, self._braking_from, self._span
+        self._kept = *state, min(self._owed + passed, MOST_BRIDGED * self._period)
+
+    def take_back(self) -> None:
+        """What was judged last has not been sent; its time is left to the next one."""
+        self._position, self._speed, self._velocity, self._braking_from, self._span, self._owed = self._kept
 
     @property
     def knows_nothing(self) -> bool:
@@ -90,9 +99,10 @@ class MessageGuard:
         Returns:
             The same if it is within the limits, or as near as they allow; NaN if nothing is known.
         """
-        passed += self._owed
         if not (np.isfinite(position).all() and np.isfinite(velocity).all()):
             return self.braking(passed, self._period)
+        self._keep(passed)
+        passed += self._owed
         if self.knows_nothing:
             return position, velocity
         if passed < _NO_TIME:
@@ -127,8 +137,10 @@ class MessageGuard:
             passed: time since the last message in s.
             stop_time: from the motion before to rest, in s.
         """
+        self._keep(passed)
+        passed += self._owed
         if self.knows_nothing or passed < _NO_TIME:
-            self._owed = 0.0 if self.knows_nothing else self._owed + passed
+            self._owed = passed
             return self._position, self._velocity
         limits, start = self._limits, self._braking_from
         top = float(np.abs(start).max())

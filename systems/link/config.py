@@ -6,7 +6,7 @@ from typing import ClassVar
 
 from pydrake.systems.framework import LeafSystem
 
-from robots.configuration.quantity import choice, quantity
+from robots.configuration.quantity import quantity
 from robots.description.model import Placement, RobotModel
 from systems.link.protocols import RobotLink, VirtualController, Wire
 from systems.link.qualisys.maker import Qualisys
@@ -25,9 +25,8 @@ class LinkConfig:
     connect: float = quantity(10.0, 0.1, 3600.0, "s")  # to wait for controller and camera
     # Silence after which the controller counts as gone
     break_after: float = quantity(0.1, 0.01, 10.0, "s")
-    # What a run does then, or when the controller stops: end, or resume
-    on_break: str = choice("end", ("end", "resume"))
-    resume_within: float = quantity(10.0, 0.1, 3600.0, "s")  # in which it must be back
+    # With servo.guard.resume, a run goes on if the controller is back within this time; else it ends
+    resume_within: float = quantity(10.0, 0.1, 3600.0, "s")
     signal_port: int = quantity(0, 0, 65535)  # of this machine, where test signals arrive; 0 for none
     has_camera: bool = True
     camera: Qualisys = field(default_factory=Qualisys)

@@ -72,6 +72,16 @@ class RobotLink(Protocol):
         """Torques (6,) in N m, joint side, at the newest report; zero if it does not report them."""
         ...
 
+    @property
+    def heard(self) -> float:
+        """Steady time at which anything last came from the controller, also what was refused, in s."""
+        ...
+
+    @property
+    def trouble(self) -> str:
+        """Why its newest messages are refused, or why commands had to start anew, in words; else empty."""
+        ...
+
     def why_not_ready(self) -> str:
         """What keeps the robot from following commands, in words."""
         ...
@@ -91,6 +101,14 @@ class RobotLink(Protocol):
             position: of the joints in rad, shape (6,).
             velocity: in rad/s, shape (6,).
             is_speed_only: whether the robot follows the velocity alone.
+        """
+        ...
+
+    def stop(self, position: np.ndarray, velocity: np.ndarray, is_speed_only: bool = False) -> bool:
+        """A command on the way to rest, the answer also to a report that was refused; arguments as of `send`.
+
+        Returns:
+            False if nothing has come that could be answered.
         """
         ...
 

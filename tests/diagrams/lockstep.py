@@ -40,6 +40,7 @@ class Lockstep:
         self._order = itertools.count()
         self._on_the_way: list = []  # (time, order, data, sender) to the client
         self._replies: list = []  # (time, order, data) to the controller
+        self.sent: list[tuple[float, bytes]] = []  # time and bytes of every command
         self._frames: list[tuple[float, PoseSample]] = []
         self._is_stopped = False
         self._report()
@@ -69,12 +70,19 @@ class Lockstep:
     def reply(self, mode: Mode, command: Command) -> bool:
         """As `systems.link.abb.client.EgmClient.reply`."""
         data = self.session.reply(mode, command, self.time)
-        if data is None:
-            return False
+        return data is not None and self._put_on_the_way(data)
+
+    def _put_on_the_way(self, data: bytes) -> bool:
+        self.sent.append((self.time, data))
         for delivery in self.from_client.pass_on(self.time + TURN_AROUND, data):
             if not delivery.is_foreign:
                 heapq.heappush(self._replies, (delivery.time, next(self._order), delivery.data))
         return True
+
+    def stop(self, mode: Mode, command: Command) -> bool:
+        """As `systems.link.abb.client.EgmClient.stop`."""
+        data = self.session.stop(mode, command, self.time)
+        return data is not None and self._put_on_the_way(data)
 
     def warm_up(self) -> None:
         """As `systems.link.abb.client.EgmClient.warm_up`."""

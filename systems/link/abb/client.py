@@ -60,6 +60,11 @@ class EgmClient:
         data, sender = self.session.reply(mode, command, steady_time()), self.session.sender
         return data is not None and sender is not None and self.channel.send(data, sender)
 
+    def stop(self, mode: Mode, command: Command) -> bool:
+        """Answers the controller's newest datagram, also a refused one; False if there is none to answer."""
+        data, sender = self.session.stop(mode, command, steady_time()), self.session.sender
+        return data is not None and sender is not None and self.channel.send(data, sender)
+
     def warm_up(self) -> None:
         """Reads the last report and writes the last command once more, so that the next ones find it warm."""
         self.session.warm_up()

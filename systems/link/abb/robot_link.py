@@ -41,6 +41,16 @@ class AbbRobotLink:
         """Grows whenever commands must start anew."""
         return self._client.session.epoch
 
+    @property
+    def heard(self) -> float:
+        """Steady time at which anything last came from the controller, in s."""
+        return self._client.session.heard
+
+    @property
+    def trouble(self) -> str:
+        """Why the controller's newest messages are refused, or commands had to start anew; else empty."""
+        return self._client.session.trouble
+
     def why_not_ready(self) -> str:
         """What keeps the robot from following commands."""
         if self._client.session.link is Link.WAITING:
@@ -62,8 +72,11 @@ class AbbRobotLink:
 
     def send(self, position: np.ndarray, velocity: np.ndarray, is_speed_only: bool = False) -> bool:
         """Answers the newest report with positions (rad) and speeds (rad/s), or speeds alone."""
-        mode = Mode.JOINT_SPEED_ONLY if is_speed_only else Mode.JOINT_SPEED
-        return self._client.reply(mode, Command(position=position, velocity=velocity))
+        return self._client.reply(_mode(is_speed_only), Command(position=position, velocity=velocity))
+
+    def stop(self, position: np.ndarray, velocity: np.ndarray, is_speed_only: bool = False) -> bool:
+        """Answers the newest message on the way to rest, also one that was refused."""
+        return self._client.stop(_mode(is_speed_only), Command(position=position, velocity=velocity))
 
     def warm_up(self) -> None:
         """Reads the last report and writes the last command once more."""
@@ -88,3 +101,7 @@ class AbbRobotLink:
         else:
             torques = list(report.message.torqueRef.joints)
             self.effort = np.array(torques) if len(torques) == NUM_JOINTS else np.zeros(NUM_JOINTS)
+
+
+def _mode(is_speed_only: bool) -> Mode:
+    return Mode.JOINT_SPEED_ONLY if is_speed_only else Mode.JOINT_SPEED

@@ -77,12 +77,14 @@ class EgmSession:
         self.epoch = 0  # grows whenever commands must start anew from the measured position
         self.sender: Address | None = None
         self.last: RobotReport | None = None
+        self.heard = -math.inf  # when anything last came from the controller, also what is refused
+        self.trouble = ""  # why its newest messages are refused, or were until commands had to start anew
         self._speed, self._break_after, self._host = np.asarray(largest_speed).tolist(), break_after, host
         self._period = period
         self._heard = -math.inf
         self._candidate: RobotReport | None = None
         self._candidates = 0
-        self._may_reply = False
+        self._may_reply = self._may_stop = False
         self._reply_number = 0
         self._safe: Command | None = None
         self._last_data = b""
@@ -99,6 +101,7 @@ class EgmSession:
         except EgmError:
             self.counters.undecodable += 1
             return None
+        self.heard, self._may_stop = now, report.is_ready
         if self.last is not None and not self._follows(report, now):
             return None
         self._accept(report, sender, now)
@@ -119,7 +122,7 @@ class EgmSession:
         """
         if not self._may_reply or self.link is not Link.READY:
             return None
-        self._may_reply = False
+        self._may_reply = self._may_stop = False
         self._reply_number += 1
         try:
             data = encode_command(mode, command, self._reply_number, now)
@@ -132,6 +135,19 @@ class EgmSession:
             data = encode_command(mode, _standing(self._safe), self._reply_number, now)
         self.counters.replies += 1
         return data
+
+    def stop(self, mode: Mode, command: Command, now: float) -> bytes | None:
+        """A command on the way to rest, the answer also to a message that was refused; None if none came.
+
+        Raises:
+            EgmError: if the command is not finite.
+        """
+        if not self._may_stop:
+            return None
+        self._may_reply = self._may_stop = False
+        self._reply_number += 1
+        self.counters.replies += 1
+        return encode_command(mode, command, self._reply_number, now)
 
     def warm_up(self) -> None:
         """Decodes the last datagram and encodes the last reply without any effect."""
@@ -164,8 +180,12 @@ class EgmSession:
         )
         if 0 < ahead <= _LARGEST_GAP and 0.0 <= passed <= _LARGEST_WAIT and is_plausible:
             self.counters.missing += ahead - 1
+            self.trouble = ""
             return True
         is_late = -_LARGEST_GAP <= ahead < 0 and passed <= 0.0
+        if self.link is not Link.BROKEN and not (is_late and self._candidates < _CONFIRMATIONS):
+            since = self._period * ahead if 0 < ahead <= _LARGEST_GAP else 0.0
+            self.trouble = _trouble(report, ahead, passed, since, max(moves, key=abs))
         if self.link is Link.BROKEN or self._is_confirmed(
             report, _MANY_CONFIRMATIONS if is_late else _CONFIRMATIONS
         ):
@@ -203,6 +223,25 @@ class EgmSession:
         self._candidate, self._candidates = None, 0
         self._may_reply = self.link is Link.READY
         self.counters.accepted += 1
+
+
+def _trouble(report: RobotReport, ahead: int, passed: float, since: float, farthest: float) -> str:
+    """In words, why a message does not follow the one before.
+
+    Args:
+        report: the message.
+        ahead: of the number of the one before.
+        passed: s, between their stamps.
+        since: s, that should lie between them.
+        farthest: rad, the largest change of a joint.
+    """
+    if passed < 0.0:
+        return f"the controller's clock stepped back by {since - passed:.3g} s"
+    if passed > _LARGEST_WAIT:
+        return f"the controller's clock stepped forward by {passed - since:.3g} s"
+    if not 0 < ahead <= _LARGEST_GAP:
+        return f"the controller's count jumped by {ahead} to {report.seqno}"
+    return f"a joint jumped by {math.degrees(farthest):.3g} degrees from one message to the next"
 
 
 def _standing(command: Command) -> Command:

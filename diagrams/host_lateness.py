@@ -1,0 +1,48 @@
+"""How late this machine itself was: a run that ends early may have ended for want of a processor."""
+
+from pathlib import Path
+
+_LATE = 1e-3  # s, above what a wake-up takes
+_SCHEDULED = Path("/proc/self/schedstat")  # ns on a processor, ns of waiting for one; Linux
+
+
+class HostLateness:
+    """Counts the messages for which this process was late, and remembers the worst."""
+
+    def __init__(self) -> None:
+        """Starts to count."""
+        self.messages = self.late = 0
+        self.worst = self.worst_at = 0.0  # s
+        self._waited = _waited()
+
+    def note(self, late: float, at: float, is_message: bool = False) -> None:
+        """Counts a message, or a delay.
+
+        Args:
+            late: s, by which this process was late.
+            at: s, when.
+            is_message: whether a message has come with it.
+        """
+        self.messages += is_message
+        self.late += late > _LATE
+        if late > self.worst:
+            self.worst, self.worst_at = late, at
+
+    @property
+    def waited(self) -> float:
+        """How long this process has waited for a processor since the start, in s; 0 where nobody counts."""
+        return _waited() - self._waited
+
+    def sentence(self, began: float) -> str:
+        """In words, with times since ``began`` in s."""
+        return (
+            f"this machine was late by {1e3 * self.worst:.0f} ms at {max(0.0, self.worst_at - began):.1f} s "
+            f"({self.late} of {self.messages} messages late, {self.waited:.1f} s of waiting for a processor)"
+        )
+
+
+def _waited() -> float:
+    try:
+        return 1e-9 * float(_SCHEDULED.read_text().split()[1])
+    except (OSError, ValueError, IndexError):
+        return 0.0
