@@ -25,6 +25,7 @@ from experiments.cli.console import (
     refusing,
     wait_for_interrupt,
 )
+from experiments.cli.ending import clean_up_on_sigterm
 from experiments.cli.json_output import human_console, json_output
 from experiments.cli.option_limits import at_least, positive
 from experiments.cli.options import (
@@ -61,7 +62,7 @@ from experiments.report.report import verdict
 from experiments.robots.command import robots_app
 from experiments.robustness.command import robustness_command
 from experiments.station.cell_command import cell_command
-from experiments.station.guided_command import ask_before_moving, guide, on_station
+from experiments.station.guided_command import Guided, ask_before_moving, guide, on_station
 from experiments.station.latency_command import latency_command
 from experiments.study.command import study_command
 from experiments.zeros.command import zeros_command
@@ -98,6 +99,7 @@ LawsOption = Annotated[
 
 def main() -> None:
     """The console command."""
+    clean_up_on_sigterm()
     app(prog_name="truetip")
 
 
@@ -164,12 +166,14 @@ def compare_command(
         is_guided = prepared.scenario.station.kind == "egm"
         if is_guided:
             ask_before_moving(human, prepared, with_cell or yes)
+    guided: Guided | None = None
     with json_output(json_file) as output, refusing(OSError), ExitStack() as stack:
         stage = stack.enter_context(staged_folder(out))
         keep_robot = robot_writer(stack, write, chosen)
         stack.enter_context(output.staged())
         if is_guided:
-            logs = guide(human, (stage, out), prepared, chosen, cycles, with_cell)
+            guided = guide(human, (stage, out), prepared, chosen, cycles, with_cell)
+            logs = guided.logs
         else:
             runs = cycles * len(chosen)
             with progress_bar(f"{count(runs, 'run')} {where.place(runs)}") as progress:
@@ -178,6 +182,8 @@ def compare_command(
         keep_robot(logs)
         output.write(with_timing(result, timing(logs)))
     _conclude(human, result, out, write)
+    if guided:
+        guided.conclude()
 
 
 @app.command("run")
@@ -217,31 +223,33 @@ def run_command(
             if meshcat or realtime is not None:
                 raise ValueError("--meshcat and --realtime belong to a simulated station")
             ask_before_moving(console, prepared, with_cell or yes)
+    guided: Guided | None = None
+    view: LiveView | None = None
     with refusing(OSError), ExitStack() as stack:
         stage = stack.enter_context(staged_folder(out))
         keep_robot = robot_writer(stack, write, [law])
         if is_guided:
-            logs = guide(console, (stage, out), prepared, [law], 1, with_cell)
-            result = _write(console, stage, prepared, logs)
-            keep_robot(logs)
-            _conclude(console, result, out, write)
-            return
-        experiment = Experiment(prepared.scenario, law, prepared.robot)
-        view = LiveView(experiment, prepared.nominal_robot) if meshcat else None
-        if view:
-            console.print(f"Watch it at {view.address}")
-        if realtime is not None:
-            experiment.simulator.set_target_realtime_rate(realtime)
-            experiment.simulator.ResetStatistics()  # the pace counts from here
-        with simulating(law, prepared.scenario.seed), progress_bar(law) as progress:
+            guided = guide(console, (stage, out), prepared, [law], 1, with_cell)
+            logs = guided.logs
+        else:
+            experiment = Experiment(prepared.scenario, law, prepared.robot)
+            view = LiveView(experiment, prepared.nominal_robot) if meshcat else None
             if view:
-                advance_live(experiment, view, progress)
-            else:
-                experiment.advance(progress=progress)
-        logs = {law: [experiment.log()]}
+                console.print(f"Watch it at {view.address}")
+            if realtime is not None:
+                experiment.simulator.set_target_realtime_rate(realtime)
+                experiment.simulator.ResetStatistics()  # the pace counts from here
+            with simulating(law, prepared.scenario.seed), progress_bar(law) as progress:
+                if view:
+                    advance_live(experiment, view, progress)
+                else:
+                    experiment.advance(progress=progress)
+            logs = {law: [experiment.log()]}
         result = _write(console, stage, prepared, logs)
         keep_robot(logs)
     _conclude(console, result, out, write)
+    if guided:
+        guided.conclude()
     if view:
         wait_for_interrupt(console, f"Still at {view.address}; Ctrl-C ends it")
 

@@ -13,9 +13,10 @@ from rich.markup import escape
 from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeRemainingColumn
 from rich.table import Table
 
+from experiments.cli.ending import exit_code
 from experiments.cli.workers import SimulationError
 
-BAD_INPUT, BROKEN_OFF, INTERRUPTED = 2, 1, 130  # exit codes
+BAD_INPUT, BROKEN_OFF = 2, 1  # exit codes
 
 
 @contextmanager
@@ -27,8 +28,8 @@ def refusing(*refusals: type[Exception]) -> Iterator[None]:
         fail(str(error), BAD_INPUT)
     except SimulationError as error:
         fail(str(error), BROKEN_OFF)
-    except KeyboardInterrupt:
-        fail("interrupted, nothing was written", INTERRUPTED)
+    except KeyboardInterrupt as error:
+        fail("interrupted, nothing was written", exit_code(error))
 
 
 def fail(message: str, code: int) -> None:

@@ -9,6 +9,7 @@ from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wai
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import closing, contextmanager
 from dataclasses import dataclass
+from multiprocessing.connection import wait as wait_for
 from typing import Any, Protocol, TypeVar
 
 _POLL = 0.1  # s between two looks at the progress
@@ -168,6 +169,15 @@ _worker: dict[str, Any] = {}  # what a worker process shares with its parent
 
 def _start_worker(shares: Any, stop: Any) -> None:
     _worker.update(shares=shares, stop=stop)
+    threading.Thread(target=_end_with_parent, daemon=True).start()
+
+
+def _end_with_parent() -> None:
+    """Nobody waits for the results of an orphan."""
+    parent = multiprocessing.parent_process()
+    if parent is not None:
+        wait_for([parent.sentinel])
+        os._exit(1)
 
 
 def _do(work: Callable[[Any, Progress], Any], number: int, job: Any) -> Any:

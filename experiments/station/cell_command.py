@@ -1,8 +1,10 @@
 """``truetip cell``: a robot cell that exists only in this process, for any client of EGM and Qualisys."""
 
 import json
+import os
 import signal
 import sys
+import threading
 from contextlib import ExitStack
 from dataclasses import fields
 from types import FrameType
@@ -42,6 +44,10 @@ def cell_command(
     announce: Annotated[
         bool, typer.Option("--announce", help="Print the ports as one line of JSON first, for scripts.")
     ] = False,
+    until_eof: Annotated[
+        bool,
+        typer.Option("--until-eof", help="Stop when standard input closes: with whoever started it."),
+    ] = False,
 ) -> None:
     """Run a virtual robot cell in real time: a controller under EGM and a camera server."""
     human = Console(stderr=announce)
@@ -64,7 +70,7 @@ def cell_command(
             with_log=truth is not None,
         )
         stack.callback(loop.close)
-        stop = _Stop(duration)
+        stop = _Stop(duration, until_eof)
         if announce:
             sys.stdout.write(json.dumps({"camera_port": camera.port}) + "\n")
             sys.stdout.flush()
@@ -113,12 +119,20 @@ def print_statistics(console: Console, statistics: CellStatistics) -> None:
 
 
 class _Stop:
-    """The stop condition of a cell: a duration, Ctrl-C or a signal."""
+    """The stop condition of a cell: a duration, Ctrl-C or a signal, or the end of standard input."""
 
-    def __init__(self, duration: float | None) -> None:
+    def __init__(self, duration: float | None, until_eof: bool) -> None:
         self._duration, self._is_asked = duration, False
+        if until_eof:
+            threading.Thread(target=self._read, daemon=True).start()
         for number in (signal.SIGINT, signal.SIGTERM):
             signal.signal(number, self._ask)
+
+    def _read(self) -> None:
+        # Not by way of sys.stdin, whose lock a daemon thread would still hold when the interpreter ends.
+        while os.read(0, 4096):
+            pass
+        self._is_asked = True
 
     def _ask(self, number: int, frame: FrameType | None) -> None:
         self._is_asked = True

@@ -86,7 +86,7 @@ class CellBeside:
         folder = Path(self._folder.name)
         self._truth, self._json = folder / "truth.npz", folder / "cell.json"
         (folder / "scenario.yaml").write_text(scenario_text(scenario), encoding="utf-8")
-        command = [sys.executable, "-m", "experiments.main", "cell", "--announce"]
+        command = [sys.executable, "-m", "experiments.main", "cell", "--announce", "--until-eof"]
         command += ["--scenario", str(folder / "scenario.yaml"), "--set", f"station.link.port={port}"]
         command += ["--set", "station.link.camera.server.port=0"]
         command += ["--set", f"station.link.signal_port={signal_port}"]
@@ -94,8 +94,14 @@ class CellBeside:
 
     def __enter__(self) -> int:
         """Starts the cell; returns the port of its camera. Raises SimulationError if it does not start."""
+        # A session of its own: Ctrl-C in a terminal is for this process, which first stops the robot.
         self._process = subprocess.Popen(
-            self._command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+            self._command,
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.PIPE,
+            text=True,
+            start_new_session=True,
         )
         assert self._process.stdout is not None
         line = self._process.stdout.readline()

@@ -6,8 +6,9 @@ from typing import Any
 
 import numpy as np
 
+from diagrams.hardware_link import never
 from diagrams.record.log import RunLog
-from diagrams.runs.real_time import RealTimeRecord, RealTimeRun
+from diagrams.runs.real_time import REQUESTED, RealTimeRecord, RealTimeRun
 from diagrams.runs.virtual_cell import CellRecord
 from diagrams.scenario.scenario import Scenario
 from experiments.station.clients import station_clients
@@ -39,6 +40,7 @@ def compare_on_station(
     cycles: int = 1,
     with_cell: bool = False,
     progress: Callable[[float], None] | None = None,
+    is_asked_to_end: Callable[[], bool] = never,
 ) -> GuidedComparison:
     """Runs laws one after the other on the station that the scenario's link names.
 
@@ -49,6 +51,7 @@ def compare_on_station(
         cycles: runs of each law.
         with_cell: whether to start a virtual cell for it; its truth is joined to the logs by time stamp.
         progress: is called now and then with the share that is done, 0 to 1.
+        is_asked_to_end: whether somebody wants an end; the run that goes on stops smoothly, none follows.
 
     Raises:
         SimulationError: if the station is not there, or a run broke off before its path began.
@@ -64,20 +67,26 @@ def compare_on_station(
                 station.client,
                 station.camera,
                 progress=lambda share, number=number: report((number + share) / len(jobs)),
+                is_asked_to_end=is_asked_to_end,
             )
             records[law].append(record)
+            if record.ended == REQUESTED:
+                break
     cell = station.cell
     if cell and cell.truth is not None:
         for cycles_of_law in records.values():
             for record in cycles_of_law:
                 record.log = with_truth(record, cell.truth)
-    return GuidedComparison(records, cell.statistics if cell else {})
+    done = {law: cycles_of_law for law, cycles_of_law in records.items() if cycles_of_law}
+    return GuidedComparison(done, cell.statistics if cell else {})
 
 
 def with_truth(record: RealTimeRecord, truth: CellRecord) -> RunLog:
     """The log of a run with the truth of the cell beside it, matched by the controller's stamps."""
     stamps, ticks = record.stamps, np.arange(len(record.stamps))
     heard = np.isfinite(stamps)
+    if not heard.any():
+        return record.log
     # A tick whose message was lost lies between its neighbours.
     X_WE, link_position = truth.at(np.interp(ticks, ticks[heard], stamps[heard]))
     known = np.isfinite(link_position)
@@ -92,6 +101,14 @@ def _link_json(record: RealTimeRecord) -> dict[str, Any]:
     return {
         "ended": record.ended,
         "pauses_s": record.pauses,
+        "events": [[event.time, event.kind, event.detail] for event in record.events],
+        "limited_messages": record.limited_messages,
+        "late_host": {
+            "messages": record.host.messages,
+            "late": record.host.late,
+            "worst_ms": 1e3 * record.host.worst,
+            "waited_s": record.host.waited,
+        },
         "controller": record.counters,
         "camera": record.camera,
         "turn_around_ms": {

@@ -3,6 +3,7 @@
 import ipaddress
 import sys
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -12,7 +13,8 @@ from rich.console import Console
 
 from diagrams.record.log import RunLog
 from diagrams.runs.real_time import RealTimeRecord
-from experiments.cli.console import count, progress_bar
+from experiments.cli.console import BROKEN_OFF, count, progress_bar
+from experiments.cli.ending import asking
 from experiments.cli.prepare import Prepared
 from experiments.cli.staging import keep_files
 from experiments.cli.workers import SimulationError
@@ -56,6 +58,22 @@ def ask_before_moving(console: Console, prepared: Prepared, is_agreed: bool) -> 
         raise typer.Exit
 
 
+@dataclass(frozen=True)
+class Guided:
+    """Runs on a station that can be reported on, and how the command ends after that."""
+
+    logs: Mapping[str, Sequence[RunLog]]
+    endings: list[str]  # of the runs that did not reach the end of their path
+    code: int  # exit code
+
+    def conclude(self) -> None:
+        """Says on stderr which runs ended early, and ends the command if one did. Raises typer.Exit."""
+        for ending in self.endings:
+            typer.echo(f"truetip: {ending}", err=True)
+        if self.code:
+            raise typer.Exit(self.code)
+
+
 def guide(
     console: Console,
     folders: tuple[Path, Path],
@@ -63,8 +81,10 @@ def guide(
     laws: Sequence[str],
     cycles: int,
     with_cell: bool,
-) -> Mapping[str, Sequence[RunLog]]:
+) -> Guided:
     """Runs laws on a station, writes ``link.json`` and the whole logs, and says what happened on the wire.
+
+    Ctrl-C and SIGTERM stop the robot smoothly; what there is until then is reported on.
 
     Args:
         console: where to say it.
@@ -76,12 +96,15 @@ def guide(
         with_cell: whether to start a virtual cell.
 
     Raises:
-        SimulationError: if the station is not there or a run has not come as far as its path.
+        SimulationError: if the station is not there or no run has come as far as its path.
+        typer.Exit: if somebody ended it before a path had begun.
     """
     stage, out = folders
     where = "a virtual cell" if with_cell else f"UDP port {prepared.scenario.station.link.port}"
-    with progress_bar(f"{count(cycles * len(laws), 'run')} on {where}") as progress:
-        comparison = compare_on_station(prepared.scenario, prepared.robot, laws, cycles, with_cell, progress)
+    with asking() as end, progress_bar(f"{count(cycles * len(laws), 'run')} on {where}") as progress:
+        comparison = compare_on_station(
+            prepared.scenario, prepared.robot, laws, cycles, with_cell, progress, end.is_asked
+        )
     link = comparison.link_json()
     write_json(stage / "link.json", link)
     records = [
@@ -91,13 +114,25 @@ def guide(
         write_log(stage / f"{law_file_name(law)}-{number}.npz", record)
     print_link(console, link)
     console.print("Counts, delays and clocks of the wire are in link.json, whole logs in *.npz")
+    endings, known = [], {}
     for law, _, record in records:
-        if not len(record.log.time) or record.log.time[-1] <= record.log.path_start:
-            keep_files(stage, out)
-            raise SimulationError(
-                f"law {law}: {record.ended} before the path had begun; see {out / 'link.json'}"
-            )
-    return comparison.logs
+        if _has_begun(record):
+            known.setdefault(law, []).append(record.log)
+        if record.ended != "path":
+            when = "before the path had begun"
+            if _has_begun(record):
+                when = f"at {record.log.time[-1]:.1f} s of {record.log.path_end:.1f} s"
+            endings.append(f"law {law}: {when}: {record.ended}")
+    if not known:
+        keep_files(stage, out)
+        Guided({}, endings, end.code).conclude()
+        raise SimulationError(f"{'; '.join(endings)}; see {out / 'link.json'}")
+    return Guided(known, endings, end.code or (BROKEN_OFF if endings else 0))
+
+
+def _has_begun(record: RealTimeRecord) -> bool:
+    """Whether a run has come as far as its path."""
+    return len(record.log.time) > 0 and bool(record.log.time[-1] > record.log.path_start)
 
 
 def write_log(path: Path, record: RealTimeRecord) -> None:
