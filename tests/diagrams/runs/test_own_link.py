@@ -54,6 +54,13 @@ class OwnLink:
         self.sent += 1
         return True
 
+    @property
+    def heard(self) -> float:
+        return self.arrived
+
+    def stop(self, position: np.ndarray, velocity: np.ndarray, is_speed_only: bool = False) -> bool:
+        return self.send(position, velocity, is_speed_only)
+
     def poll_aside(self) -> None: ...
 
     def warm_up(self) -> None: ...

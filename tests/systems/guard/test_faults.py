@@ -1,5 +1,7 @@
 """Whatever fails before the guard, no joint is commanded to move, or change its speed, faster than it may."""
 
+from typing import Any
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -36,7 +38,7 @@ class Swing:
         self.rig = GuardRig(ROBOT, config, MIDDLE, **options)
         self.rate, self.share = 4.0, share
         self.positions, self.velocities = [MIDDLE, MIDDLE], [np.zeros(6), np.zeros(6)]
-        self.counts: dict[str, int] = {}
+        self.counts: dict[Any, int] = {}
         self.tick()
 
     def tick(self, fault: str = "none", size: float = 0.0) -> None:

@@ -23,7 +23,7 @@ class Stream:
         self.guard.forget(MIDDLE)
         self.passed = PassedTime(PERIOD)
         self.stamp, self.now = 1000.0, 5.0
-        self.rows = [(PERIOD, MIDDLE, np.zeros(6))]
+        self.rows: list[tuple] = [(PERIOD, MIDDLE, np.zeros(6))]
 
     def send(self, position, velocity, stamp: float = PERIOD, own: float = PERIOD, brakes: bool = False):
         """A message; the clocks have gone on by two times in s."""
