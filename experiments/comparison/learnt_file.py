@@ -50,6 +50,8 @@ def robot_writer(
     path = stack.enter_context(staged_file(file, *YAML))
 
     def write(logs: Mapping[str, Sequence[RunLog]]) -> None:
+        if law not in logs:  # it ended before its path began
+            return
         robot = logs[law][-1].calibrated
         assert robot is not None  # of a law that calibrates
         write_text(path, robot_text(robot))
