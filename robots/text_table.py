@@ -80,10 +80,13 @@ def parse_fields(text: str, name: str, has_head: bool) -> TextTable:
     return TextTable(name, separator, rows, [number for number, _ in kept])
 
 
-def finite_number(field: str) -> float | None:
-    """The number in a field, written with a decimal point; None if there is none or it is not finite."""
+def finite_number(field: str, separator: str | None = None) -> float | None:
+    """The number in a field; None if there is none or it is not finite.
+
+    Where ``;`` separates the fields, a decimal comma is read, too.
+    """
     try:
-        value = float(field)
+        value = float(field.replace(",", ".") if separator == ";" else field)
     except ValueError:
         return None
     return value if math.isfinite(value) else None

@@ -22,6 +22,7 @@ from experiments.calibration.calibrate import (
     validated,
     validation_configurations,
 )
+from experiments.calibration.instruments import calibrate_with_instruments
 from experiments.calibration.noise_option import ESTIMATE, noise_option
 from experiments.calibration.page import write_calibration_page
 from experiments.calibration.report import calibration_json, print_calibration
@@ -35,6 +36,7 @@ from experiments.cli.staging import YAML, staged_file, staged_folder
 from experiments.metrics.run_metrics import summary
 from experiments.report.files import write_text
 from robots.calibration.identification import identify
+from robots.calibration.instruments.observation_file import names_targets
 from robots.calibration.measurement_file import RowProblem, measurement_text, read_measurements
 from robots.calibration.validation import plausible_rows
 from robots.description.robot_file import robot_text
@@ -99,6 +101,13 @@ def calibrate_command(
             metavar="Q1,...,Q6", help="Joint positions in degrees for that.", show_default="all zero"
         ),
     ] = None,
+    cell: Annotated[
+        str | None,
+        typer.Option(
+            metavar="FILE.yaml",
+            help="What is known of targets and instruments, for a table with a column target or instrument.",
+        ),
+    ] = None,
     out: OutOption = Path("out/calibration"),
     json_file: JsonOption = None,
 ) -> None:
@@ -112,6 +121,13 @@ def calibrate_command(
         baked = urdf_sag(urdf, urdf_payload, urdf_pose, compliance)
         wanted.check()
         prepared = prepare(scenario, settings or [], robot, needs_path=not measurements)
+        if measurements and names_targets(measurements):
+            wanted.check_instruments(urdf)
+            calibrated = (prepared.scenario.robot, prepared.robot)
+            calibrate_with_instruments(human, output, calibrated, (measurements, cell), out, write)
+            return
+        if cell is not None:
+            raise ValueError("--cell is for a table with a column target, instrument or distance")
         if not measurements:  # of tables nothing but the kinematics is asked
             check(prepared, ["open_loop"])
         stage = stack.enter_context(staged_folder(out))
@@ -161,6 +177,20 @@ class _Wanted:
         if self.count is not None:
             at_least("--count", 5, self.count)
         noise_option(self.noise)
+
+    def check_instruments(self, urdf: str | None) -> None:
+        """Raises ValueError if an option has no effect on tables of targets and instruments."""
+        given = {
+            "--validation": self.validation,
+            "--compliance": self.compliance,
+            "--fixed": self.fixed,
+            "--position-only": self.position_only,
+            "--noise": self.noise != ESTIMATE,
+            "--urdf": urdf,
+        }
+        for option, value in given.items():
+            if value:
+                raise ValueError(f"{option} has no effect on a table of targets and instruments")
 
 
 @dataclass(frozen=True)

@@ -1,6 +1,7 @@
 """Tables of measured poses as text files whose column names carry the units.
 
-One row a measurement, separated by commas or semicolons, lines that begin with # are comments. Columns:
+One row a measurement, separated by commas or semicolons (then decimal commas are read, too), lines that begin
+with # are comments. Columns:
 ``q1_rad`` ... ``q6_rad`` or ``q1_deg`` ...; ``x_m``, ``y_m``, ``z_m`` or ``x_mm`` ...; for the orientation
 ``qw``, ``qx``, ``qy``, ``qz``, or the ZYX Euler angles ``alpha_deg``, ``beta_deg``, ``gamma_deg`` (also in
 ``_rad``), or none of them; ``payload_kg`` if there is one; standard deviations of the row as
@@ -72,7 +73,7 @@ def _measurements(table: TextTable) -> tuple[Measurements, list[RowProblem]]:
     rows, numbers = [], []
     for line, row in zip(table.lines[1:], table.rows[1:], strict=True):
         try:
-            values = columns.numbers(row)
+            values = columns.numbers(row, table.separator)
         except ValueError as error:
             problems.append(RowProblem(line, str(error)))
             continue
@@ -130,12 +131,12 @@ class _Columns:
         wanted = " or ".join(f"{name}_{unit}" if unit else name for unit in units)
         raise MeasurementFileError(f"column {wanted} is missing; there are {', '.join(header)}")
 
-    def numbers(self, row: list[str]) -> list[float]:
+    def numbers(self, row: list[str], separator: str | None = None) -> list[float]:
         """The numbers of a row in the units of the file. Raises ValueError."""
         values = []
         for place, name in zip(self._places, self._names, strict=True):
             text = row[place] if place < len(row) else ""
-            value = finite_number(text)
+            value = finite_number(text, separator)
             if value is None:
                 raise ValueError(f"{name} is not a finite number: '{text}'")
             if value < 0.0 and name == "payload_kg":

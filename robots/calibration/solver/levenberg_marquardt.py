@@ -8,8 +8,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from robots.calibration.solver.noise_model import NoiseModel
-from robots.calibration.solver.problem import Linearised, Problem
+from robots.calibration.solver.noise_model import Noise
+from robots.calibration.solver.problem import Linearised, Predicted
 
 _NEGLIGIBLE = 1e-14  # singular values below this share of the largest are rounding
 _LARGEST_DAMPING = 1e14
@@ -30,9 +30,9 @@ class Fit:
 
 
 def minimise(
-    problem: Problem,
+    problem: Predicted,
     start: np.ndarray,
-    noise: NoiseModel,
+    noise: Noise,
     weights: np.ndarray,
     most: int = 60,
     is_rough: bool = False,

@@ -6,6 +6,7 @@ table says of each row; the theta are variances, known or to be found.
 """
 
 from dataclasses import dataclass, replace
+from typing import Protocol
 
 import numpy as np
 
@@ -13,6 +14,33 @@ from robots.calibration.measurements import MeasurementNoise, Measurements
 
 JOINT, POSITION, ROTATION = 0, 1, 2  # the components
 FLOOR = 1e-13  # m or rad: below it there is rounding only
+_SHARE_OF_RMS = 0.05  # no instrument is better than this share of the residuals
+
+
+class Noise(Protocol):
+    """What the solver asks of a model of noise with c components."""
+
+    @property
+    def theta(self) -> np.ndarray:
+        """Variances of the components, (c,)."""
+        ...
+
+    @property
+    def shape(self) -> np.ndarray:
+        """What they are multiplied by, number for number or row for row."""
+        ...
+
+    def whitening(self, J: np.ndarray) -> np.ndarray:
+        """See `NoiseModel.whitening`."""
+        ...
+
+    def halves(self, W: np.ndarray, J: np.ndarray) -> list[np.ndarray]:
+        """See `NoiseModel.halves`."""
+        ...
+
+    def floors(self, residuals: np.ndarray) -> np.ndarray:
+        """See `NoiseModel.floors`."""
+        ...
 
 
 @dataclass(frozen=True)
@@ -45,6 +73,17 @@ class NoiseModel:
         position = W[:, :, -3:]
         rotation = W[:, :, :-3]
         return [root[:, JOINT] * (W @ J), root[:, POSITION] * position, root[:, ROTATION] * rotation]
+
+    def floors(self, residuals: np.ndarray) -> np.ndarray:
+        """The least variances (3,) for residuals (n, k).
+
+        No instrument is perfect: its variance is known badly when that of the joints is large.
+        """
+        least = np.zeros(3)
+        for component, part in ((POSITION, residuals[:, -3:]), (ROTATION, residuals[:, :-3])):
+            if part.size:
+                least[component] = max(_SHARE_OF_RMS**2 * float(np.mean(part**2)), FLOOR**2)
+        return least
 
     def as_noise(self) -> MeasurementNoise:
         """Standard deviations."""

@@ -1,6 +1,7 @@
 """The measurements and the parameters that are to explain them, every parameter in the unit of its prior."""
 
 from dataclasses import dataclass
+from typing import Protocol
 
 import numpy as np
 
@@ -21,6 +22,18 @@ class Linearised:
     residuals: np.ndarray  # (n, k) measured less predicted: rad, m; rotation first
     A: np.ndarray  # (n, k, m) derivative of the prediction by the scaled parameters
     J: np.ndarray  # (n, k, 6) derivative of the prediction by the joint positions
+
+
+class Predicted(Protocol):
+    """What the search asks of a problem."""
+
+    def residuals(self, u: np.ndarray) -> np.ndarray:
+        """Measured less predicted rows, (n, k)."""
+        ...
+
+    def linearise(self, u: np.ndarray) -> Linearised:
+        """Residuals with their derivatives."""
+        ...
 
 
 class Problem:

@@ -9,12 +9,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from robots.calibration.solver.noise_model import FLOOR, JOINT, POSITION, ROTATION, NoiseModel
+from robots.calibration.solver.noise_model import JOINT, POSITION, ROTATION, Noise
 from robots.calibration.solver.problem import Linearised
 
 _SEEN = 0.1  # singular values below it, in units of the prior, take nothing from the degrees of freedom
 _LEAST = 0.02  # of its former value: a component falls no faster
-_SHARE_OF_RMS = 0.05  # no instrument is better than this share of the residuals
 
 
 @dataclass(frozen=True)
@@ -35,7 +34,7 @@ class _Whitened:
     score: np.ndarray  # g_i - t_i
 
 
-def variance_components(at: Linearised, noise: NoiseModel, estimated: list[int]) -> VarianceComponents:
+def variance_components(at: Linearised, noise: Noise, estimated: list[int]) -> VarianceComponents:
     """One step of scoring.
 
     Args:
@@ -66,20 +65,11 @@ def variance_components(at: Linearised, noise: NoiseModel, estimated: list[int])
             theta[estimated[i]] *= _LEAST
         free = [i for i in free if i not in falling]
     theta[estimated] = new if free else theta[estimated]
-    return VarianceComponents(_at_least(theta, at, estimated), 2.0 * np.linalg.inv(F))
+    theta[estimated] = np.maximum(theta, noise.floors(at.residuals))[estimated]
+    return VarianceComponents(theta, 2.0 * np.linalg.inv(F))
 
 
-def _at_least(theta: np.ndarray, at: Linearised, estimated: list[int]) -> np.ndarray:
-    """No instrument is perfect: its variance is known badly when that of the joints is large."""
-    e = at.residuals
-    for component, part in ((POSITION, e[:, -3:]), (ROTATION, e[:, :-3])):
-        if component in estimated and part.size:
-            floor = _SHARE_OF_RMS**2 * float(np.mean(part**2))
-            theta[component] = max(theta[component], floor, FLOOR**2)
-    return theta
-
-
-def _whitened(at: Linearised, noise: NoiseModel, estimated: list[int]) -> _Whitened:
+def _whitened(at: Linearised, noise: Noise, estimated: list[int]) -> _Whitened:
     n, k, m = at.A.shape
     W = noise.whitening(at.J)
     A, e = (W @ at.A).reshape(-1, m), np.einsum("nij,nj->ni", W, at.residuals)
@@ -101,7 +91,7 @@ def _whitened(at: Linearised, noise: NoiseModel, estimated: list[int]) -> _White
 
 def parameter_factor(
     at: Linearised,
-    noise: NoiseModel,
+    noise: Noise,
     estimated: list[int],
     found: VarianceComponents | None,
 ) -> np.ndarray:

@@ -13,6 +13,7 @@ from robots.description.model import load_robot
 from robots.kinematics.forward import Kinematics
 from tests.experiments.commands import refusal, truetip
 from tests.robots.calibration.matrix_robot import MatrixRobot, homogeneous
+from tests.robots.calibration.seen import PLACES, observed
 
 
 def tables(folder: Path, name: str, position_only: bool = False) -> MatrixRobot:
@@ -84,3 +85,33 @@ def test_a_file_of_known_noise_is_believed(tmp_path: Path):
     assert result.exit_code == 0, result.output
     known = {"estimated": False, "joint_deg": 0.01, "position_mm": 0.1, "rotation_deg": 0.05}
     assert json.loads(result.stdout)["noise"] == pytest.approx(known)
+
+
+def test_a_table_of_targets_and_instruments_becomes_a_robot(tmp_path: Path):
+    true, seen = observed(count=40)
+    head = [*(f"q{k}_rad" for k in range(1, 7)), "target", "instrument", "x_m", "y_m", "z_m", "distance_m"]
+    lines = [";".join(head)]
+    for k, row in enumerate(seen.row):
+        numbers = [*seen.q[row], *seen.position[k], seen.distance[k]]
+        cells = ["" if np.isnan(value) else repr(float(value)).replace(".", ",") for value in numbers]
+        names = [seen.targets[seen.target[k]], seen.instruments[seen.instrument[k]]]
+        lines.append(";".join([*cells[:6], *names, *cells[6:]]))
+    (tmp_path / "m.csv").write_text("\n".join(lines))
+    arguments = ["--measurements", tmp_path / "m.csv", "--robot", "irb1200"]
+    result = truetip(
+        "calibrate", *arguments, "--write", tmp_path / "r.yaml", "--out", tmp_path / "out", "--json", "-"
+    )
+    assert result.exit_code == 0, result.output
+    found = json.loads(result.stdout)
+    assert set(found["frames"]) == {"tracker", "camera"}
+    assert set(found["anchors_mm"]) == {"bar"}
+    assert len(found["residuals"]) == len(seen)
+    assert "Every line" in (tmp_path / "out" / "report.html").read_text()
+    q = true.configurations(20, np.random.default_rng(5))
+    X, X_true = Kinematics(load_robot(str(tmp_path / "r.yaml"))).forward(q), true.forward(q)
+    places = (1e-3 * np.array(found["targets_mm"]["a"]), PLACES["a"])
+    p, p_true = (each[:, :3, :3] @ a + each[:, :3, 3] for each, a in zip((X, X_true), places, strict=True))
+    steps, true_steps = (np.linalg.norm(np.diff(each, axis=0), axis=1) for each in (p, p_true))
+    assert np.abs(steps - true_steps).max() < 1e-10  # m, wherever the world of the robot is
+    refused = truetip("calibrate", *arguments, "--compliance", "--out", tmp_path / "no")
+    assert "--compliance has no effect on a table of targets and instruments" in refusal(refused)

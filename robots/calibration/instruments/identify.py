@@ -1,0 +1,267 @@
+"""One adjustment of a robot, of the targets on its tool and of the instruments that saw them."""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy.stats import chi2
+
+from robots.calibration.error_model import ErrorModel
+from robots.calibration.identification import IdentificationError
+from robots.calibration.instrument_frame import instrument_frame
+from robots.calibration.instruments.noise import JOINT, InstrumentNoise, instrument_noise
+from robots.calibration.instruments.observations import MeasuringCell, Observations
+from robots.calibration.instruments.problem import InstrumentProblem, Setting, Start
+from robots.calibration.solver.levenberg_marquardt import Fit, minimise
+from robots.calibration.solver.noise_model import FLOOR
+from robots.calibration.solver.variance_components import parameter_factor, variance_components
+from robots.description.calibration import Calibration
+from robots.description.model import RobotModel
+from robots.metrology.least_squares import UndeterminedError
+
+_FIRST_SIGMA = 3e-4  # m, of an instrument of which nothing is known
+_L1_ROUNDS, _NEAREST = 8, 0.3  # of the median residual: no line weighs more than one at that distance
+_RISK = 1e-3  # that a clean table loses a line
+_MANY = 10  # numbers per parameter, from which a bad line cannot hide in a fit
+_SEARCHES = 8
+_ROUNDS, _SETTLED = 20, 0.02  # of its own standard deviation: change of a variance that ends the search
+_NO_NOISE, _PRIOR_FADES, _ROUNDING = 0.01, 0.01, 1e-9
+_ENOUGH_FOR_JOINTS = (
+    90  # redundant numbers, below which noise of the joints looks like that of the instrument
+)
+_EVERYWHERE = -1.0  # m: every frame is one of its own
+
+
+@dataclass(frozen=True)
+class InstrumentCalibration:
+    """The outcome of an adjustment."""
+
+    robot: RobotModel  # the nominal one
+    model: ErrorModel
+    observations: Observations
+    names: tuple[str, ...]  # of the free parameters
+    values: np.ndarray  # (f,) m, rad
+    covariance: np.ndarray  # (f, f)
+    shares: np.ndarray  # (f,) of what is known of each, how much comes from the data: 0 to 1
+    x: np.ndarray  # parameters of the error model
+    setting: Setting  # targets, frames and anchors
+    before: np.ndarray  # (m, 3) m, measured less predicted with the nominal robot, NaN where nothing was
+    residuals: np.ndarray  # (m, 3) m, with the calibrated one
+    noise: np.ndarray  # standard deviations: of the joints in rad, of every instrument in m
+    used: np.ndarray  # (m,) bool
+    rank: int  # directions that the data show better than what was known before
+    iterations: int
+
+    @property
+    def outliers(self) -> tuple[int, ...]:
+        """The lines with gross errors."""
+        return tuple(map(int, self.observations.lines[~self.used]))
+
+    def calibrated_robot(self, of: str = "") -> RobotModel:
+        """The robot as it is, in its own world; ``of`` is the one that was calibrated."""
+        robot = self.model.robot_with_errors(self.x)
+        instruments = ", ".join(self.observations.instruments)
+        inside = [k for k, name in enumerate(self.names) if name in self.model.names]
+        covariance = self.covariance[np.ix_(inside, inside)]
+        calibration = Calibration(
+            of,
+            source=f"identified from {int(self.used.sum())} lines of {instruments}",
+            names=[self.names[k] for k in inside],
+            values=self.values[inside].tolist(),
+            covariance=[row[: i + 1].tolist() for i, row in enumerate(covariance)],
+        )
+        return replace(robot, name=f"{self.robot.name}, calibrated", calibration=calibration)
+
+
+def identify_with_instruments(
+    robot: RobotModel, observations: Observations, cell: MeasuringCell | None = None
+) -> InstrumentCalibration:
+    """Finds the errors of a robot, the unknown targets, frames and anchors, and the noise.
+
+    Args:
+        robot: the nominal robot.
+        observations: lines of all instruments.
+        cell: what is known before.
+
+    Raises:
+        IdentificationError: if nothing says where an instrument stands, or the search does not converge.
+    """
+    if robot.is_calibrated:
+        raise IdentificationError(
+            f"calibration of {robot.name}: it is calibrated already; start from the nominal robot"
+        )
+    cell = cell or MeasuringCell({}, {}, {}, {})
+    model = ErrorModel(robot)
+    problem = InstrumentProblem(model, observations, cell, _start(model, observations, cell))
+    return _Adjustment(problem, cell).result(robot)
+
+
+def _start(model: ErrorModel, seen: Observations, cell: MeasuringCell) -> Start:
+    """Frames by rigid registration of the nominal robot, targets at the tool, anchors by their distances."""
+    X = model.forward(seen.q, np.zeros(len(model)))
+    places = np.array([cell.places.get(name, np.zeros(3)) for name in seen.targets])
+    p = np.einsum("mij,mj->mi", X[seen.row, :3, :3], places[seen.target]) + X[seen.row, :3, 3]
+    frames, anchors = np.tile(np.eye(4), (len(seen.instruments), 1, 1)), np.zeros((len(seen.instruments), 3))
+    for i, name in enumerate(seen.instruments):
+        lines = np.flatnonzero(seen.instrument == i)
+        if seen.is_bar(i):
+            anchors[i] = (
+                cell.anchors[name] if name in cell.anchors else _anchor(p[lines], seen.distance[lines])
+            )
+        elif name in cell.frames:
+            frames[i] = cell.frames[name]
+        else:
+            whole = lines[np.isfinite(seen.position[lines]).all(axis=1)]
+            try:
+                found = instrument_frame(p[whole], seen.position[whole], _EVERYWHERE, 0.0)
+            except (UndeterminedError, ValueError) as error:
+                raise IdentificationError(
+                    f"instrument {name}: nothing says where it stands: {error}"
+                ) from error
+            assert found is not None
+            frames[i] = found
+    return Start(places, frames, anchors)
+
+
+def _anchor(p: np.ndarray, distance: np.ndarray) -> np.ndarray:
+    """The point from which points (n, 3) have these distances (n,), by differences of their squares, m."""
+    A = 2.0 * (p - p.mean(axis=0))
+    squares = np.sum(p**2, axis=1) - distance**2
+    return np.linalg.lstsq(A, squares - squares.mean(), rcond=None)[0]
+
+
+class _Adjustment:
+    """From a problem to its solution."""
+
+    def __init__(self, problem: InstrumentProblem, cell: MeasuringCell) -> None:
+        self._problem, self._everything, self._iterations = problem, problem.active, 0
+        seen = problem.observations
+        said = [
+            bool(np.isfinite(seen.sigma[seen.instrument == i]).all()) for i in range(len(seen.instruments))
+        ]
+        given = [
+            1.0 if known else cell.sigmas.get(name)
+            for name, known in zip(seen.instruments, said, strict=True)
+        ]
+        self._estimated = [1 + i for i, sigma in enumerate(given) if sigma is None]
+        self._theta = np.array([cell.joint_sigma or 0.0, *(s if s else _FIRST_SIGMA for s in given)]) ** 2
+        redundancy = int(self._everything.sum()) - len(problem.columns)
+        if cell.joint_sigma is None and self._estimated and redundancy >= _ENOUGH_FOR_JOINTS:
+            self._estimated.insert(0, JOINT)
+
+    def result(self, robot: RobotModel) -> InstrumentCalibration:
+        """Searches. Raises IdentificationError."""
+        problem = self._problem
+        u, used = self._clean_lines()
+        fit, noise, found = self._solve(u, used)
+        if not fit.is_converged:
+            rms = 1e3 * float(np.sqrt(np.mean(fit.at.residuals**2)))
+            raise IdentificationError(
+                f"the adjustment has not converged after {self._iterations} iterations and leaves "
+                f"{rms:.3g} mm"
+            )
+        factor = parameter_factor(fit.at, noise, self._estimated, found)
+        sizes = problem.sizes[problem.columns]
+        covariance = sizes[:, None] * (factor @ factor.T) * sizes
+        A = (noise.whitening(fit.at.J) @ fit.at.A).reshape(-1, len(sizes))
+        s = np.linalg.svd(np.linalg.qr(A, mode="r"), compute_uv=False)
+        problem.active = self._everything
+        values = problem.parameters(fit.u)
+        seen = self._everything
+        nominal = problem.parameters(fit.u)
+        nominal[: len(problem.model)] = 0.0
+        before = problem.gathered(problem.residuals(nominal[problem.columns] / sizes))
+        return InstrumentCalibration(
+            robot=robot,
+            model=problem.model,
+            observations=problem.observations,
+            names=tuple(problem.names[k] for k in problem.columns),
+            values=values[problem.columns],
+            covariance=covariance,
+            shares=np.clip(1.0 - np.diagonal(covariance) / sizes**2, 0.0, 1.0),
+            x=values[: len(problem.model)],
+            setting=problem.setting(values),
+            before=np.where(seen, before, np.nan),
+            residuals=np.where(seen, problem.gathered(problem.residuals(fit.u)), np.nan),
+            noise=np.sqrt(noise.theta),
+            used=used,
+            rank=int(np.sum(s > 1.0)),
+            iterations=self._iterations,
+        )
+
+    def _fit(self, u: np.ndarray, noise: InstrumentNoise, is_rough: bool = False) -> Fit:
+        fit = minimise(self._problem, u, noise, np.ones(len(self._problem)), is_rough=is_rough)
+        self._iterations += fit.iterations
+        return fit
+
+    def _clean_lines(self) -> tuple[np.ndarray, np.ndarray]:
+        """Parameters to begin with, and the lines without gross errors, (m,) bool.
+
+        The least sum of distances, by weights that fall with the residual, is not moved by a few bad lines;
+        then lines are left out that are farther off than the others explain, until nothing changes.
+        """
+        problem = self._problem
+        noise = instrument_noise(problem, self._theta, self._everything)
+        u = self._fit(np.zeros(len(problem.columns)), noise, is_rough=True).u
+        scale = problem.gathered(np.sqrt(noise.shape * np.append(noise.theta[1:], 1.0)[noise.instrument]))
+        is_long = self._everything.sum() > _MANY * len(problem.columns)
+        for _ in range(0 if is_long else _L1_ROUNDS):
+            size = self._sizes(u, scale)
+            weight = np.maximum(size / self._medians(size)[problem.observations.instrument], _NEAREST)
+            softer = replace(noise, shape=noise.shape * problem.spread(np.tile(weight[:, None], (1, 3))))
+            padded = softer.instrument < 0
+            softer = replace(softer, shape=np.where(padded, 1.0, softer.shape))
+            u = minimise(problem, u, softer, np.ones(len(problem)), most=1, is_rough=True).u
+        used = np.ones(len(problem.observations), dtype=bool)
+        count = self._everything.sum(axis=1)
+        for _ in range(_SEARCHES):
+            size = self._sizes(u, scale)
+            typical = self._medians(np.where(used, size, np.nan))[problem.observations.instrument]
+            limit = np.sqrt(chi2.isf(_RISK / len(size), count) / chi2.median(count))
+            now = size <= np.maximum(2.0 * limit * typical, 1e-5 / scale[:, 0])
+            problem.active = self._everything & now[:, None]
+            if np.array_equal(now, used):
+                break
+            used = now
+            u = self._fit(u, instrument_noise(problem, self._theta, problem.active), is_rough=True).u
+        return u, used
+
+    def _sizes(self, u: np.ndarray, scale: np.ndarray) -> np.ndarray:
+        """Lengths of the lines' residuals in units of the noise, (m,)."""
+        active, self._problem.active = self._problem.active, self._everything
+        e = self._problem.gathered(self._problem.residuals(u)) / scale
+        self._problem.active = active
+        return np.sqrt(np.sum(e**2, axis=1))
+
+    def _medians(self, size: np.ndarray) -> np.ndarray:
+        """Of every instrument's lines."""
+        which = self._problem.observations.instrument
+        return np.array([max(np.nanmedian(size[which == i]), 1e-12) for i in range(which.max() + 1)])
+
+    def _solve(self, u: np.ndarray, used: np.ndarray):
+        """Parameters and noise in turns, until both stand still."""
+        problem = self._problem
+        problem.active = self._everything & used[:, None]
+        noise, found, before = instrument_noise(problem, self._theta, problem.active), None, np.inf
+        fit = self._fit(u, noise)
+        for _ in range(_ROUNDS if self._estimated else 0):
+            theta = noise.theta.copy()
+            e = fit.at.residuals[noise.instrument >= 0]
+            rms = float(np.sqrt(np.mean(e**2)))
+            if theta[1:].max() <= 1.01 * FLOOR**2 or (rms < _ROUNDING and rms > 0.5 * before):
+                break
+            before, is_settled = rms, False
+            if rms < _ROUNDING or rms < _NO_NOISE * np.sqrt(theta[self._estimated].max()):
+                theta[self._estimated] = max(_PRIOR_FADES * rms, FLOOR) ** 2
+                theta[JOINT] = 0.0 if JOINT in self._estimated else theta[JOINT]
+            else:
+                if JOINT in self._estimated and theta[JOINT] == 0.0:
+                    theta[JOINT] = 0.01 * theta[1:].max()
+                found = variance_components(fit.at, noise.with_variances(theta), self._estimated)
+                change = np.abs(found.theta - theta)[self._estimated]
+                is_settled = bool(np.all(change < _SETTLED * np.sqrt(np.diag(found.covariance))))
+                theta = found.theta
+            noise = noise.with_variances(theta)
+            fit = self._fit(fit.u, noise)
+            if is_settled:
+                break
+        return fit, noise, found

@@ -1,0 +1,180 @@
+"""The lines of all instruments and the parameters that are to explain them, in one adjustment.
+
+The parameters are those of the error model, then the places of targets on the tool, the frames of
+instruments (a shift and a turn on top of where they stand at first) and the anchors of distances. The lines
+of one configuration belong together, because they share the noise of its joints; where configurations have
+different numbers of lines, what is missing is filled with zeros that weigh nothing.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from robots.calibration.error_model import ZEROS, ErrorModel, exponential
+from robots.calibration.instruments.observations import COORDINATES, MeasuringCell, Observations
+from robots.calibration.prior import OWN_FRAME, parameter_sizes
+from robots.calibration.solver.problem import Linearised
+
+PLACE, ANCHOR = 0.5, 1.0  # m, standard deviations before the measurement
+
+
+@dataclass(frozen=True)
+class Start:
+    """Where targets, frames and anchors are before the adjustment."""
+
+    places: np.ndarray  # (targets, 3) m, on the tool
+    frames: np.ndarray  # (instruments, 4, 4) world of the robot in the frame of the instrument
+    anchors: np.ndarray  # (instruments, 3) m, in the world
+
+
+@dataclass(frozen=True)
+class Setting:
+    """Targets, frames and anchors at some parameters, and how frames turn."""
+
+    places: np.ndarray
+    frames: np.ndarray
+    anchors: np.ndarray
+    turning: np.ndarray  # (instruments, 3, 3) left Jacobians of the frames' turns
+
+
+class InstrumentProblem:
+    """Predicts lines from free parameters u in units of their prior."""
+
+    def __init__(
+        self, model: ErrorModel, observations: Observations, cell: MeasuringCell, start: Start
+    ) -> None:
+        self.model, self.observations, self._start = model, observations, start
+        bars = [observations.is_bar(i) for i in range(len(observations.instruments))]
+        blocks: list[tuple[list[str], np.ndarray, bool]] = [
+            (list(model.names), parameter_sizes(model.names), True)
+        ]
+        for name in observations.targets:
+            names = [f"target_{name}_{axis}" for axis in "xyz"]
+            blocks.append((names, np.full(3, PLACE), name not in cell.places))
+        for name, is_bar in zip(observations.instruments, bars, strict=True):
+            names = [f"frame_{name}_{kind}" for kind in ("x", "y", "z", "rx", "ry", "rz")]
+            blocks.append((names, np.full(6, OWN_FRAME), not is_bar and name not in cell.frames))
+        for name, is_bar in zip(observations.instruments, bars, strict=True):
+            names = [f"anchor_{name}_{axis}" for axis in "xyz"]
+            blocks.append((names, np.full(3, ANCHOR), is_bar and name not in cell.anchors))
+        self.names = tuple(name for names, _, _ in blocks for name in names)
+        self.sizes = np.concatenate([sizes for _, sizes, _ in blocks])
+        free = np.concatenate([np.full(len(sizes), is_free) for _, sizes, is_free in blocks])
+        self.columns = np.flatnonzero(free)
+        self._values = observations.numbers
+        self.active = np.isfinite(self._values)  # (m, 3) what is compared
+        # Lines of a configuration stand beside each other: line m is number slot[m] of row[m].
+        order = np.argsort(observations.row, kind="stable")
+        rows = observations.row[order]
+        first = np.searchsorted(rows, rows)
+        self._slot = np.empty(len(rows), dtype=int)
+        self._slot[order] = np.arange(len(rows)) - first
+        self.most = int(self._slot.max()) + 1
+        self.width = COORDINATES * self.most
+
+    def __len__(self) -> int:
+        """How many configurations there are, n."""
+        return len(self.observations.q)
+
+    def parameters(self, u: np.ndarray) -> np.ndarray:
+        """All parameters in SI units from the free ones in units of the prior."""
+        x = np.zeros(len(self.sizes))
+        x[self.columns] = u * self.sizes[self.columns]
+        return x
+
+    def setting(self, x: np.ndarray) -> Setting:
+        """Targets, frames and anchors at all parameters."""
+        rest = x[len(self.model) :]
+        targets, instruments = len(self._start.places), len(self._start.frames)
+        places, frames, anchors = np.split(rest, [3 * targets, 3 * targets + 6 * instruments])
+        moved, turning = self._start.frames.copy(), np.tile(np.eye(3), (instruments, 1, 1))
+        for i, (d, w) in enumerate(frames.reshape(instruments, 2, 3)):
+            turn, turning[i] = exponential(w)
+            moved[i, :3] = turn @ self._start.frames[i, :3]
+            moved[i, :3, 3] += d
+        places = self._start.places + places.reshape(-1, 3)
+        return Setting(places, moved, self._start.anchors + anchors.reshape(-1, 3), turning)
+
+    def residuals(self, u: np.ndarray) -> np.ndarray:
+        """Measured less predicted numbers, (n, k), zeros where nothing was measured."""
+        x = self.parameters(u)
+        seen = self.observations
+        X = self.model.forward(seen.q, x[: len(self.model)])[seen.row]
+        at = self.setting(x)
+        p = _turned(X[:, :3, :3], at.places[seen.target]) + X[:, :3, 3]
+        return self.spread(self._compared(p, at))
+
+    def linearise(self, u: np.ndarray) -> Linearised:
+        """Residuals with their derivatives, (n, k), (n, k, m) and (n, k, 6)."""
+        x, seen = self.parameters(u), self.observations
+        X, Theta = self.model.forward_and_regressor(seen.q, x[: len(self.model)])
+        at = self.setting(x)
+        lever = _turned(X[seen.row, :3, :3], at.places[seen.target])
+        p = lever + X[seen.row, :3, 3]
+        whole = Theta[seen.row]
+        dp = np.zeros((len(seen), 3, len(self.sizes)))  # of the target in the world
+        model = len(self.model)
+        dp[:, :, :model] = whole[:, 3:] + np.cross(whole[:, :3], lever[:, :, None], axis=1)
+        for target in range(len(at.places)):
+            lines = np.flatnonzero(seen.target == target)
+            begin = model + 3 * target
+            dp[lines, :, begin : begin + 3] = X[seen.row[lines], :3, :3]
+        dy = self._by_instrument(p, dp, at)
+        A = dy[:, :, self.columns] * self.sizes[self.columns]
+        A[~self.active], dy[~self.active] = 0.0, 0.0
+        return Linearised(self.spread(self._compared(p, at)), self.spread(A), self.spread(dy[:, :, ZEROS]))
+
+    def spread(self, values: np.ndarray) -> np.ndarray:
+        """Values of lines, (m, 3, ...), beside each other in their configurations, (n, k, ...)."""
+        padded = np.zeros((len(self), self.most, *values.shape[1:]))
+        padded[self.observations.row, self._slot] = values
+        return padded.reshape(len(self), self.width, *values.shape[2:])
+
+    def gathered(self, values: np.ndarray) -> np.ndarray:
+        """The reverse of `spread`: (n, k) to (m, 3)."""
+        shaped = values.reshape(len(self), self.most, COORDINATES)
+        return shaped[self.observations.row, self._slot]
+
+    def _compared(self, p: np.ndarray, at: Setting) -> np.ndarray:
+        """Measured less predicted, (m, 3)."""
+        seen = self.observations
+        frames = at.frames[seen.instrument]
+        predicted = _turned(frames[:, :3, :3], p) + frames[:, :3, 3]
+        is_distance = np.isfinite(seen.distance)
+        away = p - at.anchors[seen.instrument]
+        predicted[is_distance, 0] = np.linalg.norm(away[is_distance], axis=1)
+        return np.where(self.active, np.nan_to_num(self._values) - predicted, 0.0)
+
+    def _by_instrument(self, p: np.ndarray, dp: np.ndarray, at: Setting) -> np.ndarray:
+        """Derivative of what instruments show, (m, 3, all parameters), from that of targets in the world."""
+        seen = self.observations
+        dy = np.empty_like(dp)
+        frames_begin = len(self.model) + 3 * len(at.places)
+        anchors_begin = frames_begin + 6 * len(at.frames)
+        for i, X in enumerate(at.frames):
+            lines = np.flatnonzero(seen.instrument == i)
+            if seen.is_bar(i):
+                away = p[lines] - at.anchors[i]
+                unit = away / np.linalg.norm(away, axis=1)[:, None]
+                dy[lines] = 0.0
+                dy[lines, 0] = np.einsum("mi,mij->mj", unit, dp[lines])
+                dy[lines, 0, anchors_begin + 3 * i : anchors_begin + 3 * i + 3] = -unit
+                continue
+            dy[lines] = X[:3, :3] @ dp[lines]
+            begin = frames_begin + 6 * i
+            shown = p[lines] @ X[:3, :3].T + X[:3, 3]
+            before = shown - (at.frames[i, :3, 3] - self._turned_origin(i, at))
+            dy[lines, :, begin : begin + 3] = np.eye(3)
+            dy[lines, :, begin + 3 : begin + 6] = np.cross(
+                np.broadcast_to(at.turning[i], (len(lines), 3, 3)), before[:, :, None], axis=1
+            )
+        return dy
+
+    def _turned_origin(self, i: int, at: Setting) -> np.ndarray:
+        """Where the world's origin is in a frame that has been turned and not yet shifted."""
+        turn = at.frames[i, :3, :3] @ self._start.frames[i, :3, :3].T
+        return turn @ self._start.frames[i, :3, 3]
+
+
+def _turned(R: np.ndarray, v: np.ndarray) -> np.ndarray:
+    return np.einsum("mij,mj->mi", R, v)

@@ -1,0 +1,156 @@
+"""Several targets, instruments and distances in one adjustment, against a robot of matrix products."""
+
+import time
+
+import numpy as np
+import pytest
+
+from robots.calibration.error_model import ErrorModel
+from robots.calibration.identification import IdentificationError
+from robots.calibration.instruments.identify import (
+    InstrumentCalibration,
+    _start,
+    identify_with_instruments,
+)
+from robots.calibration.instruments.observation_file import read_cell, read_observations
+from robots.calibration.instruments.observations import MeasuringCell
+from robots.calibration.instruments.problem import InstrumentProblem
+from robots.calibration.measurement_file import MeasurementFileError, read_measurements
+from robots.description.model import load_robot
+from robots.kinematics.forward import Kinematics
+from robots.metrology.point_registration import register_points
+from tests.robots.calibration.matrix_robot import MatrixRobot
+from tests.robots.calibration.seen import ANCHOR, FACTORS, PLACES, observed
+
+NOTHING = MeasuringCell({}, {}, {}, {})
+
+
+def worst_error(found: InstrumentCalibration, true: MatrixRobot) -> float:
+    """Of all targets at fresh configurations in m, wherever the world of the robot is."""
+    q = true.configurations(100, np.random.default_rng(99))
+    X, X_true = Kinematics(found.calibrated_robot("irb1200")).forward(q), true.forward(q)
+    p = [X[:, :3, :3] @ place + X[:, :3, 3] for place in found.setting.places]
+    p_true = [X_true[:, :3, :3] @ place + X_true[:, :3, 3] for place in PLACES.values()]
+    return float(np.abs(register_points(np.vstack(p), np.vstack(p_true)).residual).max())
+
+
+def test_derivatives_are_those_of_differences():
+    _, seen = observed(count=15)
+    model = ErrorModel(load_robot("irb1200"))
+    problem = InstrumentProblem(model, seen, NOTHING, _start(model, seen, NOTHING))
+    u = 0.1 * np.random.default_rng(3).normal(size=len(problem.columns))
+    at = problem.linearise(u)
+    for k in range(len(u)):
+        d = 1e-5 * np.eye(len(u))[k]
+        slope = (problem.residuals(u - d) - problem.residuals(u + d)) / 2e-5
+        np.testing.assert_allclose(at.A[:, :, k], slope, atol=1e-7, err_msg=problem.names[problem.columns[k]])
+
+
+@pytest.mark.parametrize("name", ["irb1200", "ur10"])
+def test_without_noise_robot_targets_and_anchor_are_found_exactly(name: str):
+    """Three unknown targets, missing coordinates, two unknown frames and a ball bar in one go."""
+    true, seen = observed(name)
+    found = identify_with_instruments(load_robot(name), seen)
+    assert worst_error(found, true) < 1e-12  # m
+    assert found.rank == 30 + 9 + 2 * 6 + 3 - 6 - 6  # less the frame of the robot's base and that of the tool
+    assert np.nanmax(np.abs(found.before)) > 2e-3
+    assert np.nanmax(np.abs(found.residuals)) < 1e-12
+    gaps = found.setting.places - np.array(list(PLACES.values()))
+    apart = found.setting.places[1] - found.setting.places[0]
+    assert np.linalg.norm(apart) == pytest.approx(np.linalg.norm(PLACES["b"] - PLACES["a"]), abs=1e-12)
+    assert np.abs(gaps).max() < 0.05  # as far as the tool itself may be displaced
+
+
+def test_the_noise_of_every_instrument_and_of_the_joints_is_found():
+    """Instruments are weighed by it: 0.05 mm, 0.25 mm and 5 um."""
+    _, seen = observed(count=150, noise=5e-5, joint=2e-5, seed=4)
+    found = identify_with_instruments(load_robot("irb1200"), seen)
+    np.testing.assert_allclose(
+        found.noise[1:], [5e-5 * FACTORS[name] for name in seen.instruments], rtol=0.25
+    )
+    assert found.noise[0] == pytest.approx(2e-5, rel=0.25)
+    assert not found.outliers
+
+
+def test_a_ball_bar_beside_a_tracker_makes_the_robot_more_accurate():
+    """Ten times as good as the tracker, at half of the configurations; in the mean of six robots."""
+    robot, errors = load_robot("irb1200"), []
+    for seed in range(6):
+        for instruments in (("tracker",), ("tracker", "bar")):
+            true, seen = observed(count=30, noise=5e-5, seed=seed, instruments=instruments)
+            sigmas = {name: 5e-5 * FACTORS[name] for name in instruments}
+            found = identify_with_instruments(robot, seen, MeasuringCell({}, {}, {}, sigmas, 0.0))
+            errors.append(worst_error(found, true))
+    alone, both = np.array(errors).reshape(-1, 2).mean(axis=0)
+    assert both < 0.9 * alone
+
+
+@pytest.mark.parametrize("count", [40, 400])
+def test_lines_with_gross_errors_are_named_and_the_rest_of_their_configuration_is_used(count: int):
+    true, seen = observed(count=count, noise=3e-5, seed=2)
+    bad = np.array([10, 41, 77])
+    position = seen.position.copy()
+    position[bad] += 0.02
+    damaged = type(seen)(**{**seen.__dict__, "position": position})
+    found = identify_with_instruments(load_robot("irb1200"), damaged)
+    is_bar = np.isfinite(seen.distance[bad])
+    assert found.outliers == tuple(seen.lines[bad[~is_bar]])
+    assert worst_error(found, true) < 5e-4
+
+
+@pytest.mark.slow
+def test_a_thousand_positions_of_three_targets_take_less_than_two_seconds():
+    _, seen = observed(count=1000, noise=5e-5, instruments=("tracker",))
+    robot = load_robot("irb1200")
+    started = time.process_time()
+    found = identify_with_instruments(robot, seen)
+    assert time.process_time() - started < 2.0
+    assert found.noise[1] == pytest.approx(5e-5, rel=0.05)
+
+
+def test_an_instrument_that_nothing_places_is_refused():
+    _, seen = observed(count=3, instruments=("tracker",))
+    position = np.where(np.arange(3) == 0, np.nan, seen.position)
+    with pytest.raises(IdentificationError, match="tracker: nothing says where it stands"):
+        identify_with_instruments(
+            load_robot("irb1200"), type(seen)(**{**seen.__dict__, "position": position})
+        )
+
+
+HEAD = "q1_deg;q2_deg;q3_deg;q4_deg;q5_deg;q6_deg;target;instrument;x_mm;y_mm;z_mm;distance_mm\n"
+
+
+def test_decimal_commas_empty_fields_and_configurations_are_read(tmp_path):
+    (tmp_path / "m.csv").write_text(
+        HEAD + "1,5;2;3;4;5;6;a;tracker;100,25;;300;\n1,5;2;3;4;5;6;b;tracker;1;2;3;\n"
+        "9;2;3;4;5;6;a;bar;;;;500,125\n1;2;3;4;5;six;a;bar;;;;5\n1;2;3;4;5;6;a;bar;1;;;5\n"
+    )
+    seen, problems = read_observations(tmp_path / "m.csv")
+    assert (len(seen.q), seen.row.tolist(), seen.targets) == (2, [0, 0, 1], ("a", "b"))
+    assert np.rad2deg(seen.q[0, 0]) == pytest.approx(1.5)
+    np.testing.assert_allclose(seen.position[0], [0.10025, np.nan, 0.3])
+    assert seen.distance[2] == pytest.approx(0.500125)
+    assert [(each.row, each.what[:14]) for each in problems] == [(5, "q6_deg is not "), (6, "needs coordina")]
+
+
+def test_decimal_commas_are_read_in_tables_of_poses_too(tmp_path):
+    head = ";".join([*(f"q{k}_deg" for k in range(1, 7)), "x_mm", "y_mm", "z_mm"])
+    (tmp_path / "m.csv").write_text(head + "\n1,5;2;3;4;5;6;100,25;2;3\n")
+    table, problems = read_measurements(tmp_path / "m.csv")
+    assert not problems
+    np.testing.assert_allclose(table.position[0], [0.10025, 0.002, 0.003])
+
+
+def test_a_cell_says_what_is_known(tmp_path):
+    (tmp_path / "cell.yaml").write_text(
+        "targets: {a: [0, 0, 100]}\nframes: {tracker: [1000, 0, 0, 90, 0, 0]}\n"
+        f"anchors: {{bar: {(1e3 * ANCHOR).tolist()}}}\nsigma_mm: {{tracker: 0.05}}\njoint_sigma_deg: 0.001\n"
+    )
+    cell = read_cell(tmp_path / "cell.yaml")
+    np.testing.assert_allclose(cell.places["a"], [0, 0, 0.1])
+    np.testing.assert_allclose(cell.frames["tracker"][:3, :3] @ [1, 0, 0], [0, 1, 0], atol=1e-15)
+    np.testing.assert_allclose(cell.anchors["bar"], ANCHOR)
+    assert cell.sigmas == {"tracker": pytest.approx(5e-5)}
+    (tmp_path / "bad.yaml").write_text("targets: {a: [0, 0]}")
+    with pytest.raises(MeasurementFileError, match=r"targets\.a must be 3 numbers"):
+        read_cell(tmp_path / "bad.yaml")
