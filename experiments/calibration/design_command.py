@@ -10,6 +10,7 @@ from typing import Annotated
 import typer
 from rich.markup import escape
 
+from experiments.calibration.design_program import ProgramFiles
 from experiments.cli.console import print_files, progress_bar, refusing
 from experiments.cli.json_output import human_console, json_output
 from experiments.cli.options import JsonOption, PictureOption
@@ -52,13 +53,29 @@ def design_command(
     out: Annotated[
         str | None, typer.Option(metavar="FILE.csv", help="The configurations, in the order of the visits.")
     ] = None,
+    program: Annotated[
+        str | None,
+        typer.Option(
+            metavar="rapid|krl",
+            help="Also write the run as a robot program, with moves, settling and trigger, and the table "
+            "that it will fill; beside --out.",
+        ),
+    ] = None,
+    settle: Annotated[
+        float | None, typer.Option(metavar="S", help="Seconds before the trigger.", show_default="0.5")
+    ] = None,
+    trigger: Annotated[
+        str, typer.Option(metavar="NAME|N", help="Digital output.", show_default="doTrigger, or 1 in KRL")
+    ] = "",
     report: PictureOption = Path("out/design.html"),
     json_file: JsonOption = None,
 ) -> None:
     """Choose the measurement configurations that determine the robot's errors best."""
     human = human_console(json_file)
     with json_output(json_file) as output, refusing(ValueError, OSError), ExitStack() as stack:
+        run = ProgramFiles(program, out, settle, trigger)
         page = stack.enter_context(staged_file(report, *PAGE))
+        run_stage = run.staged(stack)
         table = stack.enter_context(staged_file(out, *TABLE)) if out else None
         stack.enter_context(output.staged())
         model = load_robot(robot)
@@ -81,11 +98,12 @@ def design_command(
         }
         if table:
             write_text(table, configuration_text(design))
+        written = run.write(run_stage, design.configurations, position_only)
         output.write(result)
         write_design_page(page, model, design)
     human.print(escape(design_verdict(design)))
     human.print(f"{seconds:.1f} s, {result['peak_mb']:.0f} MB beside the program itself")
-    print_files(human, report, out)
+    print_files(human, report, out, *written)
 
 
 def _place(text: str) -> tuple[float, float, float]:

@@ -1,0 +1,61 @@
+"""``truetip design --program``: the measurement run as a robot program, and the table that it will fill."""
+
+import re
+from contextlib import ExitStack
+from pathlib import Path
+
+import numpy as np
+
+from experiments.cli.staging import staged_folder
+from experiments.report.files import write_text
+from robots.programs.measurement_run import RUNS, MeasurementRun, table_to_fill
+
+_DEFAULT = Path("out/measure.csv")
+_LONGEST = 16  # characters of a name: KRL allows 24, and we append some
+
+
+class ProgramFiles:
+    """Files of a measurement run, written all at once; none where no program is wanted."""
+
+    def __init__(self, language: str | None, beside: str | None, settle: float | None, trigger: str) -> None:
+        """Checks the options.
+
+        Args:
+            language: one of `RUNS`, or None.
+            beside: table of the configurations, whose name the files have; None for ``out/measure``.
+            settle: s; None for half a second.
+            trigger: digital output; empty for the default.
+
+        Raises:
+            ValueError: if an option is unknown, or has no effect.
+        """
+        if language is None and (settle is not None or trigger):
+            raise ValueError("--settle and --trigger need --program")
+        if language is not None and language not in RUNS:
+            raise ValueError(f"--program must be one of {', '.join(RUNS)}, got '{language}'")
+        self._language, self._settle, self._trigger = language, 0.5 if settle is None else settle, trigger
+        path = Path(beside or _DEFAULT)
+        self._folder, self._stem = path.parent, path.stem
+        self._name = re.sub(r"\W", "_", path.stem)[:_LONGEST]
+        if not self._name[:1].isalpha():  # no language lets a name begin otherwise
+            self._name = f"m_{self._name}"
+        if language is not None:
+            self._files(MeasurementRun(np.zeros((1, 6)), self._settle, trigger, self._name), False)
+
+    def staged(self, stack: ExitStack) -> Path | None:
+        """The folder to write to. Raises OSError."""
+        return None if self._language is None else stack.enter_context(staged_folder(self._folder))
+
+    def write(self, stage: Path | None, q: np.ndarray, position_only: bool) -> list[Path]:
+        """Writes program and table for configurations (n, 6) in rad; gives where they will be."""
+        if stage is None:
+            return []
+        files = self._files(MeasurementRun(q, self._settle, self._trigger, self._name), position_only)
+        for name, text in files.items():
+            write_text(stage / name, text)
+        return [self._folder / name for name in files]
+
+    def _files(self, run: MeasurementRun, position_only: bool) -> dict[str, str]:
+        assert self._language is not None
+        table = {f"{self._stem}_measured.csv": table_to_fill(run, position_only)}
+        return RUNS[self._language](run) | table

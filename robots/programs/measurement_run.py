@@ -1,0 +1,121 @@
+"""Programs that drive a robot through measurement configurations: move, settle, trigger.
+
+Probst (2024), section 6.4.2: at each configuration the vibrations are given 0.5 s to die out before the pose
+and the joint positions are taken. The joints are read where the robot stands, because encoders do not stop
+exactly where they were sent.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+_EXTERNAL = "[9E9,9E9,9E9,9E9,9E9,9E9]"
+_PULSE = 0.1  # s, of the trigger
+_EXPOSURE = 0.3  # s, for which the robot stands still after it
+_COORDINATES = ("x_mm", "y_mm", "z_mm", "alpha_deg", "beta_deg", "gamma_deg")
+
+
+@dataclass(frozen=True)
+class MeasurementRun:
+    """What a program does at each configuration."""
+
+    q: np.ndarray  # (n, 6) rad, in the order of the visits
+    settle: float = 0.5  # s before the trigger
+    trigger: str = ""  # digital output: a name in RAPID, a number in KRL; empty for the default
+    name: str = "measure"  # of the module and of the files that it writes
+
+    def __post_init__(self) -> None:
+        """Checks the numbers. Raises ValueError."""
+        if self.q.ndim != 2 or self.q.shape[1:] != (6,) or not np.isfinite(self.q).all():
+            raise ValueError(f"a measurement run takes joint positions (n, 6), got {self.q.shape}")
+        if not 0.0 <= self.settle <= 60.0:
+            raise ValueError(f"the settling time must be between 0 and 60 s, got {self.settle:g} s")
+
+
+def rapid_run(run: MeasurementRun) -> dict[str, str]:
+    """A RAPID module by the name of its file; on the controller it writes a table of joint positions."""
+    output = run.trigger or "doTrigger"
+    if not output.isidentifier():
+        raise ValueError(f"the trigger must be the name of a digital output in RAPID, got '{run.trigger}'")
+    head = "".join(f"q{joint}_deg;" for joint in range(1, 7))
+    lines = [
+        f"MODULE {run.name}",
+        f"    ! Measurement run, {len(run.q)} configurations: move, settle, pulse {output}, note the joints.",
+        f"    ! The joint positions stand in HOME:{run.name}_joints.csv afterwards.",
+        f"    CONST num settle := {run.settle:g}; ! s",
+        "    VAR iodev table;",
+        "    VAR jointtarget here;",
+    ]
+    for number, q in enumerate(np.rad2deg(run.q), 1):
+        lines.append(f"    CONST jointtarget m{number} := [[{_numbers(q)}],{_EXTERNAL}];")
+    lines += [
+        f"    PROC {run.name}_run()",
+        f'        Open "HOME:"\\File:="{run.name}_joints.csv", table\\Write;',
+        f'        Write table, "{head}";',
+    ]
+    for number in range(1, len(run.q) + 1):
+        lines += [f"        MoveAbsJ m{number}, v200, fine, tool0;", "        take;"]
+    lines += [
+        "        Close table;",
+        "    ENDPROC",
+        "    PROC take()",
+        "        WaitTime\\InPos, settle;",
+        f"        PulseDO\\PLength:={_PULSE:g}, {output};",
+        "        here := CJointT();",
+    ]
+    for joint in range(1, 7):
+        end = "" if joint == 6 else "\\NoNewLine"
+        lines.append(f'        Write table, NumToStr(here.robax.rax_{joint},5) + ";"{end};')
+    lines += [f"        WaitTime {_EXPOSURE:g};", "    ENDPROC", "ENDMODULE", ""]
+    return {f"{run.name}.mod": "\n".join(lines)}
+
+
+def krl_run(run: MeasurementRun) -> dict[str, str]:
+    """A KRL source and its data list by the names of their files; the data list keeps the joint positions."""
+    output = run.trigger or "1"
+    if not output.isdigit():
+        raise ValueError(f"the trigger must be the number of a digital output in KRL, got '{run.trigger}'")
+    count = len(run.q)
+    source = [
+        f"DEF {run.name}()",
+        f"; Measurement run of {count} configurations: move, settle, pulse output {output}, note the joints.",
+        f"; The joint positions stand in Q[] of {run.name}.dat afterwards.",
+        "DECL INT i",
+        "BAS(#INITMOV,0)",
+        "BAS(#VEL_PTP,20)",
+        f"FOR i=1 TO {count}",
+        "  PTP M[i]",
+        f"  WAIT SEC {run.settle:g}",
+        f"  PULSE($OUT[{output}],TRUE,{_PULSE:g})",
+        "  Q[i]=$AXIS_ACT",
+        f"  WAIT SEC {_EXPOSURE:g}",
+        "ENDFOR",
+        "END",
+        "",
+    ]
+    data = [f"DEFDAT {run.name}", f"DECL E6AXIS Q[{count}]", f"DECL E6AXIS M[{count}]"]
+    for number, q in enumerate(np.rad2deg(run.q), 1):
+        axes = ",".join(f"A{joint} {_number(value)}" for joint, value in enumerate(q, 1))
+        data.append(f"M[{number}]={{{axes},E1 0.0,E2 0.0,E3 0.0,E4 0.0,E5 0.0,E6 0.0}}")
+    return {f"{run.name}.src": "\n".join(source), f"{run.name}.dat": "\n".join([*data, "ENDDAT", ""])}
+
+
+def table_to_fill(run: MeasurementRun, position_only: bool = False) -> str:
+    """The table of the run, as `truetip calibrate` reads it: joints as commanded, poses still empty."""
+    coordinates = _COORDINATES[:3] if position_only else _COORDINATES
+    head = [*(f"q{joint}_deg" for joint in range(1, 7)), *coordinates]
+    rows = [[*(_number(value) for value in q), *[""] * len(coordinates)] for q in np.rad2deg(run.q)]
+    comment = "# Put in what the controller noted of the joints, and where the instrument saw the tool."
+    return "\n".join([comment, *(",".join(row) for row in [head, *rows])]) + "\n"
+
+
+RUNS = {"rapid": rapid_run, "krl": krl_run}
+
+
+def _numbers(values: np.ndarray) -> str:
+    return ",".join(_number(value) for value in values)
+
+
+def _number(value: float) -> str:
+    text = f"{value:.5f}".rstrip("0").rstrip(".")
+    return "0" if text == "-0" else text

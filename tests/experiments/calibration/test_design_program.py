@@ -1,0 +1,31 @@
+"""``truetip design --program``: files beside the table, all at once, and what is refused."""
+
+from pathlib import Path
+
+import pytest
+
+from tests.experiments.commands import files, refusal, truetip
+
+
+@pytest.mark.parametrize(("language", "written"), [("rapid", {"run.mod"}), ("krl", {"run.src", "run.dat"})])
+def test_the_run_stands_beside_the_configurations(language: str, written: set, tmp_path: Path):
+    arguments = ["--count", 12, "--out", tmp_path / "run.csv", "--report", tmp_path / "page.html"]
+    result = truetip("design", *arguments, "--program", language)
+    assert result.exit_code == 0, result.output
+    assert files(tmp_path) == written | {"run.csv", "page.html", "run_measured.csv"}
+    assert all((tmp_path / name).name in result.stdout.replace("\n", "") for name in written)
+    assert len((tmp_path / "run_measured.csv").read_text().splitlines()) == 2 + 12
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        (["--program", "fanuc"], "--program must be one of rapid, krl, got 'fanuc'"),
+        (["--settle", "1"], "--settle and --trigger need --program"),
+        (["--program", "krl", "--trigger", "doX"], "must be the number of a digital output in KRL"),
+    ],
+)
+def test_refusals_come_before_the_search(options: list, message: str, tmp_path: Path):
+    arguments = ["--out", tmp_path / "run.csv", "--report", tmp_path / "page.html"]
+    assert message in refusal(truetip("design", *arguments, *options))
+    assert files(tmp_path) == set()
