@@ -16,10 +16,11 @@ from robots.description.model import RobotModel
 from systems.cell.network_faults import FaultyLink
 from systems.link.clock import steady_time
 from systems.link.protocols import VirtualPoseSource
-from systems.link.udp_channel import Address, Buffering, UdpChannel
+from systems.link.udp_channel import Address, Buffering, UdpChannel, is_loopback
 
 _LATE = 1e-3  # s after which a message counts as late
 _LOST_TRACK = 0.25  # s behind after which the schedule is moved instead of being caught up with
+_FORGOTTEN = 2.0  # s of silence after which another client may command
 _SPIN = 1.5e-4  # s before an instant in which the loop does not sleep: a system wakes late by that much
 
 
@@ -34,6 +35,7 @@ class CellStatistics:
     crowded_at: list[float] = field(default_factory=list)
     schedule_moves: int = 0  # times at which the machine was gone for so long that the schedule moved
     commands: int = 0  # datagrams that came in
+    strangers: int = 0  # datagrams of others than the one client that is obeyed
     camera_frames: int = 0
     controller: dict[str, int] = field(default_factory=dict)
     faults: dict[str, dict[str, int]] = field(default_factory=dict)
@@ -55,6 +57,8 @@ class CellLoop:
         signal_target: Address | None = None,
         address: str = "127.0.0.1",
         with_log: bool = True,
+        peer: str = "",
+        tell: Callable[[str], None] = lambda text: None,
     ) -> None:
         """Builds the cell and opens its sockets.
 
@@ -66,10 +70,17 @@ class CellLoop:
             signal_target: where test signals go; None for none.
             address: of the interface that commands are heard on.
             with_log: whether the truth will be asked for.
+            peer: address of the only machine that is obeyed; empty for the first that sends a command.
+            tell: is called with who is obeyed, in words.
 
         Raises:
             ValueError: if a part refuses its configuration or the address cannot be used.
         """
+        if is_loopback(target[0]) != is_loopback(address):
+            raise ValueError(
+                f"the cell would send its messages to {target[0]} and hear commands on {address}: "
+                "one of them is on this machine alone"
+            )
         config = scenario.station
         self._faults = config.faults
         self.cell = VirtualCell(scenario, robot, with_log)
@@ -88,9 +99,12 @@ class CellLoop:
         self._target, self._signal_target, self._camera = target, signal_target, camera
         self._channel = UdpChannel(0, address, Buffering.NEWEST)
         self._stranger = UdpChannel(0, address)
+        self._peer, self._tell = peer, tell
+        self._obeyed: Address | None = None
+        self._obeyed_at = 0.0  # s of the cell's time, when the last command of it came
         self._order = itertools.count()
         self._outbox: list[tuple[float, int, Callable[[], None]]] = []
-        self._inbox: list[tuple[float, int, bytes]] = []
+        self._inbox: list[tuple[float, int, bytes, Address]] = []
         self._is_stopped = False
         self._frame = 0
 
@@ -154,14 +168,26 @@ class CellLoop:
             send()
 
     def _hear(self, now: float) -> None:
-        for data, _ in self._channel.receive():
+        for data, sender in self._channel.receive():
             self.statistics.commands += 1
+            if not self._may_command(sender, now):
+                self.statistics.strangers += 1
+                continue
             for delivery in self._links["from client"].pass_on(now, data):
                 if not delivery.is_foreign:
-                    heapq.heappush(self._inbox, (delivery.time, next(self._order), delivery.data))
+                    heapq.heappush(self._inbox, (delivery.time, next(self._order), delivery.data, sender))
         while self._inbox and self._inbox[0][0] <= now:
-            data = heapq.heappop(self._inbox)[2]
-            self.controller.receive(data, self.cell.stamp, self.cell.planned)
+            _, _, data, sender = heapq.heappop(self._inbox)
+            if self.controller.receive(data, self.cell.stamp, self.cell.planned):
+                if self._obeyed != sender:
+                    self._tell(f"obeys {sender[0]}:{sender[1]}")
+                self._obeyed, self._obeyed_at = sender, now
+
+    def _may_command(self, sender: Address, now: float) -> bool:
+        """Whether it is the one client that is obeyed, or may become it: after a silence another one may."""
+        if self._peer and sender[0] != self._peer:
+            return False
+        return self._obeyed in (None, sender) or now - self._obeyed_at > _FORGOTTEN
 
     def _post(self, due: float, send: Callable[[], Any]) -> None:
         heapq.heappush(self._outbox, (due, next(self._order), send))

@@ -41,6 +41,17 @@ def cell_command(
         typer.Option(metavar="FILE.npz", help="Record of the true motion, by the controller's time stamps."),
     ] = None,
     json_file: Annotated[str | None, json_option("How it ran, at the end.")] = None,
+    peer: Annotated[
+        str,
+        typer.Option(
+            metavar="ADDRESS",
+            help="Obey this machine alone.",
+            show_default="the first that sends a command",
+        ),
+    ] = "",
+    address: Annotated[
+        str, typer.Option(metavar="ADDRESS", help="Of this machine, to hear commands on.")
+    ] = "127.0.0.1",
     announce: Annotated[
         bool, typer.Option("--announce", help="Print the ports as one line of JSON first, for scripts.")
     ] = False,
@@ -67,7 +78,10 @@ def cell_command(
             (link.address, link.port),
             camera,
             (link.address, link.signal_port) if link.signal_port else None,
+            address=address,
             with_log=truth is not None,
+            peer=peer,
+            tell=human.print,
         )
         stack.callback(loop.close)
         stop = _Stop(duration, until_eof)
@@ -109,7 +123,8 @@ def print_statistics(console: Console, statistics: CellStatistics) -> None:
     lateness = 1e3 * statistics.worst_lateness
     console.print(
         f"{count(statistics.cycles, 'cycle')}, {statistics.late} of them more than 1 ms late (worst "
-        f"{lateness:.1f} ms); {count(statistics.commands, 'datagram')} came in, "
+        f"{lateness:.1f} ms); {count(statistics.commands, 'datagram')} came in"
+        f"{f' ({statistics.strangers} of strangers)' if statistics.strangers else ''}, "
         f"{count(statistics.camera_frames, 'camera frame')} went out"
     )
     for link, counts in statistics.faults.items():

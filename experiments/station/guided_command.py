@@ -1,6 +1,5 @@
 """What ``truetip compare`` and ``truetip run`` do on a real station."""
 
-import ipaddress
 import sys
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -13,7 +12,7 @@ from rich.console import Console
 
 from diagrams.record.log import RunLog
 from diagrams.runs.real_time import RealTimeRecord
-from experiments.cli.console import BROKEN_OFF, count, progress_bar
+from experiments.cli.console import BROKEN_OFF, count, progress_bar, refusing
 from experiments.cli.ending import asking
 from experiments.cli.prepare import Prepared
 from experiments.cli.staging import keep_files
@@ -21,6 +20,7 @@ from experiments.cli.workers import SimulationError
 from experiments.report.files import write_json
 from experiments.report.style import law_file_name
 from experiments.station.guided import compare_on_station
+from systems.link.udp_channel import ChannelError, is_loopback
 
 
 def on_station(
@@ -46,11 +46,7 @@ def ask_before_moving(console: Console, prepared: Prepared, is_agreed: bool) -> 
         ValueError: if nobody can be asked.
     """
     address = prepared.scenario.station.link.address
-    try:
-        is_here = ipaddress.ip_address(address).is_loopback
-    except ValueError:
-        is_here = address == "localhost"
-    if is_here or is_agreed:
+    if is_loopback(address) or is_agreed:
         return
     if not sys.stdin.isatty():
         raise ValueError("a real robot would move: say --yes if it may")
@@ -101,7 +97,8 @@ def guide(
     """
     stage, out = folders
     where = "a virtual cell" if with_cell else f"UDP port {prepared.scenario.station.link.port}"
-    with asking() as end, progress_bar(f"{count(cycles * len(laws), 'run')} on {where}") as progress:
+    label = f"{count(cycles * len(laws), 'run')} on {where}"
+    with refusing(ChannelError), asking() as end, progress_bar(label) as progress:
         comparison = compare_on_station(
             prepared.scenario, prepared.robot, laws, cycles, with_cell, progress, end.is_asked
         )

@@ -160,8 +160,12 @@ class VirtualController(Protocol):
         """Reference (6,) in rad and speed (6,) in rad/s; NaN for what is not given, both to stand still."""
         ...
 
-    def receive(self, data: bytes, time: float, position: np.ndarray) -> None:
-        """Takes a datagram of a client; ``position`` is the planned one of the joints, (6,) in rad."""
+    def receive(self, data: bytes, time: float, position: np.ndarray) -> bool:
+        """Takes a datagram of a client; ``position`` is the planned one of the joints, (6,) in rad.
+
+        Returns:
+            Whether it is followed.
+        """
         ...
 
     def cycle(self, time: float, planned: np.ndarray) -> None:

@@ -1,5 +1,6 @@
 """UDP sockets: bound to one address, never blocking, read to the end."""
 
+import ipaddress
 import select
 import socket
 from enum import Enum
@@ -9,6 +10,14 @@ Address = tuple[str, int]
 _LARGEST_DATAGRAM = 65536
 _LARGEST_BATCH = 5000  # datagrams at once: whoever floods the port does not stop the loop
 _BUFFER = 1 << 20  # bytes; the kernel keeps the oldest datagrams when it is full
+
+
+def is_loopback(address: str) -> bool:
+    """Whether an address reaches this machine alone."""
+    try:
+        return ipaddress.ip_address(address).is_loopback
+    except ValueError:
+        return address == "localhost"
 
 
 class Buffering(Enum):
@@ -45,7 +54,8 @@ class UdpChannel:
             self._socket.bind((address, port))
         except (OSError, OverflowError) as error:
             self._socket.close()
-            raise ChannelError(f"cannot listen on UDP {address}:{port}: {error}") from error
+            why = getattr(error, "strerror", None) or str(error)
+            raise ChannelError(f"cannot listen on UDP {address}:{port}: {why.lower()}") from error
         self._socket.setblocking(False)
         self._buffering, self._is_cleared = buffering, False
 

@@ -26,6 +26,7 @@ from systems.link.abb.schema import (
 from systems.link.abb.signals import ControllerSignals, SignalCodec, SignalLayout
 
 _WRAP = 2**32
+_BEYOND = math.radians(5.0)  # beyond the range of a joint, from which a reference is ignored
 _STANDING = np.full(NUM_JOINTS, math.nan)
 
 
@@ -65,6 +66,7 @@ class VirtualController:
         self.restarts = self.undecodable = self.late = self.ignored = 0
         self._config = config
         self._codec = SignalCodec(signals or SignalLayout())
+        self._lower, self._upper = robot.lower - _BEYOND, robot.upper + _BEYOND
         self._kinematics, self._inverse = Kinematics(robot), inverse_kinematics(robot)
         self._seqno = 0
         self._began: float | None = None
@@ -90,35 +92,42 @@ class VirtualController:
         self.state = RunState.ENDED if for_good else RunState.PAUSED
         self._reference = self._speed = _STANDING
 
-    def receive(self, data: bytes, time: float, position: np.ndarray) -> None:
+    def receive(self, data: bytes, time: float, position: np.ndarray) -> bool:
         """Takes a datagram of a client; what it cannot follow is counted and ignored.
 
         Args:
             data: the datagram.
             time: now.
             position: planned joint positions (6,) in rad, near which a pose is solved.
+
+        Returns:
+            Whether it is followed.
         """
         try:
             seqno, command = decode_command(data)
         except EgmError:
             self.undecodable += 1
-            return
+            return False
         if not self.is_running:
             self.ignored += 1
-            return
+            return False
         if self._last_command is not None:
             ahead = (seqno - self._last_command + _WRAP // 2) % _WRAP - _WRAP // 2
             # A client that starts anew counts from the beginning.
             if -100 < ahead <= 0:
                 self.late += 1
-                return
+                return False
         try:
             reference, speed = self._in_joints(command, position)
         except (UnreachableError, JointLimitError):
             self.ignored += 1
-            return
+            return False
+        if (reference < self._lower).any() or (reference > self._upper).any():
+            self.ignored += 1
+            return False
         self._last_command, self._heard, self._commanded = seqno, time, True
         self._reference, self._speed = reference, speed
+        return True
 
     def cycle(self, time: float, planned: np.ndarray) -> None:
         """Moves the program on by one cycle.

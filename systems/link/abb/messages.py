@@ -23,6 +23,7 @@ from systems.link.abb.schema import (
 )
 
 _LARGEST_ANGLE = 3600.0  # deg; no joint is ten turns from its zero
+_LARGEST = 1e6  # deg, mm and per s: no robot is so large or so fast, and squares of it are numbers
 _LARGEST_COUNT = 2**32
 
 
@@ -314,8 +315,9 @@ def _pose(wire: Any) -> Pose:
 
 
 def _checked(name: str, value: np.ndarray | None, sizes: tuple[int, ...]) -> np.ndarray:
-    # A sum is finite only if all its terms are.
-    if value is None or len(value) not in sizes or not math.isfinite(sum(value.tolist())):
+    # A NaN is in no range.
+    if value is None or len(value) not in sizes or not all(abs(each) <= _LARGEST for each in value.tolist()):
         allowed = " or ".join(str(size) for size in sizes)
-        raise EgmError(f"EGM {name}: {allowed} finite numbers are needed, got {value}")
+        got = value if value is None or len(value) <= max(sizes) else f"{len(value)} of them"
+        raise EgmError(f"EGM {name}: {allowed} finite numbers of at most {_LARGEST:g} are needed, got {got}")
     return value

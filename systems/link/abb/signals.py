@@ -113,7 +113,8 @@ class SignalCodec:
         if self._layout.number != "text":
             if len(data) % self._dtype.itemsize:
                 raise SignalError(f"test signals: {len(data)} bytes are no whole numbers")
-            return np.frombuffer(data, self._dtype).astype(float)
+            with np.errstate(invalid="ignore"):  # a signalling NaN is a NaN
+                return np.frombuffer(data, self._dtype).astype(float)
         try:
             return np.array([float(part) for part in data.decode("ascii").split(self._layout.separator)])
         except ValueError as error:

@@ -30,6 +30,8 @@ from systems.link.qualisys.parameters import ParameterError
 from systems.link.qualisys.stream_request import StreamRequest
 
 _CHUNK = 1 << 16  # bytes read at once
+_MOST_PACKETS = 200  # taken in one poll, lest a flood of tiny ones holds the loop
+_MOST_TEXT = 200  # characters of what a server says, for messages
 _MOST_CHUNKS = 64  # read in one poll, lest a flood holds the loop
 
 
@@ -179,7 +181,13 @@ class MocapClient:
 
     def _read_tcp(self, arrivals: list[Arrival]) -> None:
         assert self._tcp is not None
+        left = _MOST_PACKETS
         for _ in range(_MOST_CHUNKS):
+            for kind, payload in self._stream.complete():
+                self._handle(kind, payload, arrivals)
+                left -= 1
+                if left == 0:
+                    return  # the rest waits where it is, and what comes in the socket
             try:
                 data = self._tcp.recv(_CHUNK)
             except BlockingIOError:
@@ -187,8 +195,7 @@ class MocapClient:
             if not data:
                 raise MocapError("the server has closed the connection")
             self._heard, self._probed = time.monotonic(), None
-            for kind, payload in self._stream.feed(data):
-                self._handle(kind, payload, arrivals)
+            self._stream.put(data)
 
     def _handle(self, kind: PacketType, payload: bytes, arrivals: list[Arrival]) -> None:
         assert self._talk is not None
@@ -226,7 +233,7 @@ class MocapClient:
             raise MocapError(f"silent for {now - self._heard:.1f} s")
 
     def _disconnect(self, now: float, reason: str) -> None:
-        self.last_error = reason
+        self.last_error = reason[:_MOST_TEXT]
         self.counters.disconnections += self.state is State.STREAMING
         self._not_before = now + self._config.retry
         self._drop()

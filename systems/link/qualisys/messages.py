@@ -23,6 +23,7 @@ LARGEST_PACKET = 1 << 20  # bytes; the parameters of a hundred bodies need 100 k
 _HEADER = struct.Struct("<II")  # size and type, of a packet and of a component alike
 _DATA_HEADER = struct.Struct("<QII")  # stamp in us, frame number, number of components
 _BODIES_HEADER = struct.Struct("<IHH")  # number of bodies, drop rate, out-of-sync rate
+_MOST_COMPONENTS = 64  # of a data packet; the protocol knows about twenty
 _LOST_BITS = 0xFFFFFFFF  # the NaN that the protocol writes
 _ORTHONORMAL_WITHIN = 1e-4  # a rotation in single precision is exact to about 2e-7
 
@@ -167,7 +168,15 @@ class PacketStream:
             PacketError: if the bytes cannot be a packet. The place of the next one is then unknown, so the
                 connection is of no more use.
         """
+        self.put(data)
+        yield from self.complete()
+
+    def put(self, data: bytes) -> None:
+        """Adds received bytes, for `complete`."""
         self._pending += data
+
+    def complete(self) -> Iterator[tuple[PacketType, bytes]]:
+        """The packets that are complete and have not been taken yet; as `feed`."""
         while len(self._pending) >= _HEADER.size:
             size, kind = _HEADER.unpack_from(self._pending)
             if not _HEADER.size <= size <= LARGEST_PACKET:
@@ -189,6 +198,8 @@ def decode_data(payload: bytes) -> Frame:
     if len(payload) < _DATA_HEADER.size:
         raise PacketError(f"data packet: {len(payload)} bytes, its header has {_DATA_HEADER.size}")
     time_us, number, count = _DATA_HEADER.unpack_from(payload)
+    if count > _MOST_COMPONENTS:
+        raise PacketError(f"data packet: {count} components, at most {_MOST_COMPONENTS} are read")
     offset, found = _DATA_HEADER.size, {}
     for _ in range(count):
         if len(payload) < offset + _HEADER.size:

@@ -5,6 +5,8 @@ from dataclasses import dataclass
 from xml.etree import ElementTree
 from xml.sax.saxutils import escape
 
+_LARGEST = 1 << 17  # characters; a hundred bodies need 100,000
+
 
 class ParameterError(ValueError):
     """The parameters of a camera server are not XML, or lack a required element."""
@@ -24,9 +26,14 @@ def parse_bodies(xml: str) -> list[Body]:
     Raises:
         ParameterError: if the text is no XML or has no block The_6D.
     """
+    if len(xml) > _LARGEST:
+        raise ParameterError(f"6D parameters: {len(xml)} characters, at most {_LARGEST} are read")
+    # Nothing is declared in the documents of a camera: what is could grow without end.
+    if "<!" in xml:
+        raise ParameterError("6D parameters: declarations are not read")
     try:
         root = ElementTree.fromstring(xml)
-    except ElementTree.ParseError as error:
+    except (ElementTree.ParseError, ValueError) as error:
         raise ParameterError(f"6D parameters: no XML ({error})") from error
     block = root.find("The_6D")
     if block is None:

@@ -20,7 +20,7 @@ from systems.link.qualisys.messages import PORT, Component, PacketType, encode_d
 from systems.link.qualisys.session import CameraState, Session
 
 _MOST_CLIENTS = 10
-_CHUNK = 1 << 16  # bytes read at once
+_CHUNK = 1 << 12  # bytes read at once: frames wait while they are answered, and commands are short
 
 Address = tuple[str, int]
 Send = Callable[[bytes, Address], None]
@@ -64,7 +64,11 @@ class VirtualCameraServer:
         self._camera = CameraState(tuple(config.bodies), config.frequency)
         self._clients: list[_Client] = []
         self._lock = threading.RLock()
-        self._listener = socket.create_server((config.address, config.port))
+        try:
+            self._listener = socket.create_server((config.address, config.port))
+        except OSError as error:
+            place, why = f"TCP {config.address}:{config.port}", (error.strerror or str(error)).lower()
+            raise OSError(f"virtual camera: cannot listen on {place}: {why.partition(' (')[0]}") from error
         self._listener.setblocking(False)
         self._udp = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
         self._udp.bind((config.address, 0))

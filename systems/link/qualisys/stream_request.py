@@ -11,6 +11,7 @@ _ALL_COMPONENTS = {
     *("skeleton", "skeleton:global"),
 }
 _UDP_PORTS = range(1023, 65536)
+_MOST_DIGITS = 6  # of a rate or a port; more say nothing that a camera could do
 
 
 class RequestError(ValueError):
@@ -80,18 +81,17 @@ def _parse_rate(word: str) -> tuple[int | None, int]:
     kind, _, number = word.partition(":")
     if word == "allframes":
         return None, 1
-    if (
-        kind in ("frequency", "frequencydivisor")
-        and number.isascii()
-        and number.isdigit()
-        and int(number) > 0
-    ):
+    if kind in ("frequency", "frequencydivisor") and _is_number(number) and int(number) > 0:
         return (int(number), 1) if kind == "frequency" else (None, int(number))
-    raise RequestError(f"'{word}' is none of AllFrames, Frequency:n, FrequencyDivisor:n")
+    raise RequestError(f"'{word[:60]}' is none of AllFrames, Frequency:n, FrequencyDivisor:n")
 
 
 def _parse_udp(word: str) -> tuple[int, str | None]:
     _, *address, port = word.split(":")
-    if len(address) > 1 or not (port.isascii() and port.isdigit() and int(port) in _UDP_PORTS):
-        raise RequestError(f"'{word}' is not UDP:port or UDP:address:port with a port of 1023 to 65535")
+    if len(address) > 1 or not (_is_number(port) and int(port) in _UDP_PORTS):
+        raise RequestError(f"'{word[:60]}' is not UDP:port or UDP:address:port with a port of 1023 to 65535")
     return int(port), address[0] if address else None
+
+
+def _is_number(text: str) -> bool:
+    return len(text) <= _MOST_DIGITS and text.isascii() and text.isdigit()

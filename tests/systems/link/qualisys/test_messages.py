@@ -94,7 +94,8 @@ def test_poses_survive_the_wire_to_single_precision(poses: list, time_us: int, n
         (struct.pack("<QIIII", 1, 1, 1, 8, 5), "0 bytes, its header has 8"),
         (struct.pack("<QIIIIIhh", 1, 1, 1, 16, 5, 1, 0, 0), "1 bodies do not fit into 8 bytes"),
         (struct.pack("<QIIIIIhh", 1, 1, 1, 16, 11, 2**32 - 1, 0, 0), "bodies do not fit"),
-        (struct.pack("<QII", 1, 1, 2**32 - 1), "ends before all of its 4294967295 components"),
+        (struct.pack("<QII", 1, 1, 2**32 - 1), "4294967295 components, at most 64 are read"),
+        (struct.pack("<QII", 1, 1, 64), "ends before all of its 64 components"),
     ],
 )
 def test_sizes_that_contradict_each_other_are_refused(payload: bytes, message: str):
