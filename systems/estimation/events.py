@@ -10,16 +10,19 @@ from systems.estimation.memory import Layout
 from systems.estimation.tip_model import TipModel
 
 _WINDOW = 12.0  # samples of the running mean
-_SUSPICIOUS = 4.0, 1.0  # sigmas of the camera alone, of one sample and of the mean: below, nothing is to do
+_AVERAGING = np.sqrt(2.0 * _WINDOW - 1.0)  # times, by which the noise of the mean is smaller
+_SUSPICIOUS = 4.0  # sigmas of the camera alone, of one sample: below, nothing is to do
 _OUTLIER, _LONGEST_OUTLIER = 6.0, 5  # sigmas; and how many samples in a row may be so called
-_JUMP = 9.0  # sigmas of the mean
+_JUMP, _CALM = 9.0, 4.0  # sigmas of the mean: what no parameter describes lasts longer than noise
+_MODEL_SHARE = 3.0 / _JUMP  # what the estimate is wrong by is within 5 sigmas
 _FIRST = 15  # samples, whose median is what the next ones are compared with
 _MARGIN = np.repeat([3e-3, 1e-3], 3)  # rad and m, what the first linearisations may be wrong by
 _PAUSE = 50  # samples after an event before the next one
 _EXPLAINED = 0.15  # what a cause leaves of the mean error if it is the cause
 
 
-TOOL_DISPLACED, LOAD_CHANGED, DEAD_TIME_CHANGED = "tool displaced", "load changed", "dead time changed"
+TOOL_DISPLACED, LOAD_CHANGED = "tool displaced", "load changed"
+DEAD_TIME_CHANGED, CLOCK_DRIFTS = "dead time changed", "clock drifts"
 
 
 class Verdict(NamedTuple):
@@ -27,26 +30,29 @@ class Verdict(NamedTuple):
 
     is_outlier: bool = False
     has_jumped: bool = False
+    is_calm: bool = False
 
 
 class Event(NamedTuple):
     """What happened to the robot."""
 
-    kind: str  # "tool displaced", "load changed" or "dead time changed"
-    size: float  # m, kg or s
+    kind: str  # "tool displaced", "load changed", "dead time changed" or "clock drifts"
+    size: float  # m, kg, s or s/s
     error: float  # m, of the tip where it is known
 
 
 class Innovations:
     """The running mean of what samples say beyond the estimate, in units of what both may be wrong by.
 
-    Samples of a camera are independent, so that the mean of a window w is smaller by sqrt(2 w - 1).
+    The noise of a camera is independent from sample to sample: in a mean over a window w it is smaller by
+    sqrt(2 w - 1). What the estimate is wrong by is the same in all of them: the mean has the variance
+    R / (2 w - 1) + H P H^T.
     """
 
     def __init__(self, variances: np.ndarray) -> None:
         """Takes the variances of one sample, (6,)."""
         self._variances = variances
-        self.layout = Layout(mean=(6,), error=(6,), outliers=(1,), pause=(1,), seen=(1,), first=(_FIRST, 6))
+        self.layout = Layout(error=(6,), outliers=(1,), pause=(1,), seen=(1,), first=(_FIRST, 6))
 
     def is_false_start(
         self, memory: SimpleNamespace, r: np.ndarray, H: np.ndarray, solve: Callable[[], np.ndarray]
@@ -84,21 +90,32 @@ class Innovations:
             H: its columns, (6, n).
             solve: gives P H^T, (n, 6), with the covariance P of the estimate; called where it matters.
         """
-        z = r / np.sqrt(self._variances)
-        single, lasting = _SUSPICIOUS
-        if np.abs(z).max() > single or np.abs(memory.mean).max() > lasting:
-            z = r / np.sqrt(self._variances + np.einsum("ij,ji->i", H, solve()))
+        known = np.sqrt(self._variances)
+        z = np.abs(r) / known
+        by_model = None  # what the estimate may be wrong by, in variances of the camera
+        if z.max() > _SUSPICIOUS:
+            by_model = np.einsum("ij,ji->i", H, solve()) / self._variances
+            z = z / np.sqrt(1.0 + by_model)
         memory.pause[0] = max(0.0, memory.pause[0] - 1.0)
-        if np.abs(z).max() > _OUTLIER and memory.outliers[0] < _LONGEST_OUTLIER:
+        is_large = z.max() > _OUTLIER
+        if is_large and memory.outliers[0] < _LONGEST_OUTLIER:
             memory.outliers[0] += 1.0
             return Verdict(is_outlier=True)
         # Samples that were left out count as soon as there are too many of them in a row to be outliers.
-        share = 1.0 - (1.0 - 1.0 / _WINDOW) ** (1.0 + memory.outliers[0] * (np.abs(z).max() > _OUTLIER))
-        memory.mean += share * (z - memory.mean)
+        share = 1.0 - (1.0 - 1.0 / _WINDOW) ** (1.0 + memory.outliers[0] * is_large)
         memory.error += share * (r - memory.error)
         memory.outliers[0] = 0.0
-        jumped = np.abs(memory.mean).max() * np.sqrt(2.0 * _WINDOW - 1.0) > _JUMP
-        return Verdict(has_jumped=bool(jumped and memory.pause[0] == 0.0))
+        mean = np.abs(memory.error) / known
+        size = mean.max() * _AVERAGING
+        if size > _CALM:
+            if by_model is None:
+                by_model = np.einsum("ij,ji->i", H, solve()) / self._variances
+            size = (mean / np.sqrt(_AVERAGING**-2 + _MODEL_SHARE**2 * by_model)).max()
+        return Verdict(has_jumped=bool(size > _JUMP and memory.pause[0] == 0.0), is_calm=bool(size < _CALM))
+
+    def forget(self, memory: SimpleNamespace) -> None:
+        """Begins the mean anew."""
+        memory.error[:], memory.outliers[0] = 0.0, 0.0
 
     def explain(self, memory: SimpleNamespace, H: np.ndarray, model: TipModel) -> Event:
         """Says what the mean error looks like, and begins anew."""
@@ -106,7 +123,8 @@ class Innovations:
         by_load = H[:, model.M] / np.sqrt(self._variances)[:, None]
         change = np.linalg.lstsq(by_load[:, :1], whitened, rcond=None)[0]
         left = whitened - by_load[:, :1] @ change
-        memory.mean[:], memory.error[:], memory.outliers[0], memory.pause[0] = 0.0, 0.0, 0.0, _PAUSE
+        self.forget(memory)
+        memory.pause[0] = _PAUSE
         # The running mean has seen the change for a part of its window only.
         size = float(np.linalg.norm(error[3:]))
         if left @ left < _EXPLAINED * (whitened @ whitened):

@@ -18,7 +18,8 @@ def findings(estimator: TipEstimator, memory: SimpleNamespace) -> dict[str, Any]
         memory: of the estimator.
 
     Returns:
-        ``clock_offset_s``: what is to be added to the camera's stamps; ``mass_kg`` of the payload; and
+        ``clock_offset_s``: what is to be added to the camera's stamps now, and ``clock_drift_ppm`` by which
+        that changes; ``mass_kg`` of the payload; and
         ``parameters``: by name a ``value`` and its ``sigma`` in m or rad for geometric errors, as factors of
         what is believed for the compliance of ``gear_i`` and ``bearing_a_i``, ``bearing_b_i``.
     """
@@ -27,7 +28,8 @@ def findings(estimator: TipEstimator, memory: SimpleNamespace) -> dict[str, Any]
     sigma = model.sigma * np.sqrt(np.diag(estimator.covariance(memory)))
     names = _names(estimator)
     return {
-        "clock_offset_s": float(x[model.C]),
+        "clock_offset_s": estimator.clock_offset(memory, float(memory.last_time[0])),
+        "clock_drift_ppm": 1e6 * float(x[model.D]),
         "mass_kg": float(x[model.M][0]),
         "parameters": {
             name: {"value": float(value), "sigma": float(spread)}

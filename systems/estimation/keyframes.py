@@ -10,11 +10,13 @@ from systems.estimation.gear_errors import NUM_SHAPES
 from systems.estimation.memory import Layout
 from systems.estimation.tip_model import Prediction, TipModel
 
-# A keyframe: encoder positions, deflection of the gears, joint velocity and acceleration, twist, the rows of
-# the pose that was seen, its weight in samples, and the shapes of the gears' errors if there are any.
-_THETA, _GEARS, _MOTION, _TWIST = slice(0, 6), slice(6, 12), slice(12, 24), slice(24, 30)
-_POSE, _WEIGHT, _SHAPES = slice(30, 42), 42, 43
-_MANY = 60  # keyframes, some two seconds of motion
+# A keyframe: encoder positions, deflection of the gears, joint velocity and acceleration, twist, time, the
+# rows of the pose that was seen, its weight in samples, and shapes of the gears' errors if there are any.
+_THETA, _GEARS, _MOTION, _TWIST, _TIME = slice(0, 6), slice(6, 12), slice(12, 24), slice(24, 30), 30
+_POSE, _WEIGHT, _SHAPES = slice(31, 43), 43, 44
+# m or rad, by which the parameters may be off from where the sum was linearised: half of its square, over an
+# arm of a metre, is a third of what the mean of a dozen samples of a good camera may be wrong by.
+_LINEAR = 3e-3
 
 
 class Keyframes:
@@ -44,6 +46,8 @@ class Keyframes:
             position=(1,),  # of the pass; below zero for none
             leaving=(1,),  # keyframes before this one leave with this pass
             xi_pass=(n,),
+            xi_sum=(n,),  # of the pass that made the sum
+            held=(1,),  # information on the drift of the clock that is only supposed
             A_old=(n, n),
             b_old=(n,),
             A=(n, n),  # old and ring
@@ -54,12 +58,21 @@ class Keyframes:
             b_leaving=(n,),
         )
 
-    def reset(self, memory: SimpleNamespace, A: np.ndarray, b: np.ndarray) -> None:
-        """Forgets all keyframes; the information A, b is what is left."""
+    def reset(self, memory: SimpleNamespace, A: np.ndarray, xi: np.ndarray) -> None:
+        """Forgets all keyframes; the information A about xi is what is left."""
+        b = A @ xi
+        memory.xi_sum[:] = xi
         memory.first[0] = memory.end[0] = 0.0
         memory.position[0] = -1.0
         memory.A_old[:], memory.b_old[:], memory.A[:], memory.b[:] = A, b, A, b
         memory.xi_pass[:] = np.inf
+
+    def free_drift(self, memory: SimpleNamespace) -> None:
+        """Takes back that the clock is supposed not to drift."""
+        D = self._model.D
+        memory.A_old[D, D] -= memory.held[0] - 1.0
+        memory.A[D, D] -= memory.held[0] - 1.0
+        memory.held[0] = 1.0
 
     def has_room(self, memory: SimpleNamespace) -> bool:
         """Whether another keyframe fits in."""
@@ -73,15 +86,13 @@ class Keyframes:
         memory.A += A
         memory.b += b
 
-    def is_settled(self, memory: SimpleNamespace, xi: np.ndarray, tolerance: float) -> bool:
-        """Whether many configurations have been seen, or the sum is linear where the parameters (m, rad) are.
+    def is_settled(self, memory: SimpleNamespace, xi: np.ndarray) -> bool:
+        """Whether the sum is linear where the parameters are.
 
-        What a linearisation far off leaves looks like a change of the robot as long as little has been seen.
+        What a linearisation far off leaves looks like a change of the robot.
         """
-        if memory.end[0] >= _MANY:
-            return True
-        change = np.abs((xi - memory.xi_pass) * self._model.sigma)[self._model.G]
-        return bool(memory.position[0] < 0.0 and change.max() <= tolerance)
+        change = np.abs((xi - memory.xi_sum) * self._model.sigma)[self._model.G]
+        return bool(change.max() <= _LINEAR)
 
     def work(self, memory: SimpleNamespace, constants: Constants, xi: np.ndarray, tolerance: float) -> bool:
         """Goes on with a pass, or begins one if a parameter has moved by more than the tolerance (m, rad).
@@ -114,11 +125,14 @@ class Keyframes:
             # Old knowledge fades as new knowledge joins it.
             fading = 1.0 - (leaving - first) / 3000.0
             memory.A_old[:] = fading * memory.A_old + (1.0 - fading) * self._model.prior
+            supposed = memory.held[0] - self._model.prior[self._model.D, self._model.D]
+            memory.A_old[self._model.D, self._model.D] += (1.0 - fading) * supposed
             memory.A_old += memory.A_leaving
             memory.b_old[:] = fading * memory.b_old + memory.b_leaving
             memory.first[0] = leaving
         memory.A[:] = memory.A_old + memory.A_pass
         memory.b[:] = memory.b_old + memory.b_pass
+        memory.xi_sum[:] = memory.xi_pass
         memory.position[0] = -1.0
         return True
 
@@ -128,7 +142,8 @@ class Keyframes:
         motion = rows[:, 12:18], rows[:, 18:24]
         configuration = rows[:, _THETA], rows[:, _GEARS]
         shapes = rows[:, _SHAPES:].reshape(-1, NUM_SHAPES, 6) if model.has_gear_errors else None
-        return model.predict_anew(constants, model.full(xi), configuration, motion, rows[:, _TWIST], shapes)
+        seen = rows[:, _TWIST], shapes, rows[:, _TIME]
+        return model.predict_anew(constants, model.full(xi), configuration, motion, *seen)
 
     def _information(
         self, memory: SimpleNamespace, numbers: np.ndarray, constants: Constants, xi: np.ndarray
@@ -153,8 +168,8 @@ def keyframe_row(means: np.ndarray, seen: tuple[np.ndarray, float]) -> np.ndarra
     """One keyframe as numbers.
 
     Args:
-        means: encoder positions, deflection of the gears, joint velocity and acceleration, twist, and shapes
-            of the gears' errors behind each other.
+        means: encoder positions, deflection of the gears, joint velocity and acceleration, twist, time, and
+            shapes of the gears' errors behind each other.
         seen: the pose (4, 4) and its weight in samples.
     """
-    return np.concatenate((means[:30], seen[0][:3].ravel(), [seen[1]], means[30:]))
+    return np.concatenate((means[:31], seen[0][:3].ravel(), [seen[1]], means[31:]))

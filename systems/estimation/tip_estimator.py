@@ -1,5 +1,6 @@
 """From pairs of encoder positions and camera poses of one instant to the parameters of the robot."""
 
+import math
 from dataclasses import dataclass, field
 from types import SimpleNamespace
 from typing import NamedTuple
@@ -9,7 +10,7 @@ from scipy.linalg import get_lapack_funcs
 
 from robots.pose import pose_error
 from systems.estimation.arm_geometry import Constants
-from systems.estimation.events import LOAD_CHANGED, Event, Innovations
+from systems.estimation.events import CLOCK_DRIFTS, LOAD_CHANGED, Event, Innovations
 from systems.estimation.gear_errors import NUM_SHAPES
 from systems.estimation.keyframes import Keyframes, keyframe_row
 from systems.estimation.memory import Layout
@@ -18,6 +19,12 @@ from systems.estimation.tip_model import Prediction, Spread, TipModel, moved
 (_POSV,) = get_lapack_funcs(("posv",), dtype=np.float64)  # symmetric positive definite equations
 _AGAIN = 500  # samples, in which a second event says that the first was explained wrongly
 _OF_THE_LOAD = 0.1  # of its spread, when a tool was displaced
+_TRUST = 0.02  # m or rad, the largest step from where the past was read
+_DRIFT_EVERY = 50  # samples, between two looks whether the clock drifts
+_LEAST_DRIFT, _DRIFT_SIGMAS = (
+    1e-4,
+    8.0,
+)  # s/s; and how sure it has to be, as what no parameter describes adds up
 _CLOSE_AT = (5, 20, 60)  # samples: the first linearisations are poor
 
 
@@ -46,6 +53,7 @@ class Pair(NamedTuple):
     X_WE: np.ndarray  # (4, 4), seen
     unrest: float = 0.0  # m/s^2, of the tip by parameters that are led in
     states: np.ndarray = np.zeros(12)  # of the gears' hysteresis, in -1 to 1
+    time: float = 0.0  # s, as the camera's clock has it
 
 
 class TipEstimator:
@@ -68,14 +76,18 @@ class TipEstimator:
             x_geometry=(n,),  # the value that the constants are for
             count=(1,),
             event_at=(1,),  # the count at the last event
+            was_settled=(1,),  # whether the sum was linear enough when samples agreed with it last
+            is_rereading=(1,),  # whether nothing is learnt until the past has been read anew
             A_open=(n, n),
             b_open=(n,),
             samples=(1,),
             weight=(1,),
             first_theta=(6,),
             sums=(
-                30 + 6 * NUM_SHAPES * model.has_gear_errors,
-            ),  # theta, gears, motion, twist, shapes, weighted
+                31 + 6 * NUM_SHAPES * model.has_gear_errors,
+            ),  # of theta, gears, motion, twist, time, shapes
+            first_time=(1,),  # of the camera's clock
+            last_time=(1,),
             sum_y=(6,),
             sum_H=(6, n),
             keyframes=self._keyframes.layout,
@@ -87,11 +99,23 @@ class TipEstimator:
         """Writes what is known before the first sample."""
         memory.x_geometry[:] = self.model.mean
         memory.event_at[0] = -np.inf
-        self._keyframes.reset(memory.keyframes, self.model.prior, np.zeros(self.model.size))
+        memory.first_time[0] = memory.last_time[0] = np.nan
+        memory.keyframes.held[0] = self.model.prior[self.model.D, self.model.D]
+        self._keyframes.reset(memory.keyframes, self.model.prior, memory.xi)
 
     def x(self, memory: SimpleNamespace) -> np.ndarray:
         """The unknowns in their units."""
         return self.model.full(memory.xi)
+
+    def clock_offset(self, memory: SimpleNamespace, time: float) -> float:
+        """What is to be added to a stamp of the camera in s."""
+        x = self.x(memory)
+        return float(x[self.model.C] + x[self.model.D] * self._since_first(memory, time))
+
+    @staticmethod
+    def _since_first(memory: SimpleNamespace, time: float) -> float:
+        first = float(memory.first_time[0])
+        return 0.0 if math.isnan(first) else time - first
 
     def covariance(self, memory: SimpleNamespace) -> np.ndarray:
         """Covariance of the unknowns in units of their spreads."""
@@ -116,7 +140,11 @@ class TipEstimator:
         shapes = self.model.gear_shapes(x, pair.theta, pair.loads, pair.states)
         rows = pair.theta[None], pair.loads[None], pair.twist[None]
         found = self.model.predict(
-            self.constants(memory), x, *rows, shapes[None] if shapes is not None else None
+            self.constants(memory),
+            x,
+            *rows,
+            shapes[None] if shapes is not None else None,
+            self._since_first(memory, pair.time),
         )
         return found, shapes
 
@@ -128,6 +156,9 @@ class TipEstimator:
     def add(self, memory: SimpleNamespace, pair: Pair) -> Event | None:
         """Learns from one pair; says if something happened to the robot."""
         config = self._config
+        if math.isnan(memory.first_time[0]):
+            memory.first_time[0] = pair.time
+        memory.last_time[0] = pair.time
         found, shapes = self._predict(memory, pair)
         r, H = pose_error(pair.X_WE, found.X_WE[0]), found.H[0]
         weight = 1.0 / (1.0 + (pair.unrest / config.calm) ** 2)
@@ -136,18 +167,25 @@ class TipEstimator:
             if self._innovations.is_false_start(innovations, r, H, lambda: self._solve_columns(memory, H)):
                 return None
         else:
+            if memory.is_rereading[0] and not self._is_reread(memory):
+                return None
             verdict = self._innovations.judge(innovations, r, H, lambda: self._solve_columns(memory, H))
             if verdict.is_outlier:
                 return None
-            is_settled = self._keyframes.is_settled(memory.keyframes, memory.xi, config.relinearise)
-            if verdict.has_jumped and weight > 0.2 and is_settled:
+            if verdict.is_calm:
+                memory.was_settled[0] = self._keyframes.is_settled(memory.keyframes, memory.xi)
+            if verdict.has_jumped and weight > 0.2:
+                if not memory.was_settled[0]:
+                    self._reread(memory)
+                    return None
                 event = self._innovations.explain(innovations, H, self.model)
                 self._widen(memory, event)
         y = r + H @ memory.xi
         weighted = (weight * self._weights)[:, None] * H
         memory.A_open += H.T @ weighted
         memory.b_open += weighted.T @ y
-        means = [pair.theta, found.gears[0], pair.motion, pair.twist]
+        since_first = [self._since_first(memory, pair.time)]
+        means = [pair.theta, found.gears[0], pair.motion, pair.twist, since_first]
         means += [shapes.ravel()] if shapes is not None else []
         self._open(memory, np.concatenate(means), (y, H, weight))
         memory.count[0] += 1.0
@@ -155,8 +193,43 @@ class TipEstimator:
         is_long = memory.samples[0] >= config.keyframe_samples
         if moved_away or is_long or int(memory.count[0]) in _CLOSE_AT:
             self._close(memory)
+        if event is None and memory.count[0] % _DRIFT_EVERY == 0.0:
+            event = self._look_for_drift(memory)
         self._solve(memory)
         return event
+
+    def _look_for_drift(self, memory: SimpleNamespace) -> Event | None:
+        """Tells a clock that drifts from one that does not by what the drift would be if it were free."""
+        D, held = self.model.D, float(memory.keyframes.held[0])
+        if held <= 1.0:
+            return None
+        A, b = memory.keyframes.A + memory.A_open, memory.keyframes.b + memory.b_open
+        A[D, D] -= held - 1.0
+        unit = np.zeros(len(b))
+        unit[D] = 1.0
+        row = np.linalg.solve(A, unit)
+        drift = float(row @ b)
+        size = abs(drift) * float(self.model.sigma[D])
+        if size < _LEAST_DRIFT or abs(drift) < _DRIFT_SIGMAS * math.sqrt(row[D]):
+            return None
+        self._keyframes.free_drift(memory.keyframes)
+        return Event(CLOCK_DRIFTS, drift * float(self.model.sigma[D]), 0.0)
+
+    def _reread(self, memory: SimpleNamespace) -> None:
+        """Samples do not agree with a past that was read with other parameters: it is read anew first.
+
+        Only what disagrees with it then has happened to the robot.
+        """
+        if memory.weight[0] > 0.0:
+            self._close(memory)
+        self._innovations.forget(memory.innovations)
+        memory.is_rereading[0] = 1.0
+
+    def _is_reread(self, memory: SimpleNamespace) -> bool:
+        is_done = self._keyframes.is_settled(memory.keyframes, memory.xi)
+        if is_done:
+            memory.is_rereading[0], memory.was_settled[0] = 0.0, 1.0
+        return is_done
 
     def work(self, memory: SimpleNamespace) -> None:
         """What can be done in a tick without a sample, or after its command is out: relinearise."""
@@ -194,8 +267,13 @@ class TipEstimator:
     def _solve(self, memory: SimpleNamespace) -> None:
         A, b = memory.keyframes.A + memory.A_open, memory.keyframes.b + memory.b_open
         _, xi, info = _POSV(A, b, lower=1)
-        if info == 0:
-            memory.xi[:] = xi
+        if info != 0:
+            return
+        # Half of the square of a step is what it leaves of samples that are known far better: small steps
+        # from where the past was read keep to the curved set of parameters that explain it.
+        step = xi - memory.keyframes.xi_sum
+        largest = np.abs((step * self.model.sigma)[self.model.G]).max()
+        memory.xi[:] = memory.keyframes.xi_sum + min(1.0, _TRUST / max(largest, 1e-12)) * step
 
     def _solve_columns(self, memory: SimpleNamespace, H: np.ndarray) -> np.ndarray:
         return np.linalg.solve(memory.keyframes.A + memory.A_open, H.T)
@@ -216,7 +294,7 @@ class TipEstimator:
         load[model.M] = share * np.array([4.0, 0.3, 0.3, 0.3]) / model.sigma[model.M]
         A = np.linalg.inv(P + np.diag(load**2))
         A = 0.5 * (A + A.T)
-        self._keyframes.reset(memory.keyframes, A, A @ memory.xi)
+        self._keyframes.reset(memory.keyframes, A, memory.xi)
         for part in (memory.A_open, memory.b_open, memory.samples, memory.weight):
             part[:] = 0.0
         for part in (memory.sums, memory.sum_y, memory.sum_H):

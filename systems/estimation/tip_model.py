@@ -14,6 +14,7 @@ from systems.estimation.arm_loads import ArmLoads
 from systems.estimation.gear_errors import NUM_SHAPES, GearErrors
 from systems.estimation.learnt_robot import known_before
 
+HELD = 1e5  # information on the drift of a clock as long as nothing shows that there is one
 _STAYS = 0.02  # of the spread, by which what was measured of a robot may have changed since
 
 
@@ -30,6 +31,7 @@ class Spread:
     payload: float = 0.5  # kg
     payload_centre: float = 0.015  # m
     clock: float = 2e-3  # s, between the stamps of the camera and those of the joints
+    clock_drift: float = 3e-4  # s/s, by which that changes if it does
     gear_error: float = (
         0.0  # rad, of a gear's waves, gap and hysteresis; 5e-5 is a good guess where there are
     )
@@ -48,12 +50,12 @@ class TipModel:
 
     The tip is at exp(T phi + V c) F(theta + delta, p), with the gears' deflection delta = -k c_g tau, that of
     the bearings phi = -k c_b M about the axes in the columns T, and the twist V of the tip times the offset
-    c of the camera's clock. Loads are linear in the payload's mass and first moment.
+    c = c_0 + c_1 t of the camera's clock. Loads are linear in the payload's mass and first moment.
 
     The vector of unknowns holds the identifiable geometric errors (m, rad), 18 factors of the compliance of
-    gears and bearings, the mass of the payload (kg), the change of its first moment (kg m, 3), the offset
-    of the clock (s), and the sizes of the gears' errors (rad, 7 shapes of 6 joints) unless their spread is
-    zero.
+    gears and bearings, the mass of the payload (kg), the change of its first moment (kg m, 3), the offset of
+    the clock (s) and its drift (s/s), and the sizes of the gears' errors (rad, 7 shapes of 6 joints) unless
+    their spread is zero.
     """
 
     def __init__(self, model: ControllerModel, spread: Spread) -> None:
@@ -68,9 +70,10 @@ class TipModel:
         g = len(chosen)
         self.has_gear_errors = spread.gear_error > 0.0
         self.gear_errors = GearErrors(robot)
-        self.size = g + 23 + 6 * NUM_SHAPES * self.has_gear_errors
+        self.size = g + 24 + 6 * NUM_SHAPES * self.has_gear_errors
         self.G, self.K = slice(0, g), slice(g, g + 18)
-        self.M, self.C, self.E = slice(g + 18, g + 22), g + 22, slice(g + 23, self.size)
+        self.M, self.C, self.D = slice(g + 18, g + 22), g + 22, g + 23
+        self.E = slice(g + 24, self.size)
         self.mean, self.sigma = np.zeros(self.size), np.zeros(self.size)
         shift, angle = spread.shift, spread.angle
         if robot.is_calibrated:
@@ -88,10 +91,11 @@ class TipModel:
         self.mean[g + 18] = model.payload
         self.sigma[g + 18] = spread.payload
         self.sigma[g + 19 : g + 22] = spread.payload_centre * max(model.payload, 0.1)
-        self.sigma[self.C] = spread.clock
+        self.sigma[self.C], self.sigma[self.D] = spread.clock, spread.clock_drift
         self.sigma[self.E] = spread.gear_error
         self._tool = self._tool_directions()
         self.prior = np.eye(self.size)  # information, in units of the spreads
+        self.prior[self.D, self.D] = HELD
         known = known_before(robot, drawn, chosen) if robot.is_calibrated else None
         if known is not None:
             self._take_over(*known)
@@ -103,7 +107,7 @@ class TipModel:
         self.mean[springs] = np.where(self.mean[springs] > 0.0, 1.0, 0.0)
         scaled = covariance[np.ix_(entries, entries)] / np.outer(self.sigma[entries], self.sigma[entries])
         # Nothing is known better than a robot stays as it was.
-        P = np.eye(self.size)
+        P = np.linalg.inv(self.prior)
         P[np.ix_(entries, entries)] = scaled + _STAYS**2 * np.eye(len(entries))
         self.prior = np.linalg.inv(P)
 
@@ -168,6 +172,7 @@ class TipModel:
         loads: np.ndarray,
         twist: np.ndarray,
         shapes: np.ndarray | None = None,
+        time: np.ndarray | float = 0.0,
     ) -> Prediction:
         """The tip at encoder positions.
 
@@ -178,11 +183,12 @@ class TipModel:
             loads: as `ArmLoads.at` gives them, (n, 5, 18).
             twist: of the tip, (n, 6).
             shapes: of the gears' errors, (n, 7, 6); None if there are none.
+            time: since the camera's clock was compared first, s, (n,).
         """
         unit = -self.compliance * self.total_load(x, loads)
         yields = x[self.K] * unit
         X_WE, arm = self.forward(constants, x, theta + yields[:, :6] + self.gear_error(x, shapes))
-        return self._complete(arm, X_WE, x, (unit, yields, shapes), loads, twist)
+        return self._complete(arm, X_WE, x, (unit, yields, shapes), loads, (twist, time))
 
     def predict_anew(
         self,
@@ -192,11 +198,12 @@ class TipModel:
         motion: tuple[np.ndarray, np.ndarray],
         twist: np.ndarray,
         shapes: np.ndarray | None = None,
+        time: np.ndarray | float = 0.0,
     ) -> Prediction:
         """The same with loads worked out anew at the geometry of now.
 
         Args:
-            constants, x, twist, shapes: as in `predict`.
+            constants, x, twist, shapes, time: as in `predict`.
             configuration: encoder positions and about by how much the gears yield, in rad, (n, 6) each.
             motion: velocities and accelerations of the joints, (n, 6) each.
         """
@@ -208,20 +215,22 @@ class TipModel:
         yields = x[self.K] * unit
         change = yields[:, :6] - gears
         X_WE = moved(X_WE, (arm.columns[..., :6] @ change[..., None])[..., 0])
-        return self._complete(arm, X_WE, x, (unit, yields, shapes), loads, twist)
+        return self._complete(arm, X_WE, x, (unit, yields, shapes), loads, (twist, time))
 
-    def _complete(self, arm: Arm, X_WE, x, deflection, loads, twist) -> Prediction:
+    def _complete(self, arm: Arm, X_WE, x, deflection, loads, seen) -> Prediction:
         """Adds the tilting bearings and the clock to a pose, and makes the columns."""
         unit, yields, shapes = deflection
+        twist, time = seen
+        later = np.asarray(time)[..., None] * twist
         columns = arm.columns
         springs = columns[..., :18]
-        step = (columns[..., 6:18] @ yields[:, 6:, None])[..., 0] + twist * x[self.C]
+        step = (columns[..., 6:18] @ yields[:, 6:, None])[..., 0] + twist * x[self.C] + later * x[self.D]
         H = np.empty((len(X_WE), 6, self.size))
         H[..., self.G] = columns[..., 18:]
         H[..., self.K] = springs * unit[:, None]
         by_mass = (-x[self.K] * self.compliance) * loads[:, 1:]
         H[..., self.M] = springs @ by_mass.swapaxes(-1, -2)
-        H[..., self.C] = twist
+        H[..., self.C], H[..., self.D] = twist, later
         if self.has_gear_errors and shapes is None:
             H[..., self.E] = 0.0
         elif self.has_gear_errors:

@@ -11,7 +11,7 @@ from robots.description.model import NUM_JOINTS, RobotModel
 from systems.controller_model import ControllerModel
 from systems.estimation.dead_time import CommandDelay
 from systems.estimation.drive_model import DEAD_TIME, DriveModel
-from systems.estimation.events import DEAD_TIME_CHANGED, LOAD_CHANGED, TOOL_DISPLACED, Event
+from systems.estimation.events import CLOCK_DRIFTS, DEAD_TIME_CHANGED, LOAD_CHANGED, TOOL_DISPLACED, Event
 from systems.estimation.findings import calibrated_robot, findings
 from systems.estimation.memory import History, Layout
 from systems.estimation.parameter_lead import ParameterLead
@@ -35,7 +35,7 @@ _ASTRAY = 3e-3  # rad, by which motors may miss their plan before its loads are 
 _UNREST = 0.5  # m/s^2, while the robot is led onto its plan, or the plan is not where motors are
 _STARTING = 1.5  # s
 _LOOK_EVERY = 5  # ticks, between two searches for the dead time
-_KINDS = (TOOL_DISPLACED, LOAD_CHANGED, DEAD_TIME_CHANGED)
+_KINDS = (TOOL_DISPLACED, LOAD_CHANGED, DEAD_TIME_CHANGED, CLOCK_DRIFTS)
 _GIVE_UP = 1.6  # s after the start: what is believed of the dead time has to do
 
 # A row of the plan: motors, loads, links, tip, unrest, columns and correction of the drive model,
@@ -220,7 +220,8 @@ class SelfCalibrating(LeafSystem):
         """Plans for the instant when a command of now acts, and says what to command."""
         instant = time + self._delay.step(memory.delay, float(memory.planned[0]))
         path_start = reference.path.path_start
-        (X_WE,), (V_WE,), _ = reference.sample(np.array([instant]))
+        moment = reference.moment(instant)
+        X_WE, V_WE = np.array([*moment.X_WE, (0.0, 0.0, 0.0, 1.0)]), np.array(moment.V_WE)
         if not memory.planner.started[0]:
             J = self._planner.start(memory.planner, memory.lead.x, position, X_WE)
             memory.start_time[0] = time
@@ -265,7 +266,7 @@ class SelfCalibrating(LeafSystem):
         """The encoders and the plan at the instant of an exposure."""
         count = int(memory.encoders.count[0])
         newest = memory.encoders.times[(count - 1) % self._encoders.length]
-        offset = self.estimator.x(memory.estimator)[self.tip_model.C]
+        offset = self.estimator.clock_offset(memory.estimator, sample.time)
         exposure = min(sample.time + offset, newest)
         encoders = self._encoders_at(memory, exposure)
         loaded = self._plan.at(memory.plan, exposure - self._load_lag)
@@ -280,7 +281,7 @@ class SelfCalibrating(LeafSystem):
         X_WE = moved(X_WE[None], ((exposure - sample.time) * now.twist)[None])[0]
         is_settling = exposure < memory.delay.settled[0] + _SETTLING
         unrest = _UNREST if is_settling else float(now.unrest[0])
-        return Pair(encoders, then.loads, then.motion, now.twist, X_WE, unrest, then.states)
+        return Pair(encoders, then.loads, then.motion, now.twist, X_WE, unrest, then.states, sample.time)
 
     def _encoders_at(self, memory: SimpleNamespace, time: float) -> np.ndarray | None:
         """Positions between two samples, a cubic through positions and velocities, rad, (6,)."""

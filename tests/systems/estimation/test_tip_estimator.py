@@ -5,6 +5,7 @@ import pytest
 
 from robots.pose import pose_error
 from systems.estimation.tip_estimator import TipEstimator, TipEstimatorConfig
+from systems.estimation.tip_model import moved
 from tests.systems.estimation.arms import PERIOD, MovingArm, tip_model, true_unknowns
 
 
@@ -41,6 +42,7 @@ def test_four_seconds_of_motion_are_enough():
     session = Session(0)
     assert session.error() > 5e-3
     session.learn(4.0)
+    assert not session.events
     assert session.error() < 0.3e-3  # where it has not been
     assert session.error(seen=True) < 30e-6  # half the noise of a sample
     clock = session.model.C
@@ -143,3 +145,19 @@ def test_the_same_pairs_give_the_same_memory():
     for session in (one, other):
         session.learn(0.5)
     assert np.array_equal(one.memory.xi, other.memory.xi)
+
+
+def test_a_clock_that_drifts_is_followed():
+    session, drift = Session(9), 5e-4
+
+    def stamped(pair):
+        late = drift * session.time  # what the camera stamped at this time was seen so much later
+        return pair._replace(X_WE=moved(pair.X_WE[None], (late * pair.twist)[None])[0], time=session.time)
+
+    session.learn(4.0, change=stamped)
+    assert [event.kind for event in session.events] == ["clock drifts"]
+    found = session.estimator.x(session.memory)
+    assert found[session.model.D] == pytest.approx(drift, abs=2e-5)
+    assert session.estimator.clock_offset(session.memory, session.time) == pytest.approx(
+        session.arm.x[session.model.C] + drift * session.time, abs=5e-5
+    )
