@@ -99,3 +99,16 @@ def test_a_dead_time_that_changes_on_the_path_is_learnt_while_the_tip_stays_on_i
     assert [event["kind"] for event in log.learnt["events"]] == ["dead time changed"]
     assert log.learnt["dead_time_s"] == pytest.approx(0.037, abs=0.2e-3)
     assert not any(log.guard_counts.values())
+
+
+@pytest.mark.slow
+def test_a_camera_clock_that_drifts_is_learnt_before_it_matters():
+    drawn = [f"{name}=1001" for name in ("seed", "station.errors.random.seed", "station.variation.seed")]
+    scenario = load_scenario("everything", ["station.camera.clock_drift_ppm=500", *drawn])
+    experiment = Experiment(scenario, "self_calibrating")
+    experiment.advance(until=8.0)
+    log = experiment.log()
+    assert tip_errors(log)[0].max() < 0.06e-3
+    assert log.learnt is not None
+    assert [event["kind"] for event in log.learnt["events"]] == ["clock drifts"]
+    assert log.learnt["clock_drift_ppm"] == pytest.approx(-500.0, abs=50.0)  # of what corrects the stamps
