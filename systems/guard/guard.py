@@ -182,18 +182,15 @@ class CommandGuard(LeafSystem):
         output.set_value(torque if follows and np.isfinite(torque).all() else np.zeros(NUM_JOINTS))
 
     def _calc_next(self, context: Context, value) -> None:
-        """The next state, which kinds of intervention it takes, and when the last sample arrived."""
+        """The next state, the kinds of intervention it takes, the time of the last sample, the joints."""
         joints: JointSample = self._joints.Eval(context)
         has_issued = not math.isnan(context.get_discrete_state(0).value()[0])
-        if not math.isfinite(joints.position.sum()):
-            value.set_value(self._decided(context, None, are_joints_known=False))
+        if not math.isfinite(sum(joints.position.tolist())):
+            value.set_value((*self._decided(context, None, are_joints_known=False), None))
         elif not (joints.running and has_issued):
-            value.set_value(self._decided(context, joints))
+            value.set_value((*self._decided(context, joints), None))
         else:
-            state, kinds, last_sample = self._next_in_motion.Eval(context)
-            state = state.copy()
-            state[_WERE_AT] = joints.position
-            value.set_value((state, kinds, last_sample))
+            value.set_value((*self._next_in_motion.Eval(context), joints.position))
 
     def _calc_next_in_motion(self, context: Context, value) -> None:
         value.set_value(self._decided(context, None))
@@ -359,8 +356,10 @@ class CommandGuard(LeafSystem):
 
     def _remember(self, context: Context, discrete_state: DiscreteValues) -> None:
         """Makes the issued command the state and decides from the clocks how the next tick will go."""
-        state, kinds, last_sample = self._next.Eval(context)
+        state, kinds, last_sample, were_at = self._next.Eval(context)
         state = state.copy()
+        if were_at is not None:
+            state[_WERE_AT] = were_at
         time = context.get_time()
         if _NO_COMMAND not in kinds:
             state[_LAST_COMMAND] = time
