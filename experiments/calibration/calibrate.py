@@ -183,7 +183,9 @@ def path_runs(
 
 
 def identification_config(
-    compliance: bool, fixed: list[str], noise: MeasurementNoise
+    compliance: bool, fixed: list[str], noise: MeasurementNoise, joint_errors: tuple[str, ...] = ()
 ) -> IdentificationConfig:
     """What to identify; residuals are whitened where the noise is known."""
-    return IdentificationConfig(compliance=compliance, fixed=tuple(fixed), noise=noise)
+    return IdentificationConfig(
+        compliance=compliance, fixed=tuple(fixed), noise=noise, joint_errors=joint_errors
+    )

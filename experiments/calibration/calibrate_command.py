@@ -39,6 +39,7 @@ from robots.calibration.identification import identify
 from robots.calibration.instruments.observation_file import names_targets
 from robots.calibration.measurement_file import RowProblem, measurement_text, read_measurements
 from robots.calibration.validation import plausible_rows
+from robots.description.joint_errors import names_of
 from robots.description.robot_file import robot_text
 from robots.description.urdf import urdf_text
 from robots.measurement_design.constraints import AdmissibleConfigurations
@@ -81,6 +82,14 @@ def calibrate_command(
         bool,
         typer.Option("--compliance", help="Also identify joint compliances; measures with two payloads."),
     ] = False,
+    joint_errors: Annotated[
+        str,
+        typer.Option(
+            metavar="A,B,...",
+            help="Also identify errors that depend on joint angles: scale (of encoders), eccentricity, "
+            "coupling (of wrist axes).",
+        ),
+    ] = "",
     fixed: Annotated[
         list[str] | None, typer.Option(metavar="NAME", help="A parameter that stays zero; repeatable.")
     ] = None,
@@ -114,7 +123,15 @@ def calibrate_command(
     """Identify the geometry of a robot and validate it on the path."""
     human = human_console(json_file)
     wanted = _Wanted(
-        measurements, validation, count, criterion, noise, position_only, compliance, fixed or []
+        measurements,
+        validation,
+        count,
+        criterion,
+        noise,
+        position_only,
+        compliance,
+        fixed or [],
+        tuple(filter(None, joint_errors.split(","))),
     )
     note = ""
     with json_output(json_file) as output, refusing(ValueError, OSError), ExitStack() as stack:
@@ -163,6 +180,7 @@ class _Wanted:
     position_only: bool
     compliance: bool
     fixed: list[str]
+    joint_errors: tuple[str, ...]
 
     def check(self) -> None:
         """Raises ValueError if something is unknown, too small or does not go together."""
@@ -177,6 +195,7 @@ class _Wanted:
         if self.count is not None:
             at_least("--count", 5, self.count)
         noise_option(self.noise)
+        names_of(self.joint_errors)
 
     def check_instruments(self, urdf: str | None) -> None:
         """Raises ValueError if an option has no effect on tables of targets and instruments."""
@@ -184,6 +203,7 @@ class _Wanted:
             "--validation": self.validation,
             "--compliance": self.compliance,
             "--fixed": self.fixed,
+            "--joint-errors": self.joint_errors,
             "--position-only": self.position_only,
             "--noise": self.noise != ESTIMATE,
             "--urdf": urdf,
@@ -245,7 +265,9 @@ def _study(prepared: Prepared, wanted: _Wanted, measured: _Measured) -> Calibrat
     robot, sets = prepared.robot, measured.sets
     table = sets.calibration.without_rotation() if wanted.position_only else sets.calibration
     position_only = table.rotation is None
-    config = identification_config(wanted.compliance, wanted.fixed, noise_option(wanted.noise))
+    config = identification_config(
+        wanted.compliance, wanted.fixed, noise_option(wanted.noise), wanted.joint_errors
+    )
     identified = identify(robot, table, config)
     calibrated = identified.calibrated_robot(prepared.scenario.robot)
     rigid = None

@@ -20,6 +20,10 @@ def in_words(name: str) -> str:
         return f"joint {kind}, zero point"
     if part == "scale":
         return f"joint {kind}, scale of the encoder"
+    if part in ("sine", "cosine"):
+        return f"joint {kind}, eccentricity ({part})"
+    if part == "coupling":
+        return f"joint {kind[1]}, turned along by joint {kind[0]}"
     if part == "c":
         return f"joint {kind}, compliance"
     place = f"frame of joint {part.removeprefix('joint')}" if part.startswith("joint") else part
@@ -30,7 +34,7 @@ def unit(name: str) -> tuple[str, float]:
     """The unit in which a parameter is shown, and how many of it are one in SI units."""
     if name.startswith("c_"):
         return "rad / N m", 1.0
-    if name.startswith("scale_"):
+    if name.startswith(("scale_", "coupling_")):
         return "ppm", 1e6
     return ("mm", 1e3) if name.endswith(("_x", "_y", "_z")) else ("deg", 180.0 / math.pi)
 
@@ -51,8 +55,8 @@ def rounded(value: float, uncertainty: float) -> tuple[str, str]:
 def icon(name: str, robot: RobotModel) -> Markup:
     """The axes of a frame with an arrow along the one that is shifted, or around the one that is turned."""
     part, _, kind = name.partition("_")
-    if part in ("zero", "scale", "c"):
-        axis = "xyz"[int(np.argmax(np.abs(robot.axes[int(kind) - 1])))]
+    if part in ("zero", "scale", "c", "sine", "cosine", "coupling"):
+        axis = "xyz"[int(np.argmax(np.abs(robot.axes[int(kind[-1]) - 1])))]
         is_turn = True
     else:
         axis, is_turn = kind[-1], kind.startswith("r")

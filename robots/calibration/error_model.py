@@ -5,16 +5,18 @@ The pose of the tool is
     X_WE = prod_i  P_i  T(t_i)  exp(w_i~)  Rot(a_i, (1 + k_i) q_i + z_i),   i = base, 1 ... 6, tool,
 
 with the nominal placements P_i and axes a_i of the robot file; base and tool have no joint. These are 54
-parameters, 60 with the scales k_i of the encoders. They are redundant on purpose: whatever frames were
-chosen to draw the robot, they span all small changes of its geometry, and a prior decides between changes
-that no measurement can tell apart.
+parameters, and those of `robots.description.joint_errors` where they are asked for, such as scales k_i. They
+are redundant on purpose: whatever frames were chosen to draw the robot, they span all small changes of its
+geometry, and a prior decides between changes that no measurement can tell apart.
 """
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
+from robots.description.joint_errors import JointErrors, names_of
 from robots.description.model import NUM_JOINTS, Placement, RobotModel
 from robots.kinematics.forward import rotation_about
 from robots.pose import zyx_from_rotation
@@ -22,10 +24,9 @@ from robots.pose import zyx_from_rotation
 PLACEMENTS = ("base", *(f"joint{number}" for number in range(1, NUM_JOINTS + 1)), "tool")
 _PLACED = tuple(f"{part}_{kind}" for part in PLACEMENTS for kind in ("x", "y", "z", "rx", "ry", "rz"))
 _ZEROS = tuple(f"zero_{number}" for number in range(1, NUM_JOINTS + 1))
-_SCALES = tuple(f"scale_{number}" for number in range(1, NUM_JOINTS + 1))
 NUM_PLACED = len(_PLACED)  # 48
 ZEROS = slice(NUM_PLACED, NUM_PLACED + NUM_JOINTS)
-SCALES = slice(NUM_PLACED + NUM_JOINTS, NUM_PLACED + 2 * NUM_JOINTS)
+_NUM_DRAWN = NUM_PLACED + NUM_JOINTS  # 54; what follows has no place in a drawing
 
 _EYE = np.eye(3)
 _SMALL = 1e-5  # rad, below which the series of sin and cos have all digits
@@ -42,23 +43,24 @@ class Chain:
 
 
 class ErrorModel:
-    """Forward kinematics of a robot at any value of its 54 or 60 error parameters, and its exact derivative.
+    """Forward kinematics of a robot at any value of its error parameters, and its exact derivative.
 
     Parameters x are one vector, in m and rad, in the order of `names`: ``base_x``, ``base_y``, ``base_z``,
     ``base_rx``, ... ``tool_rz`` for the placements (displaced along and turned about the axes of the placed
-    frame), ``zero_1`` ... ``zero_6`` for the zero points of the joints, ``scale_1`` ... for their encoders.
+    frame), ``zero_1`` ... ``zero_6`` for the zero points of the joints, then the errors of joints.
     """
 
-    def __init__(self, robot: RobotModel, has_scales: bool = False) -> None:
+    def __init__(self, robot: RobotModel, joint_errors: Sequence[str] = ()) -> None:
         """Takes the placements of a robot as nominal.
 
         Args:
             robot: any robot of six revolute joints.
-            has_scales: whether the scales of the encoders are parameters too.
+            joint_errors: kinds of `robots.description.joint_errors.KINDS` that are parameters, too.
         """
         self.robot = robot
-        self.names = _PLACED + _ZEROS + (_SCALES if has_scales else ())
-        self._has_scales = has_scales
+        self.joint_errors = names_of(joint_errors)
+        self.names = _PLACED + _ZEROS + self.joint_errors
+        self._errors = JointErrors(self.joint_errors)
         poses = [
             part.pose().GetAsMatrix4()
             for part in (robot.base, *(joint.placement for joint in robot.joints), robot.tool)
@@ -102,8 +104,8 @@ class ErrorModel:
             x: parameters, shape (len(self),).
 
         Returns:
-            A robot with ``Kinematics(robot).forward(q)`` equal to `forward` (q, x) up to rounding; the scales
-            of the encoders have no place in a drawing and are left out.
+            A robot with ``Kinematics(robot).forward(q)`` equal to `forward` (q, x) up to rounding; errors of
+            joints have no place in a drawing and are left out.
         """
         placed, zeros = x[:NUM_PLACED].reshape(-1, 2, 3), x[ZEROS]
         nominal = [self.robot.base, *(joint.placement for joint in self.robot.joints), self.robot.tool]
@@ -130,7 +132,9 @@ class ErrorModel:
         if x.shape != (len(self),):
             raise ValueError(f"error parameters must have the shape ({len(self)},), got {x.shape}")
         placed, zeros = x[:NUM_PLACED].reshape(-1, 2, 3), x[ZEROS]
-        angles = q * (1.0 + x[SCALES]) + zeros if self._has_scales else q + zeros
+        angles = q + zeros
+        if self.joint_errors:
+            angles = angles + self._errors.added(q, x[_NUM_DRAWN:])
         sines, versines = np.sin(angles)[..., None, None], 1.0 - np.cos(angles)[..., None, None]
         n = len(q)
         R, p = np.broadcast_to(_EYE, (n, 3, 3)), np.zeros((n, 3))
@@ -174,8 +178,9 @@ class ErrorModel:
         a = np.moveaxis(chain.axes, 0, 2)  # (n, 3, 6)
         Theta[:, :3, ZEROS] = a
         Theta[:, 3:, ZEROS] = _cross(a, np.swapaxes(levers[:, 1:-1], 1, 2))
-        if self._has_scales:
-            Theta[:, :, SCALES] = Theta[:, :, ZEROS] * q[:, None, :]
+        if self.joint_errors:
+            moved = Theta[:, :, ZEROS][:, :, self._errors.joint]
+            Theta[:, :, _NUM_DRAWN:] = moved * self._errors.effects(q)[:, None, :]
         return Theta
 
 

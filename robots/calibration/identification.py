@@ -59,7 +59,7 @@ class IdentificationConfig:
     """What is identified, and how."""
 
     compliance: bool = False  # whether the joints' compliances are identified too
-    scales: bool = False  # whether the scales of the encoders are
+    joint_errors: tuple[str, ...] = ()  # which kinds of errors of joints are: scale, eccentricity, coupling
     fixed: tuple[str, ...] = ()  # names of parameters that stay zero
     noise: MeasurementNoise = field(default_factory=MeasurementNoise)  # estimated if it is not known
     search_outliers: bool = True  # False takes every row as good, which is five times faster
@@ -122,7 +122,7 @@ def _in_frame_of_instrument(
 def _problem(
     robot: RobotModel, measurements: Measurements, config: IdentificationConfig, is_own_frame: bool
 ) -> tuple[Problem, ReducibleModel]:
-    model = ErrorModel(robot, config.scales)
+    model = ErrorModel(robot, config.joint_errors)
     reducible = ReducibleModel(model, measurements.rotation is None)
     sizes, loads, free = parameter_sizes(model.names, is_own_frame), None, np.arange(len(model))
     unknown = [name for name in config.fixed if name not in model.names]

@@ -137,12 +137,7 @@ class Identified:
 
         Args:
             of: the robot that was calibrated, as `robots.description.model.load_robot` takes it.
-
-        Raises:
-            ValueError: if scales of encoders were identified, which have no place in a robot file.
         """
-        if len(self.model) > len(ErrorModel(self.robot)):
-            raise ValueError(f"calibration of {self.robot.name}: a robot file cannot hold scales of encoders")
         robot = self.model.robot_with_errors(self.x)
         number = len(self.model) + (NUM_JOINTS if len(self.parameters) > len(self.model) else 0)
         covariance = np.zeros((number, number))
@@ -158,6 +153,8 @@ class Identified:
             self.parameters[:number].tolist(),
             [row[: i + 1].tolist() for i, row in enumerate(covariance)],
         )
+        errors = self.model.joint_errors
+        calibration.joint_errors = dict(zip(errors, self.x[-len(errors) :].tolist(), strict=False))
         if self.frame is not None:
             calibration.frame_translation = self.frame[:3, 3].tolist()
             calibration.frame_zyx_deg = np.rad2deg(zyx_from_rotation(self.frame[:3, :3])).tolist()

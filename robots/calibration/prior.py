@@ -13,7 +13,8 @@ from robots.description.model import RobotModel
 
 TRANSLATION = 10e-3  # m, standard deviation of each coordinate of a placement
 ROTATION = float(np.deg2rad(2.0))  # rad, of each rotation of a placement and of the zero of a joint
-SCALE = 1e-3  # of an encoder: share of the angle that it tells
+SCALE = 1e-3  # of an encoder or a coupling: share of the angle
+ECCENTRICITY = 1e-3  # rad, amplitude of what an eccentric disc or gear does
 OWN_FRAME = 1.0  # m and rad, of the base in a frame that has nothing to do with the robot
 COMPLIANCES = 3.0  # times what the stiffness in the robot file says
 MASS = 0.05  # of the masses in a robot file and of a payload, relative
@@ -31,8 +32,10 @@ def parameter_sizes(names: Sequence[str], is_own_frame: bool = False) -> np.ndar
     sizes = []
     for name in names:
         part, _, kind = name.partition("_")
-        if part == "scale":
+        if part in ("scale", "coupling"):
             sizes.append(SCALE)
+        elif part in ("sine", "cosine"):
+            sizes.append(ECCENTRICITY)
         elif part == "base" and is_own_frame:
             sizes.append(OWN_FRAME)
         else:

@@ -5,6 +5,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from robots.configuration.quantity import numbers
+from robots.description.joint_errors import JointErrors
 
 _JOINTS = 6
 
@@ -28,6 +29,7 @@ class Calibration:
     # World of the robot in the frame of the instrument, where the base is displaced: m and degrees
     frame_translation: list[float] = numbers([0.0] * 3, (3,), unit="m")
     frame_zyx_deg: list[float] = numbers([0.0] * 3, (3,), unit="deg")
+    joint_errors: dict[str, float] = field(default_factory=dict)  # as `robots.description.joint_errors`
 
     @property
     def covariance_matrix(self) -> np.ndarray:
@@ -39,6 +41,10 @@ class Calibration:
 
     def problem(self) -> str:
         """Why this is no calibration, or an empty string."""
+        try:
+            JointErrors(tuple(self.joint_errors))
+        except ValueError as error:
+            return f"calibration: {error}"
         sizes = [len(self.names), len(self.values), len(self.covariance)]
         if len(set(sizes)) > 1:
             return f"calibration: names, values and covariance must be equally long, got {sizes}"

@@ -210,6 +210,11 @@ class RobotModel:
         return np.array(self.calibration.compliance)
 
     @property
+    def has_joint_calibration(self) -> bool:
+        """Whether a calibration has found that joints yield, or err with their angle."""
+        return bool(self.compliance.any() or self.calibration.joint_errors)
+
+    @property
     def counterbalance_at_axis_2(self) -> Counterbalance | None:
         """What the counterbalance does about axis 2, None where there is none."""
         joint = self.joints[1]

@@ -66,6 +66,8 @@ def not_in_urdf(robot: RobotModel) -> str:
         lost.append("the counterbalance")
     if any(link.beam is not None for link in robot.links):
         lost.append("links that bend")
+    if robot.calibration.joint_errors:
+        lost.append("errors of joints that depend on their angle")
     text = f"URDF cannot hold {', '.join(lost)}"
     if not robot.compliance.any():
         return text

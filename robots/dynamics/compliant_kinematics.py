@@ -1,8 +1,9 @@
-"""Kinematics of a robot whose joints yield under its own weight and its load."""
+"""Kinematics of a robot whose joints yield under its own weight and its load, and err with their angle."""
 
 import numpy as np
 from pydrake.multibody.plant import MultibodyPlant
 
+from robots.description.joint_errors import JointErrors
 from robots.description.model import NUM_JOINTS, RobotModel
 from robots.dynamics.plant import add_robot
 from robots.kinematics.forward import Kinematics
@@ -18,7 +19,8 @@ class CompliantKinematics:
     """Tool poses for motor positions theta: the links stand at theta + compliance * gravity torque.
 
     The gravity torques are those of the robot's masses and the payload where the links stand, so that the
-    deflection is that of the elastic robot at rest. The methods have the shapes and errors of `Kinematics`.
+    deflection is that of the elastic robot at rest. What a calibration has found of errors of the joints
+    adds to that. The methods have the shapes and errors of `Kinematics`.
     The Jacobian is that of the motors: it knows that the deflection changes along the way, which is a
     thousandth of the motion and would let a law that integrates velocities lag by tenths of a millimetre.
     """
@@ -36,6 +38,8 @@ class CompliantKinematics:
         self.robot = robot
         self._rigid = Kinematics(robot)
         self._compliance = robot.compliance
+        found = robot.calibration.joint_errors
+        self._errors, self._values = JointErrors(tuple(found)), np.array(list(found.values()))
         self._plant = MultibodyPlant(0.0)
         self._parts = add_robot(self._plant, robot, "rigid", payload)
         self._plant.Finalize()
@@ -56,9 +60,13 @@ class CompliantKinematics:
     def link_positions(self, theta: np.ndarray) -> np.ndarray:
         """Where the links stand at motor positions in rad, (..., 6) -> (..., 6)."""
         q = theta
-        for _ in range(_ROUNDS):
-            q = theta + self._compliance * self.gravity_torque(q)
-        return q
+        for _ in range(_ROUNDS if self._compliance.any() else 0):
+            q = theta + self._compliance * self.gravity_torque(self._erring(q))
+        return self._erring(q)
+
+    def _erring(self, q: np.ndarray) -> np.ndarray:
+        """Where joints stand that should be at q."""
+        return q + self._errors.added(q, self._values) if len(self._values) else q
 
     def forward(self, q: np.ndarray) -> np.ndarray:
         """Tool poses at motor positions q."""
@@ -77,7 +85,9 @@ class CompliantKinematics:
         """Tool poses and geometric Jacobians at motor positions q."""
         links = self.link_positions(q)
         X, J = self._rigid.forward_and_jacobian(links)
-        return X, J @ self._links_by_motors(links)
+        if len(self._values):
+            J = J + J @ _slopes(self._errors, q, self._values)
+        return X, J @ self._links_by_motors(links) if self._compliance.any() else J
 
     def _links_by_motors(self, q: np.ndarray) -> np.ndarray:
         """d(link positions) / d(motor positions), first order in the compliance, (..., 6) -> (..., 6, 6)."""
@@ -90,5 +100,11 @@ class CompliantKinematics:
 
 
 def controller_kinematics(robot: RobotModel, payload: float = 0.0) -> Kinematics | CompliantKinematics:
-    """The kinematics that a controller computes with: rigid, or with the compliances of a calibration."""
-    return CompliantKinematics(robot, payload) if robot.compliance.any() else Kinematics(robot)
+    """The kinematics that a controller computes with: rigid, or with what a calibration found of joints."""
+    return CompliantKinematics(robot, payload) if robot.has_joint_calibration else Kinematics(robot)
+
+
+def _slopes(errors: JointErrors, q: np.ndarray, values: np.ndarray) -> np.ndarray:
+    """Derivatives of errors by joint positions, (..., 6) -> (..., 6, 6)."""
+    flat = [errors.slope(each, values) for each in q.reshape(-1, NUM_JOINTS)]
+    return np.array(flat).reshape(*q.shape, NUM_JOINTS)

@@ -50,7 +50,7 @@ def inverse_kinematics(robot: RobotModel, payload: float = 0.0) -> InverseSolver
         robot: nominal or calibrated.
         payload: mass at the flange in kg, under which a robot with compliances bends.
     """
-    yielding = CompliantKinematics(robot, payload) if robot.compliance.any() else None
+    yielding = CompliantKinematics(robot, payload) if robot.has_joint_calibration else None
     if yielding is None and has_spherical_wrist(robot):
         return InverseKinematics(robot)
     try:

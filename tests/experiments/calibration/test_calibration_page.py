@@ -10,6 +10,7 @@ from experiments.calibration.words import in_words, rounded
 from robots.calibration.error_model import ErrorModel
 from robots.calibration.measurement_file import measurement_text
 from robots.calibration.measurements import SOURCE_NOISE, Measurements
+from robots.description.joint_errors import KINDS
 from robots.description.model import load_robot
 from robots.kinematics.forward import Kinematics
 from tests.experiments.commands import truetip
@@ -69,6 +70,6 @@ def test_a_value_has_the_digits_that_its_uncertainty_leaves(value: float, uncert
 
 
 def test_every_parameter_has_words_of_its_own():
-    names = ErrorModel(load_robot("irb1200"), has_scales=True).names
+    names = ErrorModel(load_robot("irb1200"), tuple(KINDS)).names
     assert len({in_words(name) for name in (*names, "c_1", "c_6")}) == len(names) + 2
     assert in_words("joint3_rz") == "frame of joint 3, turn about z"

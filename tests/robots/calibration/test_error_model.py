@@ -4,8 +4,9 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from robots.calibration.error_model import NUM_PLACED, SCALES, ZEROS, ErrorModel
+from robots.calibration.error_model import NUM_PLACED, ZEROS, ErrorModel
 from robots.calibration.prior import parameter_sizes
+from robots.description.joint_errors import KINDS
 from robots.description.model import load_robot
 from robots.kinematics.forward import Kinematics
 from robots.pose import pose_error
@@ -18,7 +19,7 @@ def errors(model: ErrorModel, seed: int) -> np.ndarray:
 
 @pytest.mark.parametrize("name", ["irb1200", "irb140", "kr16", "kr210", "puma560", "ur10"])
 def test_the_pose_is_the_product_of_placements_displacements_and_turns(name: str):
-    model, robot = ErrorModel(load_robot(name), has_scales=True), MatrixRobot(name)
+    model, robot = ErrorModel(load_robot(name), ["scale"]), MatrixRobot(name)
     x = errors(model, 0)
     moves = x[:NUM_PLACED].reshape(8, 6)
     turned = Rotation.from_rotvec(moves[:, 3:]), np.zeros((8, 3))
@@ -27,14 +28,14 @@ def test_the_pose_is_the_product_of_placements_displacements_and_turns(name: str
     )
     zeros = homogeneous(Rotation.from_rotvec(x[ZEROS][:, None] * robot.axes), np.zeros((6, 3)))
     robot.placements[1:7] = robot.placements[1:7] @ zeros
-    robot.scales = 1.0 + x[SCALES]
+    robot.scales = 1.0 + x[-6:]
     q = robot.configurations(50, np.random.default_rng(1))
     np.testing.assert_allclose(model.forward(q, x), robot.forward(q), atol=1e-13)
 
 
 def test_the_regressor_is_the_derivative_of_the_pose():
     """Central differences of 1e-5 leave 1e-10 of curvature and 1e-11 of rounding."""
-    model = ErrorModel(load_robot("irb1200"), has_scales=True)
+    model = ErrorModel(load_robot("irb1200"), tuple(KINDS))
     x, h = errors(model, 2), 1e-5
     q = np.random.default_rng(3).uniform(-2.0, 2.0, (10, 6))
     Theta = model.forward_and_regressor(q, x)[1]

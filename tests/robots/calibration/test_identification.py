@@ -12,6 +12,7 @@ from robots.calibration.identified import Identified
 from robots.calibration.measurements import SOURCE_NOISE, Measurements
 from robots.calibration.reduction import ReducibleModel
 from robots.description.model import RobotModel, load_robot
+from robots.dynamics.compliant_kinematics import controller_kinematics
 from robots.kinematics.forward import Kinematics
 from tests.robots.calibration.matrix_robot import MatrixRobot, homogeneous
 
@@ -99,13 +100,13 @@ def test_scales_of_encoders_are_found_where_they_are_asked_for():
     true = drawn.displaced(rng)
     true.scales = 1.0 + rng.uniform(-1e-3, 1e-3, 6)
     q = drawn.configurations(75, rng)
-    result = identify(nominal, measured(true, q), IdentificationConfig(scales=True))
+    result = identify(nominal, measured(true, q), IdentificationConfig(joint_errors=("scale",)))
     fresh = drawn.configurations(200, rng)
     X_WE = result.model.forward(fresh, result.x)
     assert np.abs(X_WE - true.forward(fresh)).max() <= 1e-12
     assert result.rank == 36
-    with pytest.raises(ValueError, match="cannot hold scales of encoders"):
-        result.calibrated_robot()
+    calibrated = controller_kinematics(result.calibrated_robot())
+    assert np.abs(calibrated.forward(fresh) - true.forward(fresh)).max() <= 1e-12
 
 
 def test_the_named_values_are_the_true_robot_and_as_exact_as_it():
