@@ -163,7 +163,7 @@ def compare_command(
         check(prepared, chosen)
         where = executor(scheduler, jobs)
         print_note(human, prepared.note)
-        is_guided = prepared.scenario.station.kind == "egm"
+        is_guided = prepared.scenario.station.kind != "simulated"
         if is_guided:
             ask_before_moving(human, prepared, with_cell or yes)
     guided: Guided | None = None
@@ -218,7 +218,7 @@ def run_command(
             calibrating_law([law])
         check(prepared, [law])
         print_note(console, prepared.note)
-        is_guided = prepared.scenario.station.kind == "egm"
+        is_guided = prepared.scenario.station.kind != "simulated"
         if is_guided:
             if meshcat or realtime is not None:
                 raise ValueError("--meshcat and --realtime belong to a simulated station")

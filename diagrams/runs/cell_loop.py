@@ -197,7 +197,7 @@ class CellLoop:
         now, joints = self.cell.time, self.cell.joints
         stamp = self.cell.stamp
         report = self.controller.report(stamp, joints.position, self.cell.planned, joints.effort)
-        for delivery in self._links["to client"].pass_on(now, report):
+        for delivery in self._links["to client"].pass_on(now, report) if report is not None else ():
             channel = self._stranger if delivery.is_foreign else self._channel
             self._post(
                 delivery.time,

@@ -150,6 +150,10 @@ def _contradiction(scenario: Scenario) -> tuple[list[str | int], str] | None:
             FEEDFORWARDS.find(kind)
     except ValueError as error:
         return ["servo", "feedforward", "kind"], str(error)
+    link = scenario.station.link.kind
+    for name, value in (("kind", scenario.station.kind), ("interface", scenario.station.interface)):
+        if value in LINK_NAMES and value != link:
+            return ["station", name], f"station.{name}={value} contradicts station.link, which is {link}"
     try:
         scenario.station.link.check()
     except ValueError as error:

@@ -24,7 +24,9 @@ AnyScenarioOption = Annotated[
 StationOption = Annotated[
     str | None,
     typer.Option(
-        "--station", metavar="NAME", help="simulated, or egm for a controller and a camera on the wire."
+        "--station",
+        metavar="NAME",
+        help="simulated, or egm or rsi for a controller of ABB or KUKA and a camera on the wire.",
     ),
 ]
 WithCellOption = Annotated[

@@ -1,4 +1,4 @@
-"""``truetip cell``: a robot cell that exists only in this process, for any client of EGM and Qualisys."""
+"""``truetip cell``: a robot cell that exists only in this process, for clients of robot and camera."""
 
 import json
 import os
@@ -60,7 +60,7 @@ def cell_command(
         typer.Option("--until-eof", help="Stop when standard input closes: with whoever started it."),
     ] = False,
 ) -> None:
-    """Run a virtual robot cell in real time: a controller under EGM and a camera server."""
+    """Run a virtual robot cell in real time: a controller under EGM or RSI, and a camera server."""
     human = Console(stderr=announce)
     with refusing(ValueError, OSError), ExitStack() as stack:
         if duration is not None and not duration > 0.0:
@@ -89,7 +89,7 @@ def cell_command(
             sys.stdout.write(json.dumps({"camera_port": camera.port}) + "\n")
             sys.stdout.flush()
         human.print(
-            f"{prepared.nominal_robot.name}: speaks EGM to UDP {link.address}:{link.port} every "
+            f"{prepared.nominal_robot.name}: speaks {link.title} to UDP {link.address}:{link.port} every "
             f"{1e3 * prepared.scenario.station.period:g} ms; its camera listens on {camera.place}"
         )
         if duration is None and not announce:

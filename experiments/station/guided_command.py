@@ -12,6 +12,7 @@ from rich.console import Console
 
 from diagrams.record.log import RunLog
 from diagrams.runs.real_time import RealTimeRecord
+from diagrams.scenario.scenario import load_scenario
 from experiments.cli.console import BROKEN_OFF, count, progress_bar, refusing
 from experiments.cli.ending import asking
 from experiments.cli.prepare import Prepared
@@ -20,7 +21,10 @@ from experiments.cli.workers import SimulationError
 from experiments.report.files import write_json
 from experiments.report.style import law_file_name
 from experiments.station.guided import compare_on_station
+from systems.link.makers import LINK_NAMES
 from systems.link.udp_channel import ChannelError, is_loopback
+
+_CELLS = {"rsi": "cell-kuka"}  # the shipped scenario of a link, where it is not ``cell``
 
 
 def on_station(
@@ -29,12 +33,13 @@ def on_station(
     """The scenario and its settings with the options that choose a station.
 
     Raises:
-        ValueError: if a virtual cell is wanted for a simulated station.
+        ValueError: if a virtual cell is wanted for a simulated station, or the scenario is refused.
     """
-    if with_cell and station not in (None, "egm"):
-        raise ValueError(f"--with-cell needs --station egm, got '{station}'")
-    kind = "egm" if with_cell else station
-    name = scenario or ("cell" if kind == "egm" else "misaligned")
+    if with_cell and station == "simulated":
+        raise ValueError(f"--with-cell needs --station {' or '.join(LINK_NAMES)}, got '{station}'")
+    is_guided = with_cell or station in LINK_NAMES
+    name = scenario or (_CELLS.get(station or "", "cell") if is_guided else "misaligned")
+    kind = station or (load_scenario(name, settings).station.link.kind if with_cell else None)
     return name, [*settings, *([f"station.kind={kind}"] if kind else [])]
 
 

@@ -11,7 +11,7 @@ from rich import box
 from rich.table import Table
 
 from diagrams.runs.latency import LatencyConfig, LatencyRecord, measure_latency
-from diagrams.scenario.scenario import Scenario
+from diagrams.scenario.scenario import Scenario, load_scenario
 from experiments.cli.console import print_files, progress_bar, refusing
 from experiments.cli.json_output import human_console, json_output
 from experiments.cli.options import (
@@ -49,7 +49,8 @@ def latency_command(
     """Measure the delays and clocks of a real station by moving one joint back and forth."""
     human = human_console(json_file)
     with json_output(json_file) as output, refusing(ValueError, OSError), ExitStack() as stack:
-        name, changes = on_station(scenario, list(settings or []), "egm", with_cell)
+        link = load_scenario(scenario, settings).station.link.kind
+        name, changes = on_station(scenario, list(settings or []), link, with_cell)
         prepared = prepare(name, changes)
         ask_before_moving(human, prepared, with_cell or yes)
         page = stack.enter_context(staged_file(report, *PAGE))

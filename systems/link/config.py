@@ -17,6 +17,7 @@ class LinkConfig:
     """Addresses, and what to do when the other end falls silent; a maker's class extends it."""
 
     kind: ClassVar[str]  # what scenarios and the command line call it
+    title: ClassVar[str]  # what people call it
     takes_torque: ClassVar[bool] = False  # whether commands may have a torque feedforward
 
     address: str = "127.0.0.1"  # of this machine, to listen on for the controller

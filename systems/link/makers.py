@@ -5,8 +5,9 @@ from typing import ClassVar, get_args
 
 from systems.link.abb.link import EgmSettings
 from systems.link.config import LinkConfig
+from systems.link.kuka.link import RsiSettings
 
-__all__ = ["LINK_NAMES", "AbbEgm", "RobotLinkConfig", "default_link"]
+__all__ = ["LINK_NAMES", "AbbEgm", "KukaRsi", "RobotLinkConfig", "default_link"]
 
 
 @dataclass
@@ -14,10 +15,19 @@ class AbbEgm(EgmSettings, LinkConfig):
     """An ABB controller under Externally Guided Motion."""
 
     kind: ClassVar[str] = "egm"
+    title: ClassVar[str] = "EGM"
 
 
-RobotLinkConfig = AbbEgm  # a further maker is one more member: AbbEgm | Another
-LINK_NAMES = tuple(link.kind for link in get_args(RobotLinkConfig) or (RobotLinkConfig,))
+@dataclass
+class KukaRsi(RsiSettings, LinkConfig):
+    """A KUKA controller under the Robot Sensor Interface."""
+
+    kind: ClassVar[str] = "rsi"
+    title: ClassVar[str] = "RSI"
+
+
+RobotLinkConfig = AbbEgm | KukaRsi  # a further maker is one more member
+LINK_NAMES = tuple(link.kind for link in get_args(RobotLinkConfig))
 
 
 def default_link() -> RobotLinkConfig:

@@ -172,8 +172,10 @@ class VirtualController(Protocol):
         """Moves the program on by one cycle."""
         ...
 
-    def report(self, time: float, position: np.ndarray, planned: np.ndarray, torque: np.ndarray) -> bytes:
-        """The message of this cycle."""
+    def report(
+        self, time: float, position: np.ndarray, planned: np.ndarray, torque: np.ndarray
+    ) -> bytes | None:
+        """The message of this cycle; None if it sends none."""
         ...
 
     def signals(

@@ -21,13 +21,14 @@ from systems.link.abb.schema import (
     EgmSensorPathCorr,
     measured_force,
 )
+from systems.link.session import TelegramError
 
 _LARGEST_ANGLE = 3600.0  # deg; no joint is ten turns from its zero
 _LARGEST = 1e6  # deg, mm and per s: no robot is so large or so fast, and squares of it are numbers
 _LARGEST_COUNT = 2**32
 
 
-class EgmError(ValueError):
+class EgmError(TelegramError):
     """A datagram that is not an EGM message, or has impossible content."""
 
 

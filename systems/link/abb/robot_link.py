@@ -5,8 +5,8 @@ import numpy as np
 from robots.description.model import NUM_JOINTS
 from systems.link.abb.client import EgmClient
 from systems.link.abb.messages import Command, Mode, RobotReport
-from systems.link.abb.session import Link
 from systems.link.abb.signal_client import SignalClient
+from systems.link.session import Link
 
 _SIGNAL_AGE = 0.1  # s, beyond which signals and earlier messages say nothing of the present motion
 

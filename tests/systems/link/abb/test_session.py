@@ -9,7 +9,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from systems.link.abb.messages import Command, Mode, decode_command
-from systems.link.abb.session import EgmSession, Link
+from systems.link.abb.session import EgmSession
+from systems.link.session import Link
 from tests.systems.link.abb.reports import ELSEWHERE, HERE, PERIOD, SPEED, report
 
 HOLD = Command(np.zeros(6), np.zeros(6))

@@ -1,0 +1,163 @@
+"""A KUKA controller under RSI, as any robot's link."""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from robots.description.model import NUM_JOINTS
+from systems.link.client import LinkClient
+from systems.link.kuka.telegrams import RobotTelegram, RsiError, SensorTelegram, read_robot, write_sensor
+from systems.link.session import Link
+
+_OLD = 0.1  # s, beyond which an earlier message says nothing of the present motion
+_WRAP = 2**32
+
+
+class RsiReport(NamedTuple):
+    """What a telegram says, as `systems.link.protocols.RobotReport`; a controller that sends follows."""
+
+    seqno: int
+    time: float  # s
+    position: np.ndarray  # (6,) rad
+    telegram: RobotTelegram
+    is_ready: bool = True
+
+
+class RsiCommand(NamedTuple):
+    """Where the joints shall be."""
+
+    position: np.ndarray  # (6,) rad
+    velocity: np.ndarray  # (6,) rad/s
+    is_speed_only: bool = False
+
+
+class RsiCodec:
+    """Fits `systems.link.session.Codec`.
+
+    A relative correction is worked out from the set-point of the telegram that it answers and the corrections
+    that this set-point cannot contain yet. So replies that were lost are made up for, and never faster than
+    the axes may turn.
+    """
+
+    def __init__(
+        self, largest_speed: np.ndarray, cycle: float, is_relative: bool, name: str, behind: int = 1
+    ) -> None:
+        """Takes what the controller is set up for.
+
+        Args:
+            largest_speed: of the joints in rad/s, (6,).
+            cycle: in s.
+            is_relative: whether corrections add up on the controller.
+            name: its SENTYPE.
+            behind: how many replies before a telegram its set-point does not contain.
+        """
+        self._largest_step, self._cycle = np.asarray(largest_speed) * cycle, cycle
+        self._is_relative, self._name, self._behind = is_relative, name, behind
+        self._sent: dict[int, np.ndarray] = {}  # (6,) rad, by the number of the telegram that was answered
+
+    def decode(self, data: bytes) -> RsiReport:
+        """The report in a datagram. Raises RsiError if there is none."""
+        telegram = read_robot(data)
+        if not self._is_relative and telegram.correction is None:
+            raise RsiError("RSI: absolute corrections need AxisCorrMon in the telegram")
+        number = round(1e-3 * telegram.ipoc / self._cycle) % _WRAP
+        return RsiReport(number, 1e-3 * telegram.ipoc, telegram.measured, telegram)
+
+    def encode(self, command: RsiCommand, report: RsiReport, number: int, now: float) -> bytes:
+        """The correction that leads to a command. Raises RsiError if it is not finite."""
+        telegram, last = report.telegram, report.seqno
+        self._sent = {each: step for each, step in self._sent.items() if 0 < last - each <= self._behind}
+        setpoint = telegram.setpoint + sum(self._sent.values())
+        step = command.velocity * self._cycle if command.is_speed_only else command.position - setpoint
+        step = np.minimum(np.maximum(step, -self._largest_step), self._largest_step)
+        correction = step
+        if not self._is_relative and telegram.correction is not None:
+            correction = telegram.correction + (setpoint - telegram.setpoint) + step
+        data = write_sensor(SensorTelegram(telegram.ipoc, axes=correction), self._name)
+        self._sent[last] = step
+        return data
+
+    def at(self, report: RsiReport) -> RsiCommand:
+        """To stay at the set-point of a report."""
+        return RsiCommand(report.telegram.setpoint, np.zeros(NUM_JOINTS))
+
+    def standing(self, safe: RsiCommand, asked: RsiCommand) -> RsiCommand:
+        """To hold the position of another command; where only speeds are known, no speed."""
+        return RsiCommand(safe.position, np.zeros(NUM_JOINTS), safe.is_speed_only)
+
+
+class KukaRobotLink:
+    """Fits `systems.link.protocols.RobotLink`."""
+
+    def __init__(self, client: LinkClient[RsiReport]) -> None:
+        """Takes over a socket that is open."""
+        self._client = client
+        self._last: RsiReport | None = None
+        self.velocity, self.effort = np.zeros(NUM_JOINTS), np.zeros(NUM_JOINTS)
+
+    @property
+    def arrived(self) -> float:
+        """Steady time at which the newest report came, in s."""
+        return self._client.arrived
+
+    @property
+    def place(self) -> str:
+        """Where the controller is waited for."""
+        address, port = self._client.channel.address
+        return f"UDP {address}:{port}"
+
+    @property
+    def ports(self) -> tuple[int, int]:
+        """Where reports come in; there are no test signals."""
+        return self._client.channel.address[1], 0
+
+    @property
+    def epoch(self) -> int:
+        """Grows whenever commands must start anew."""
+        return self._client.session.epoch
+
+    @property
+    def heard(self) -> float:
+        """Steady time at which anything last came from the controller, in s."""
+        return self._client.session.heard
+
+    @property
+    def trouble(self) -> str:
+        """Why the controller's newest messages are refused, or commands had to start anew; else empty."""
+        return self._client.session.trouble
+
+    def why_not_ready(self) -> str:
+        """What keeps the robot from following commands."""
+        if self._client.session.link is Link.WAITING:
+            return "no telegram of a controller came in"
+        return "the controller does not run RSI"
+
+    def poll(self, timeout: float = 0.0) -> RsiReport | None:
+        """The newest report that has come, waiting for at most ``timeout`` in s."""
+        report = self._client.poll(timeout)
+        if report is not None:
+            last, self._last = self._last, report
+            passed = report.time - last.time if last else 0.0
+            moved = report.position - last.position if last else np.zeros(NUM_JOINTS)
+            self.velocity = moved / passed if 0.0 < passed < _OLD else np.zeros(NUM_JOINTS)
+        return report
+
+    def poll_aside(self) -> None:
+        """Nothing comes beside the telegrams."""
+
+    def send(self, position: np.ndarray, velocity: np.ndarray, is_speed_only: bool = False) -> bool:
+        """Answers the newest report so that the joints come to positions (rad), or keep speeds (rad/s)."""
+        return self._client.answer(RsiCommand(position, velocity, is_speed_only))
+
+    def stop(self, position: np.ndarray, velocity: np.ndarray, is_speed_only: bool = False) -> bool:
+        """Answers the newest message on the way to rest, also one that was refused."""
+        return self._client.answer_stopping(RsiCommand(position, velocity, is_speed_only))
+
+    def warm_up(self) -> None:
+        """Reads the last report and writes the last command once more."""
+        self._client.warm_up()
+
+    def counters(self) -> dict[str, int]:
+        """What has come and gone, by name; ``late_replies`` as the controller counts them."""
+        late = 0 if self._last is None else self._last.telegram.late
+        return self._client.session.counters.as_dict() | {"late_replies": late}
