@@ -17,6 +17,7 @@ from systems.link.abb.messages import Command, Mode, RobotReport
 from systems.link.abb.robot_link import AbbRobotLink
 from systems.link.abb.session import EgmSession
 from systems.link.clock import ClockQuality
+from systems.link.protocols import RobotLink
 from systems.samples import PoseSample
 
 LOOK = 2e-5  # s that it takes to look for a message
@@ -31,7 +32,7 @@ class Lockstep:
         robot, config = load_robot(scenario.robot), scenario.station
         self.cell = VirtualCell(scenario, robot)
         self.controller = config.link.virtual_controller(robot)
-        self.session = EgmSession(robot.speed, config.link.break_after, period=config.period)
+        self.session = self.new_session(scenario)
         self.channel = SimpleNamespace(address=("127.0.0.1", 6510))
         self.time = self.arrived = 0.0
         self.faults = config.faults
@@ -44,6 +45,12 @@ class Lockstep:
         self._frames: list[tuple[float, PoseSample]] = []
         self._is_stopped = False
         self._report()
+
+    def new_session(self, scenario: Scenario) -> Any:
+        """Of the maker whose robot it is."""
+        config = scenario.station
+        speed = load_robot(scenario.robot).speed
+        return EgmSession(speed, config.link.break_after, period=config.period)
 
     def now(self) -> float:
         """The one clock of client and cell in s."""
@@ -67,10 +74,19 @@ class Lockstep:
                 newest, self.arrived = report, self.time
         return newest
 
+    def answer(self, command: Any) -> bool:
+        """As `systems.link.client.LinkClient.answer`."""
+        data = self.session.answer(command, self.time)
+        return data is not None and self._put_on_the_way(data)
+
+    def answer_stopping(self, command: Any) -> bool:
+        """As `systems.link.client.LinkClient.answer_stopping`."""
+        data = self.session.answer_stopping(command, self.time)
+        return data is not None and self._put_on_the_way(data)
+
     def reply(self, mode: Mode, command: Command) -> bool:
         """As `systems.link.abb.client.EgmClient.reply`."""
-        data = self.session.reply(mode, command, self.time)
-        return data is not None and self._put_on_the_way(data)
+        return self.answer((mode, command))
 
     def _put_on_the_way(self, data: bytes) -> bool:
         self.sent.append((self.time, data))
@@ -81,8 +97,7 @@ class Lockstep:
 
     def stop(self, mode: Mode, command: Command) -> bool:
         """As `systems.link.abb.client.EgmClient.stop`."""
-        data = self.session.stop(mode, command, self.time)
-        return data is not None and self._put_on_the_way(data)
+        return self.answer_stopping((mode, command))
 
     def warm_up(self) -> None:
         """As `systems.link.abb.client.EgmClient.warm_up`."""
@@ -100,7 +115,7 @@ class Lockstep:
             self._cycle()
 
     @property
-    def link(self) -> AbbRobotLink:
+    def link(self) -> RobotLink:
         """The client's end as a run takes it."""
         return AbbRobotLink(self)  # pyright: ignore[reportArgumentType]
 
@@ -131,7 +146,7 @@ class Lockstep:
     def _report(self) -> None:
         joints = self.cell.joints
         data = self.controller.report(self.cell.stamp, joints.position, self.cell.planned, joints.effort)
-        for delivery in self.to_client.pass_on(self.cell.time, data):
+        for delivery in self.to_client.pass_on(self.cell.time, data) if data is not None else ():
             sender = STRANGER if delivery.is_foreign else CELL
             heapq.heappush(self._on_the_way, (delivery.time, next(self._order), delivery.data, sender))
 

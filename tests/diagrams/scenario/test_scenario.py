@@ -29,6 +29,7 @@ def written(folder: Path, text: str, name: str = "mine.yaml") -> str:
 def test_the_shipped_scenarios_load_by_name_and_say_what_they_are():
     assert shipped_scenarios() == [
         "cell",
+        "cell-kuka",
         "dead-time",
         "everything",
         "everything-realistic",

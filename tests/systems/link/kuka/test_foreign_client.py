@@ -1,4 +1,4 @@
-"""A client of RSI that others wrote moves the virtual controller, with the configuration of the documentation."""
+"""A client of RSI that others wrote moves the virtual controller, configured as the documentation says."""
 
 import re
 import socket
