@@ -31,7 +31,7 @@ class Lockstep:
     def __init__(self, scenario: Scenario) -> None:
         robot, config = load_robot(scenario.robot), scenario.station
         self.cell = VirtualCell(scenario, robot)
-        self.controller = config.link.virtual_controller(robot)
+        self.controller: Any = config.link.virtual_controller(robot)  # of any maker
         self.session = self.new_session(scenario)
         self.channel = SimpleNamespace(address=("127.0.0.1", 6510))
         self.time = self.arrived = 0.0

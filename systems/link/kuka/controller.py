@@ -66,27 +66,30 @@ class RsiController:
         self._state = _State.ENDED if for_good else _State.PAUSED
         self._reference = _STANDING
 
-    def receive(self, data: bytes, time: float, position: np.ndarray) -> None:
+    def receive(self, data: bytes, time: float, position: np.ndarray) -> bool:
         """Takes a datagram of a sensor; what it cannot follow is counted and ignored.
 
         Args:
             data: the datagram.
             time: now.
             position: planned joint positions (6,) in rad.
+
+        Returns:
+            Whether it is followed.
         """
         try:
             telegram = read_sensor(data)
         except RsiError:
             self.undecodable += 1
-            return
+            return False
         if self._state is not _State.RUNNING or self._base is None or telegram.ipoc != self._asked:
             self.ignored += 1
-            return
+            return False
         if self._answered:
-            return  # the same telegram twice
+            return True  # the same telegram twice
         self._answered = self._has_answer = True
         self._in_a_row = 0
-        self._correct(telegram, time)
+        return self._correct(telegram, time)
 
     def cycle(self, time: float, planned: np.ndarray) -> None:
         """Moves the program on by one cycle.
@@ -140,7 +143,7 @@ class RsiController:
         names = ("restarts", "undecodable", "late", "ignored", "beyond")
         return {name: getattr(self, name) for name in names}
 
-    def _correct(self, telegram: SensorTelegram, time: float) -> None:
+    def _correct(self, telegram: SensorTelegram, time: float) -> bool:
         is_relative = self._config.correction == "relative"
         axes, pose = self._axes, self._pose
         if telegram.axes is not None:
@@ -152,14 +155,15 @@ class RsiController:
         if angles > largest or 1e3 * np.abs(pose[:3]).max() > self._config.largest_correction_mm:
             self.beyond += 1
             self.stop(time)
-            return
+            return False
         try:
             reference = self._corrected(pose) + axes
         except (UnreachableError, JointLimitError):
             self.beyond += 1
             self.stop(time)
-            return
+            return False
         self._axes, self._pose, self._reference = axes, pose, reference
+        return True
 
     def _corrected(self, pose: np.ndarray) -> np.ndarray:
         """Joint positions (6,) with the pose of the program displaced and turned in the base's axes."""

@@ -34,6 +34,7 @@ def test_rsipi_turns_the_axes(tmp_path):
             time = 100.0 + CYCLE * cycle
             controller.cycle(time, planned)
             asked, coming = coming, controller.report(time, planned, planned, np.zeros(6))
+            assert asked is not None
             cell.sendto(asked, ("127.0.0.1", port))
             try:
                 controller.receive(cell.recv(4096), time, planned)

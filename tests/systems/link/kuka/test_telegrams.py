@@ -26,6 +26,8 @@ ROBOT = RobotTelegram(4_208_163_634, np.zeros(6), np.zeros(6), np.zeros(6), 0, n
 def test_what_a_sensor_writes_is_read_again(ipoc, axes, pose):
     telegram = read_sensor(write_sensor(SensorTelegram(ipoc, axes, pose)))
     assert telegram.ipoc == ipoc
+    assert telegram.axes is not None
+    assert telegram.pose is not None
     np.testing.assert_allclose(telegram.axes, axes, atol=1e-11)
     np.testing.assert_allclose(telegram.pose, pose, atol=1e-11)
 
