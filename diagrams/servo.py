@@ -5,6 +5,7 @@ from typing import Any
 from pydrake.systems.framework import Context, Diagram, DiagramBuilder, OutputPort, System
 from pydrake.systems.primitives import Adder, ConstantVectorSource
 
+from diagrams.record.coverage import Prediction
 from diagrams.scenario.controller_model import controller_model
 from diagrams.scenario.scenario import Scenario, ScenarioError
 from diagrams.tick_clock import TickClock
@@ -207,6 +208,12 @@ def learnt(servo: Servo, root_context: Context) -> dict[str, Any] | None:
     """What a law that learns has found out until now, as its ``learnt(context)`` says; None for others."""
     report = getattr(servo.law, "learnt", None)
     return None if report is None else dict(report(servo.law.GetMyContextFromRoot(root_context)))
+
+
+def predicted_tip(servo: Servo, root_context: Context) -> Prediction | None:
+    """Where a law that predicts it says that the tip was last, see its ``predicted_tip(context)``."""
+    predict = getattr(servo.law, "predicted_tip", None)
+    return None if predict is None else predict(servo.law.GetMyContextFromRoot(root_context))
 
 
 def calibrated(servo: Servo, root_context: Context, of: str) -> RobotModel | None:

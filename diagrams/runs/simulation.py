@@ -9,10 +9,11 @@ from pydrake.systems.analysis import Simulator
 from pydrake.systems.framework import DiagramBuilder, System
 
 from diagrams.integration import Integration
+from diagrams.record.coverage import Prediction, coverage
 from diagrams.record.log import GuardEvent, RunLog
 from diagrams.record.packed_log import PackedLog
 from diagrams.scenario.scenario import Scenario, ScenarioError
-from diagrams.servo import Servo, calibrated, law_name, learnt
+from diagrams.servo import Servo, calibrated, law_name, learnt, predicted_tip
 from diagrams.station import SimulatedStation
 from robots.description.model import RobotModel, load_robot
 from robots.dynamics.newton_inverse import inverse_kinematics
@@ -104,6 +105,7 @@ class Experiment:
         self.integration = Integration(scenario.integrator, scenario.station.period, rate, changes)
         self.integration.initialize(self.simulator)
         self._wall_time = 0.0
+        self._predictions: list[Prediction] = []  # of the tip, one a chunk, by a law that says where it is
 
     def advance(self, until: float | None = None, progress: Callable[[float], None] | None = None) -> None:
         """Advances to a time in s, or to the end of the path."""
@@ -126,6 +128,9 @@ class Experiment:
         while self.context.get_time() < end:
             done += ticks
             self.integration.advance(self.simulator, min(end, done * self.scenario.station.period))
+            prediction = predicted_tip(self.servo, self.context)
+            if prediction is not None:
+                self._predictions.append(prediction)
             if progress:
                 progress(self.context.get_time() / end)
 
@@ -134,6 +139,10 @@ class Experiment:
         times, data = self._log.read(self.context)
         record = self.station.record(times, data)
         counts = np.round(data["guard_status"]).astype(int)
+        found = learnt(self.servo, self.context)
+        if found is not None and self._predictions:
+            on_path = [row for row in self._predictions if row[0] >= self.path.path_start]
+            found["coverage"] = coverage(on_path, record.time, record.X_WE_true)
         return RunLog(
             law=self.law,
             seed=self.seed,
@@ -153,7 +162,7 @@ class Experiment:
             dwell_start=self.path.dwell_start,
             path_end=self.path.duration,
             lap_starts=tuple(self.path.lap_starts.tolist()) if len(self.path.lap_starts) > 1 else (),
-            learnt=learnt(self.servo, self.context),
+            learnt=found,
             calibrated=calibrated(self.servo, self.context, self.scenario.robot),
             tick_seconds=self.servo.tick_clock.seconds,
             wall_time=self._wall_time,

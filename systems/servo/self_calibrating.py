@@ -163,6 +163,25 @@ class SelfCalibrating(LeafSystem):
             "events": self._events(memory),
         }
 
+    def predicted_tip(self, context: Context) -> tuple[float, np.ndarray, np.ndarray] | None:
+        """Where the tip was at the newest exposure as far as is known now, whatever the camera saw.
+
+        Returns:
+            The time of the exposure in s, as the joints' clock has it; the pose (4, 4); and its covariance,
+            rotation (rad^2) first, (6, 6). None if there is no sample or no plan for it.
+        """
+        sample: PoseSample = self._camera.Eval(context)
+        memory = self._layout.view(np.array(context.get_discrete_state(self._memory).value()))
+        if not sample.valid or not memory.planner.started[0]:
+            return None
+        pair = self._pair(memory, sample)
+        if pair is None:
+            return None
+        time = sample.time + self.estimator.clock_offset(memory.estimator, sample.time)
+        still = pair._replace(twist=np.zeros(6))  # of the joints' clock alone
+        X_WE = self.estimator.predict(memory.estimator, still).X_WE[0]
+        return time, X_WE, self.estimator.tip_covariance(memory.estimator, still)
+
     def calibrated_robot(self, context: Context, of: str) -> RobotModel:
         """The robot as it is known now, see `systems.estimation.findings.calibrated_robot`."""
         return calibrated_robot(self.estimator, self.memory(context).estimator, of)

@@ -37,6 +37,7 @@ def test_the_tip_comes_onto_the_path_before_it_begins():
     assert log.learnt is not None
     assert log.learnt["clock_offset_s"] == pytest.approx(3e-3, abs=0.2e-3)
     assert log.learnt["dead_time_s"] == pytest.approx(7e-3, abs=0.2e-3)
+    assert log.learnt["coverage"]["share"] >= 0.8  # 0.95 of eight, where one may be outside
 
 
 def test_the_same_seed_gives_the_same_commands():
