@@ -56,9 +56,14 @@ class PathAhead:
         """
         return self.path.sample(t)
 
-    def moment(self, t: float) -> PathMoment:
-        """Where the tool shall be at a time of the station in s; quick at ticks and a preview after them."""
-        for phase in (0.0, self.preview):
+    def moment(self, t: float, ahead: float = 0.0) -> PathMoment:
+        """Where the tool shall be at a time of the station in s; quick at ticks and a preview after them.
+
+        Args:
+            t: s.
+            ahead: s, another time after ticks at which it is asked for long.
+        """
+        for phase in (0.0, self.preview, ahead):
             tick = round((t - phase) / self.period)
             if abs(t - phase - tick * self.period) < _EPSILON:
                 return self._block(phase, tick // _BLOCK)[tick % _BLOCK]

@@ -239,7 +239,9 @@ class SelfCalibrating(LeafSystem):
         """Plans for the instant when a command of now acts, and says what to command."""
         instant = time + self._delay.step(memory.delay, float(memory.planned[0]))
         path_start = reference.path.path_start
-        moment = reference.moment(instant)
+        delay = memory.delay
+        is_steady = delay.delay[0] == delay.target[0]
+        moment = reference.moment(instant, float(delay.delay[0]) if is_steady else 0.0)
         X_WE, V_WE = np.array([*moment.X_WE, (0.0, 0.0, 0.0, 1.0)]), np.array(moment.V_WE)
         if not memory.planner.started[0]:
             J = self._planner.start(memory.planner, memory.lead.x, position, X_WE)

@@ -92,6 +92,23 @@ def test_what_is_asked_at_one_time_is_the_path(time):
         np.testing.assert_allclose(actual, expected[:3] if expected.ndim == 2 else expected, atol=1e-14)
 
 
+def test_another_time_after_ticks_is_as_quick(monkeypatch):
+    asked = []
+    sample = CartesianPath.sample
+    monkeypatch.setattr(CartesianPath, "sample", lambda path, time: asked.append(time) or sample(path, time))
+    reference, _, context = in_diagram(ReferenceConfig())
+    path = reference.GetOutputPort("reference").Eval(context)
+    asked.clear()
+    delay = 0.0353
+    moments = [path.moment(0.004 * tick + delay, delay) for tick in range(100)]
+    assert len(asked) == 1
+    np.testing.assert_allclose(
+        [moment.X_WE for moment in moments],
+        reference.path.sample(0.004 * np.arange(100) + delay)[0][:, :3],
+        atol=1e-14,
+    )
+
+
 def test_refuses_a_path_that_does_not_exist():
     with pytest.raises(ValueError, match=r"path 'rectangle' needs at least one waypoint"):
         Reference(ReferenceConfig(Rectangle([])))
