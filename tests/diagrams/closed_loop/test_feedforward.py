@@ -102,7 +102,9 @@ def test_on_the_test_path_an_elastic_structure_is_left_by_hundredths_of_a_millim
     assert max(true("position_level", "servo.feedforward.stiffness_error=0.2")["static_mm"]) <= 0.02
 
 
-@pytest.mark.parametrize("law", ["numerical_ik", "pbvs", "position_level"])
+@pytest.mark.parametrize(
+    "law", ["numerical_ik", "pbvs", pytest.param("position_level", marks=pytest.mark.slow)]
+)
 def test_a_law_with_an_exact_model_has_little_left_to_do(law: str):
     """Also PBVS on drives that follow positions: its own start from where the motors are."""
     assert errors("flexible_joint", law)["max_norm_mm"] < 0.1 * errors("none", law)["max_norm_mm"]
@@ -116,7 +118,7 @@ def test_torque_has_a_port_on_both_sides_only_where_it_is_fed_forward():
             assert getattr(diagram, has)("torque_feedforward") == (kind != "none")
 
 
-@pytest.mark.parametrize("dead_time", [0.0, 0.002, 0.02])
+@pytest.mark.parametrize("dead_time", [pytest.param(0.0, marks=pytest.mark.slow), 0.002, 0.02])
 def test_torque_arrives_as_late_as_the_positions_that_it_belongs_to(dead_time: float):
     """With the whole delay previewed, a model that is exact leaves as little as without a delay.
 

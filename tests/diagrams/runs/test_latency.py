@@ -27,7 +27,10 @@ def measured(*settings: str, **config) -> Latency:
     return evaluate(record)
 
 
-@pytest.mark.parametrize("dead_time", [0.012, 0.052, 0.14])
+@pytest.mark.parametrize(
+    "dead_time",
+    [pytest.param(0.012, marks=pytest.mark.slow), 0.052, pytest.param(0.14, marks=pytest.mark.slow)],
+)
 def test_a_dead_time_is_found_to_a_millisecond(dead_time: float):
     found = measured(f"station.drive.dead_time={dead_time}", duration=20.0)
     assert found.dead_time == pytest.approx(dead_time, abs=5e-4)

@@ -41,7 +41,15 @@ def largest_and_static(log, e: np.ndarray) -> tuple[float, float]:
     return 1e3 * largest, 1e3 * float(np.linalg.norm(e[rest, 3:].mean(axis=0)))
 
 
-@pytest.mark.parametrize("law", ["numerical_ik", "pbvs", "position_level", "open_loop"])
+@pytest.mark.parametrize(
+    "law",
+    [
+        "numerical_ik",
+        "pbvs",
+        pytest.param("position_level", marks=pytest.mark.slow),
+        pytest.param("open_loop", marks=pytest.mark.slow),
+    ],
+)
 def test_over_the_wire_a_law_is_as_accurate_as_in_simulation(law: str):
     """Same delays, other noise: the largest error agrees to 2 %, at rest only noise is left."""
     record, e, _ = guided(quick(), law)
@@ -105,8 +113,15 @@ def test_when_the_controller_goes_the_run_ends_and_the_robot_stops_smoothly(faul
     assert np.abs(acceleration[SETTLED:]).max() < HARSH
 
 
-@pytest.mark.parametrize("fault", ["stall_at=5", "stop_at=5"])
-@pytest.mark.parametrize("law", ["numerical_ik", "pbvs"])
+@pytest.mark.parametrize(
+    ("fault", "law"),
+    [
+        ("stop_at=5", "numerical_ik"),
+        ("stall_at=5", "pbvs"),
+        pytest.param("stall_at=5", "numerical_ik", marks=pytest.mark.slow),
+        pytest.param("stop_at=5", "pbvs", marks=pytest.mark.slow),
+    ],
+)
 def test_a_run_may_go_on_where_it_was_interrupted(fault: str, law: str):
     scenario = quick(f"station.faults.{fault}", "servo.guard.resume=true")
     record, e, wire = guided(scenario, law)
