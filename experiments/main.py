@@ -34,6 +34,7 @@ from experiments.cli.options import (
     FeedforwardOption,
     JobsOption,
     LapsOption,
+    McapOption,
     OutOption,
     RobotOption,
     ScenarioOption,
@@ -57,6 +58,8 @@ from experiments.feedforward.command import feedforward_command
 from experiments.frames.commands import align_command, chain_command, frame_command, tool_command
 from experiments.metrics.run_metrics import timing, with_timing
 from experiments.modes.command import modes_command
+from experiments.record.log_command import log_command
+from experiments.record.simulated import write_records
 from experiments.replay.live import LiveView, advance_live
 from experiments.report.report import verdict
 from experiments.robots.command import robots_app
@@ -147,6 +150,7 @@ def compare_command(
     jobs: JobsOption = None,
     scheduler: SchedulerOption = None,
     write: WriteOption = None,
+    mcap: McapOption = False,
 ) -> None:
     """Run several laws on one scenario, by default the open loop and three others, and compare them."""
     human = human_console(json_file)
@@ -180,6 +184,8 @@ def compare_command(
                 logs = compare(prepared.scenario, prepared.robot, chosen, cycles, where, progress)
         result = _write(human, stage, prepared, logs)
         keep_robot(logs)
+        if mcap and not guided:
+            write_records(stage, prepared.text, logs)
         output.write(with_timing(result, timing(logs)))
     _conclude(human, result, out, write)
     if guided:
@@ -205,6 +211,7 @@ def run_command(
         typer.Option(metavar="RATE", help="Largest real-time factor: 1 is real time."),
     ] = None,
     write: WriteOption = None,
+    mcap: McapOption = False,
 ) -> None:
     """Run one law."""
     console = Console()
@@ -247,6 +254,8 @@ def run_command(
             logs = {law: [experiment.log()]}
         result = _write(console, stage, prepared, logs)
         keep_robot(logs)
+        if mcap and not guided:
+            write_records(stage, prepared.text, logs)
     _conclude(console, result, out, write)
     if guided:
         guided.conclude()
@@ -277,6 +286,7 @@ def diagram_command(
 
 app.command("cell")(cell_command)
 app.command("latency")(latency_command)
+app.command("log")(log_command)
 app.command("modes")(modes_command)
 app.command("zeros")(zeros_command)
 app.add_typer(cameras_app, name="cameras")

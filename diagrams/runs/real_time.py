@@ -15,6 +15,8 @@ from diagrams.hardware_link import EndedOnRequest, HardwareLink, StationError, n
 from diagrams.host_lateness import HostLateness
 from diagrams.record.log import GuardEvent, RunLog
 from diagrams.record.packed_log import PackedLog
+from diagrams.record.run_record import RunRecord, marks, write_event, write_tick
+from diagrams.record.topics import POSE, pose_message
 from diagrams.runs.simulation import guard_events, measured_along, start_position
 from diagrams.scenario.scenario import Scenario, ScenarioError
 from diagrams.servo import Servo, calibrated, law_name, learnt
@@ -95,6 +97,7 @@ class RealTimeRun:
         self._exposures: list[tuple[float, np.ndarray]] = []
         self._pauses: list[tuple[float, float]] = []
         self._events: list[GuardEvent] = []
+        self._stream: RunRecord | None = None
 
     @property
     def uses_camera(self) -> bool:
@@ -108,6 +111,7 @@ class RealTimeRun:
         progress: Callable[[float], None] | None = None,
         now: Callable[[], float] = steady_time,
         is_asked_to_end: Callable[[], bool] = never,
+        record: RunRecord | None = None,
     ) -> RealTimeRecord:
         """Runs the law on the station at the other end.
 
@@ -119,10 +123,12 @@ class RealTimeRun:
             progress: is called now and then with the share that is done, 0 to 1.
             now: the clock of the client's arrivals, in s.
             is_asked_to_end: whether somebody wants the run to end now.
+            record: to which the run is logged while it goes on; it is closed at the end, however that is.
 
         Raises:
             StationError: if there is no controller or camera, or its cycle is not the scenario's.
         """
+        self._stream = record
         collecting, switching = gc.isenabled(), sys.getswitchinterval()
         # A full search for garbage takes tens of milliseconds with Drake loaded.
         gc.collect()
@@ -146,6 +152,8 @@ class RealTimeRun:
                 if ended != REQUESTED and wire.host.worst > _WORTH_SAYING:
                     ended = f"{ended}; {wire.host.sentence(began)}"
         finally:
+            if record is not None and not self._joint_rows:
+                record.close(law=self.law, ended="before its path")
             sys.setswitchinterval(switching)
             gc.unfreeze()
             if collecting:
@@ -202,8 +210,28 @@ class RealTimeRun:
                 progress(min(1.0, tick / end))
         return "path"
 
+    def _write(
+        self,
+        stream: RunRecord,
+        time: float,
+        report: RobotReport,
+        effort: np.ndarray,
+        command: tuple[np.ndarray, np.ndarray],
+        sample: PoseSample,
+    ) -> None:
+        """Logs a tick, after its reply is on its way."""
+        servo = self.servo.GetMyContextFromRoot(self._context)
+        correction = self.servo.GetOutputPort("correction").Eval(servo)
+        X_WE_desired = self.servo.GetOutputPort("X_WE_desired").Eval(servo).GetAsMatrix4()
+        joints = report.position, effort
+        write_tick(stream, time, report.time, joints, command, correction, X_WE_desired)
+        if sample.valid and (not self._exposures or sample.time > self._exposures[-1][0]):
+            stream.write(POSE, time, pose_message(sample.X_WE.GetAsMatrix4(), sample.time))
+
     def _note(self, tick: int, kind: str, detail: str) -> None:
         self._events.append(GuardEvent(tick * self.period, kind, detail))
+        if self._stream is not None:
+            write_event(self._stream, self._events[-1])
 
     def _tick(self, wire: HardwareLink, report: RobotReport, tick: int, is_running: bool) -> None:
         """One message in, one tick, one reply out."""
@@ -217,7 +245,10 @@ class RealTimeRun:
         if not self._joint_rows:
             self.diagram.ForcedPublish(self._context)  # here, where the log finds samples to begin with
         self._update(self._context)
-        wire.send_command(*self.station.command(self._context))
+        command = self.station.command(self._context)
+        wire.send_command(*command)
+        if self._stream is not None:
+            self._write(self._stream, time, report, wire.effort, command, sample)
         self._stand_before_next()
         self._joint_rows.append((tick, report.time, report.position, wire.effort))
         if sample.valid and (not self._exposures or sample.time > self._exposures[-1][0]):
@@ -301,6 +332,10 @@ class RealTimeRun:
             calibrated=calibrated(self.servo, self._context, self.scenario.robot),
             wall_time=float(times[-1]) if n else 0.0,
         )
+        if self._stream is not None and self._joint_rows:
+            for event in guard_events(times, counts):
+                write_event(self._stream, event)
+            self._stream.close(**marks(log, ended))
         report = camera.report() if camera else None
         return RealTimeRecord(
             log=log,

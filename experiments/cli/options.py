@@ -114,3 +114,7 @@ def json_option(text: str) -> Any:
 
 
 JsonOption = Annotated[str | None, json_option("The numbers; - prints them, and nothing else.")]
+McapOption = Annotated[
+    bool,
+    typer.Option("--mcap", help="Write every simulated run as LAW-CYCLE.mcap too; on hardware always."),
+]

@@ -8,6 +8,7 @@ import numpy as np
 
 from diagrams.hardware_link import never
 from diagrams.record.log import RunLog
+from diagrams.record.run_record import RunRecord
 from diagrams.runs.real_time import REQUESTED, RealTimeRecord, RealTimeRun
 from diagrams.runs.virtual_cell import CellRecord
 from diagrams.scenario.scenario import Scenario
@@ -41,6 +42,7 @@ def compare_on_station(
     with_cell: bool = False,
     progress: Callable[[float], None] | None = None,
     is_asked_to_end: Callable[[], bool] = never,
+    recording: Callable[[str, int], RunRecord | None] = lambda law, number: None,
 ) -> GuidedComparison:
     """Runs laws one after the other on the station that the scenario's link names.
 
@@ -52,6 +54,7 @@ def compare_on_station(
         with_cell: whether to start a virtual cell for it; its truth is joined to the logs by time stamp.
         progress: is called now and then with the share that is done, 0 to 1.
         is_asked_to_end: whether somebody wants an end; the run that goes on stops smoothly, none follows.
+        recording: opens the record of a law's run with a number from 1.
 
     Raises:
         SimulationError: if the station is not there, or a run broke off before its path began.
@@ -68,6 +71,7 @@ def compare_on_station(
                 station.camera,
                 progress=lambda share, number=number: report((number + share) / len(jobs)),
                 is_asked_to_end=is_asked_to_end,
+                record=recording(law, len(records[law]) + 1),
             )
             records[law].append(record)
             if record.ended == REQUESTED:

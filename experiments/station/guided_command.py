@@ -11,8 +11,9 @@ import typer
 from rich.console import Console
 
 from diagrams.record.log import RunLog
+from diagrams.record.run_record import RunRecord
 from diagrams.runs.real_time import RealTimeRecord
-from diagrams.scenario.scenario import load_scenario
+from diagrams.scenario.scenario import load_scenario, scenario_text
 from experiments.cli.console import BROKEN_OFF, count, progress_bar, refusing
 from experiments.cli.ending import asking
 from experiments.cli.prepare import Prepared
@@ -102,10 +103,19 @@ def guide(
     """
     stage, out = folders
     where = "a virtual cell" if with_cell else f"UDP port {prepared.scenario.station.link.port}"
+    streams: list[RunRecord] = []
+
+    def recording(law: str, number: int) -> RunRecord:
+        # Where it stays: what is only moved there in the end is lost with the process.
+        out.mkdir(parents=True, exist_ok=True)
+        path = out / f"{law_file_name(law)}-{number}.mcap"
+        streams.append(RunRecord(path, scenario_text(prepared.scenario)))
+        return streams[-1]
+
     label = f"{count(cycles * len(laws), 'run')} on {where}"
     with refusing(ChannelError), asking() as end, progress_bar(label) as progress:
         comparison = compare_on_station(
-            prepared.scenario, prepared.robot, laws, cycles, with_cell, progress, end.is_asked
+            prepared.scenario, prepared.robot, laws, cycles, with_cell, progress, end.is_asked, recording
         )
     link = comparison.link_json()
     write_json(stage / "link.json", link)
@@ -115,7 +125,9 @@ def guide(
     for law, number, record in records:
         write_log(stage / f"{law_file_name(law)}-{number}.npz", record)
     print_link(console, link)
-    console.print("Counts, delays and clocks of the wire are in link.json, whole logs in *.npz")
+    console.print("Counts, delays and clocks of the wire are in link.json, whole logs in *.npz and *.mcap")
+    for problem in filter(None, (stream.problem for stream in streams)):
+        typer.echo(f"truetip: {problem}", err=True)
     endings, known = [], {}
     for law, _, record in records:
         if _has_begun(record):

@@ -1,0 +1,98 @@
+"""``truetip log``: what stands in the record of a run, and its export."""
+
+from contextlib import ExitStack
+from pathlib import Path
+from typing import Annotated, Any
+
+import numpy as np
+import typer
+from rich import box
+from rich.console import Console
+from rich.markup import escape
+from rich.table import Table
+
+from diagrams.record.read_record import Contents, Topic, read_record
+from experiments.cli.console import print_files, refusing
+from experiments.cli.staging import staged_file, staged_folder
+
+
+def log_command(
+    file: Annotated[Path, typer.Argument(metavar="FILE.mcap", help="Record of a run.")],
+    csv: Annotated[
+        Path | None, typer.Option(metavar="FOLDER", help="A table for each topic, as CSV.")
+    ] = None,
+    npz: Annotated[Path | None, typer.Option(metavar="FILE.npz", help="All topics as numpy arrays.")] = None,
+) -> None:
+    """Summarise the record of a run, also one that was cut off, and export it."""
+    with refusing(ValueError, OSError), ExitStack() as stack:
+        contents = read_record(file)
+        folder = stack.enter_context(staged_folder(csv)) if csv else None
+        arrays = stack.enter_context(staged_file(npz, ".npz")) if npz else None
+        if folder:
+            for name, topic in contents.topics.items():
+                write_csv(folder / f"{name.strip('/').replace('/', '-')}.csv", topic)
+        if arrays:
+            columns: dict[str, Any] = as_arrays(contents)
+            np.savez_compressed(arrays, **columns)
+    console = Console()
+    said = contents.run
+    how = str(said.get("ended", ""))
+    if how == "path":
+        how = "ran its path to the end"
+    if not contents.is_complete:
+        how = "was cut off: what follows is what had been written"
+    console.print(
+        f"{escape(str(file))}: law {escape(str(said.get('law', 'unknown')))}, {escape(how)}", soft_wrap=True
+    )
+    console.print(summary_table(contents))
+    print_files(console, csv, npz)
+
+
+def summary_table(contents: Contents) -> Table:
+    """Messages, times and rates of all topics."""
+    table = Table(box=box.SIMPLE_HEAD)
+    table.add_column("topic", no_wrap=True)
+    for name in ("messages", "from", "to", "rate", "longest gap"):
+        table.add_column(name, justify="right", no_wrap=True)
+    for name, topic in sorted(contents.topics.items()):
+        count, gaps = len(topic.time), np.diff(topic.time)
+        span = float(topic.time[-1] - topic.time[0])
+        table.add_row(
+            name,
+            str(count),
+            f"{topic.time[0]:.3f} s",
+            f"{topic.time[-1]:.3f} s",
+            f"{(count - 1) / span:.1f} Hz" if span > 0.0 else "-",
+            f"{1e3 * gaps.max():.1f} ms" if count > 1 else "-",
+        )
+    return table
+
+
+def as_arrays(contents: Contents) -> dict[str, np.ndarray]:
+    """All columns by topic and field: ``joint_sample.position``, with ``joint_sample.time`` in s."""
+    found = {}
+    for name, topic in contents.topics.items():
+        prefix = name.strip("/").replace("/", ".")
+        found[f"{prefix}.time"] = topic.time
+        for column, values in topic.columns.items():
+            found[f"{prefix}.{column}"] = values.astype(str) if values.dtype == object else values
+    return found
+
+
+def write_csv(path: Path, topic: Topic) -> None:
+    """A topic as a table; a column of several numbers becomes several columns."""
+    names, columns = ["time"], [topic.time.astype(object)]
+    for column, values in topic.columns.items():
+        width = values.shape[1]
+        names += [column] if width == 1 else [f"{column}_{n}" for n in range(1, width + 1)]
+        columns += list(values.astype(object).T)
+    lines = [",".join(names)]
+    lines += [",".join(_cell(value) for value in row) for row in zip(*columns, strict=True)]
+    path.write_text("\n".join(lines) + "\n", encoding="utf-8")
+
+
+def _cell(value: object) -> str:
+    if isinstance(value, float):
+        return f"{value:.12g}" if value == value else ""
+    text = str(value)
+    return '"' + text.replace('"', '""') + '"' if any(each in text for each in ',"\n') else text

@@ -1,0 +1,53 @@
+"""``truetip log``: a record is summarised and exported, whole or cut off."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from typer.testing import CliRunner
+
+from diagrams.record.log import GuardEvent
+from diagrams.record.run_record import write_log
+from experiments.main import app
+from tests.experiments.synthetic import comparison
+
+
+@pytest.fixture(scope="module")
+def log():
+    found = next(iter(comparison(with_joints=True).values()))[0]
+    return replace(found, guard_events=[GuardEvent(2.0, "interrupted", 'no message, "for" 50 ms')])
+
+
+def test_a_record_is_summarised_and_exported(log, tmp_path):
+    path = tmp_path / "run.mcap"
+    write_log(path, "", log)
+    arguments = ["log", str(path), "--csv", str(tmp_path / "csv"), "--npz", str(tmp_path / "run.npz")]
+    result = CliRunner().invoke(app, arguments)
+    assert result.exit_code == 0, result.output
+    assert f"law {log.law}, ran its path to the end" in result.output
+    assert "50.0 Hz" in result.output
+    with np.load(tmp_path / "run.npz") as arrays:
+        np.testing.assert_array_equal(arrays["command.position"], log.position_command)
+    table = np.genfromtxt(tmp_path / "csv" / "command.csv", delimiter=",", names=True)
+    np.testing.assert_allclose(table["position_3"], log.position_command[:, 2], rtol=1e-11, atol=1e-12)
+    events = (tmp_path / "csv" / "guard_event.csv").read_text().splitlines()
+    assert events[1] == '2,interrupted,"no message, ""for"" 50 ms"'
+
+
+def test_a_record_that_was_cut_off_is_summarised_and_said_to_be_so(log, tmp_path):
+    path = tmp_path / "run.mcap"
+    write_log(path, "", log)
+    path.write_bytes(path.read_bytes()[:-2000])
+    result = CliRunner().invoke(app, ["log", str(path)])
+    assert result.exit_code == 0, result.output
+    assert "was cut off" in result.output
+    assert "/command" in result.output
+
+
+@pytest.mark.parametrize("content", [b"no record, but of some length", b""])
+def test_what_is_no_record_is_refused(content: bytes, tmp_path):
+    path = tmp_path / "run.mcap"
+    path.write_bytes(content)
+    result = CliRunner().invoke(app, ["log", str(path)])
+    assert result.exit_code == 2
+    assert "not an MCAP file" in result.stderr
