@@ -44,6 +44,7 @@ def rounded(value: float, uncertainty: float) -> tuple[str, str]:
     if not (uncertainty > 0.0 and math.isfinite(uncertainty)):
         return f"{value:.6g}", f"{uncertainty:.2g}"
     place = math.floor(math.log10(uncertainty)) - 1
+    value = round(value, -place) + 0.0  # no minus zero
     if abs(value) >= 1e-3 and 0 <= -place <= 9:
         return f"{value:.{-place}f}", f"{uncertainty:.{-place}f}"
     if value == 0.0 or abs(value) < uncertainty:

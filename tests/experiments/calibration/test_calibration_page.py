@@ -63,6 +63,7 @@ def test_the_page_names_parameters_and_shows_them_rounded(folder: Path):
         (123.4, 4.56, ("123.4", "4.6")),
         (3.9876e-5, 1.2e-7, ("3.988e-05", "1.2e-07")),
         (0.00001, 0.5, ("0", "0.5")),
+        (-0.001, 19.6, ("0", "20")),
     ],
 )
 def test_a_value_has_the_digits_that_its_uncertainty_leaves(value: float, uncertainty: float, shown: tuple):
