@@ -2,6 +2,7 @@
 
 from typing import Any
 
+import numpy as np
 from pydrake.systems.framework import Context, Diagram, DiagramBuilder, OutputPort, System
 from pydrake.systems.primitives import Adder, ConstantVectorSource
 
@@ -102,7 +103,7 @@ class Servo(Diagram):
                 commands[name] = self.law.GetOutputPort(name)
         if feedforward.kind != "none":
             model = FEEDFORWARDS.find(feedforward.kind)(self.model, feedforward)
-            model.check_path(self.reference.path)
+            model.prepare(self.reference.path, np.deg2rad(scenario.home_deg))
             ahead = builder.AddNamedSystem("feedforward", model)
             builder.ConnectInput(joints, ahead.GetInputPort("joint_sample"))
             self._add_feedforward(builder, ahead, commands)

@@ -56,6 +56,7 @@ from experiments.diagram.view import write_diagram
 from experiments.drivetrain.command import drivetrain_command
 from experiments.feedforward.command import feedforward_command
 from experiments.frames.commands import align_command, chain_command, frame_command, tool_command
+from experiments.invert.command import invert_command
 from experiments.metrics.run_metrics import timing, with_timing
 from experiments.modes.command import modes_command
 from experiments.record.log_command import log_command
@@ -291,6 +292,7 @@ app.command("modes")(modes_command)
 app.command("zeros")(zeros_command)
 app.add_typer(cameras_app, name="cameras")
 app.command("feedforward")(feedforward_command)
+app.command("invert")(invert_command)
 app.command("design")(design_command)
 app.command("calibrate")(calibrate_command)
 app.command("compensate")(compensate_command)

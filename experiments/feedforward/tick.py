@@ -26,6 +26,7 @@ def tick_time(trial: RectangleTrial) -> float:
     builder = DiagramBuilder()
     reference = builder.AddSystem(Reference(scenario.reference, period))
     model = FEEDFORWARDS[trial.config.kind](controller_model(scenario, trial.robot), trial.config)
+    model.prepare(reference.path, np.deg2rad(scenario.home_deg))
     builder.AddSystem(model)
     start = JointSample(position=np.deg2rad(scenario.home_deg), running=True)
     joints = builder.AddSystem(ConstantValueSource(Value(start)))

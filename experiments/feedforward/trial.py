@@ -38,24 +38,35 @@ class Trial:
     config: FeedforwardConfig
     plant: RobotModel | None = None  # in the station, if it is another one than the model's
     timing: str = "polynomial"  # of `systems.reference.timing.TIMINGS`
+    settle: float = SETTLE  # s at rest before the motion
+    speeding_up: float = SPEEDING_UP  # s, see `profile`
 
     @property
     def profile(self) -> Profile:
         """How far the axes have turned, in rad.
 
         It takes as long as a constant acceleration would that brings the slowest of them to its largest speed
-        in `SPEEDING_UP`, then as constant a deceleration.
+        in ``speeding_up``, then as constant a deceleration.
         """
-        acceleration = float(self.robot.speed[:_AXES].min()) / SPEEDING_UP
+        acceleration = float(self.robot.speed[:_AXES].min()) / self.speeding_up
         return TIMINGS[self.timing].lasting(
             2.0 * float(np.sqrt(abs(self.angle) / acceleration)), abs(self.angle)
         )
 
     def run(self, progress: Progress | None = None) -> float:
-        """Simulates it with the drives of the station and an elastic structure; returns C of (6.1) in m/s."""
+        """Simulates it; returns C of (6.1) in m/s."""
+        return criterion(*self.ringing(progress))
+
+    def ringing(self, progress: Progress | None = None) -> tuple[np.ndarray, np.ndarray]:
+        """Simulates it with the drives of the station and an elastic structure.
+
+        Returns:
+            From the end of the motion on: times in s, shape (n,), and how the wrist accelerates, in m/s^2,
+            shape (n, 3).
+        """
         config = StationConfig(elasticity="structure", payload=self.payload)
         period, ahead = config.period, config.drive.command_delay + config.drive.dead_time
-        stop = SETTLE + self.profile.duration
+        stop = self.settle + self.profile.duration
         told = commands(self, np.arange(0.0, stop + RINGING, period) + ahead, period)
         builder = DiagramBuilder()
         station = builder.AddNamedSystem(
@@ -72,10 +83,10 @@ class Trial:
         integration = Integration(IntegratorConfig(max_step=_MAX_STEP), period, rate)
         integration.initialize(simulator)
         integration.advance(simulator, stop)
-        times, accelerations = _watched(simulator, station, integration, stop + RINGING)
+        found = _watched(simulator, station, integration, stop + RINGING)
         if progress:
             progress(1.0)
-        return criterion(times, accelerations)
+        return found
 
 
 class CommandPlayer(LeafSystem):
@@ -103,7 +114,7 @@ class CommandPlayer(LeafSystem):
 
 def references(trial: Trial, times: np.ndarray) -> list[JointReference]:
     """Where the links shall be."""
-    s, rate, acceleration = trial.profile.at_times(times - SETTLE)
+    s, rate, acceleration = trial.profile.at_times(times - trial.settle)
     direction = np.zeros(NUM_JOINTS)
     direction[:_AXES] = np.sign(trial.angle)
     return [
@@ -115,13 +126,7 @@ def references(trial: Trial, times: np.ndarray) -> list[JointReference]:
 def commands(trial: Trial, times: np.ndarray, period: float) -> np.ndarray:
     """What the drives are told: positions, velocities and torques, shape (n, 3, 6)."""
     believed = ControllerModel(trial.robot, trial.payload, period)
-    model = FEEDFORWARDS[trial.config.kind](believed, trial.config)
-    memory, rows = model.fresh_memory(), []
-    for reference in references(trial, times):
-        answer = model.answer(reference, memory)
-        memory = answer.memory
-        rows.append((answer.position, answer.velocity, answer.torque))
-    return np.array(rows)
+    return FEEDFORWARDS[trial.config.kind](believed, trial.config).play(references(trial, times))
 
 
 def criterion(times: np.ndarray, accelerations: np.ndarray) -> float:

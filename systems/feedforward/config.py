@@ -19,10 +19,12 @@ class CorrectionConfig:
 class FeedforwardConfig:
     """Which inverse model runs beside the law; read from a scenario file."""
 
-    kind: str = "none"  # none, rigid, flexible_joint, elastic_structure or FILE.py:CLASS
+    kind: str = "none"  # none, one of `systems.feedforward.FEEDFORWARDS` or FILE.py:CLASS
     # By which shares stiffness and damping, and masses and inertias, of the model are above the robot's.
     stiffness_error: float = quantity(0.0, -0.9, 10.0)
     inertia_error: float = quantity(0.0, -0.9, 10.0)
+    # Of the stable inverse: which point is exact, the tip or where axes 4, 5 and 6 meet
+    point: str = choice("tip", ("tip", "wrist"))
     # What becomes of a path with too few continuous derivatives: refuse it, or accept torques that jump
     rough_path: str = choice("refuse", ("refuse", "accept"))
     correction: CorrectionConfig = field(default_factory=CorrectionConfig)

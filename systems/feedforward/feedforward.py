@@ -1,5 +1,7 @@
 """What all feedforwards share: ports, the joint reference with its derivatives, and the load of the links."""
 
+from collections.abc import Sequence
+
 import numpy as np
 from pydrake.common.value import Value
 from pydrake.math import RigidTransform
@@ -164,6 +166,27 @@ class Feedforward(LeafSystem):
             ahead.torque - self._gravity_compensation(later.position - ahead.deflection),
             np.concatenate([now.ravel(), filtered, memory]),
         )
+
+    def play(self, references: Sequence[JointReference]) -> np.ndarray:
+        """Commands at successive ticks: positions in rad, velocities in rad/s, torques in N m; (n, 3, 6)."""
+        memory, rows = self.fresh_memory(), []
+        for reference in references:
+            answer = self.answer(reference, memory)
+            memory = answer.memory
+            rows.append((answer.position, answer.velocity, answer.torque))
+        return np.array(rows)
+
+    def prepare(self, path: CartesianPath, home: np.ndarray) -> None:
+        """What is to be done before a run; a model that looks ahead takes its time here.
+
+        Args:
+            path: that the run will ask for.
+            home: where the joints are before it, in rad, shape (6,).
+
+        Raises:
+            ValueError: if the path is not for this model.
+        """
+        self.check_path(path)
 
     def check_path(self, path: CartesianPath) -> None:
         """Refuses a path that is too rough.

@@ -1,0 +1,72 @@
+"""``truetip invert``: how much a robot still rings with the stable inverse, and with causal ones."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+from rich import box
+from rich.markup import escape
+from rich.table import Table
+
+from experiments.cli.console import count, print_files, progress_bar, refusing
+from experiments.cli.json_output import human_console, json_output
+from experiments.cli.option_limits import at_least
+from experiments.cli.options import (
+    GridOption,
+    JobsOption,
+    JsonOption,
+    PayloadOption,
+    PictureOption,
+    StudiedRobotOption,
+)
+from experiments.cli.staging import PAGE, staged_file
+from experiments.cli.workers import usable_cores
+from experiments.invert.plots import TABLE_HEAD, table_rows, verdict, write_invert_page
+from experiments.invert.study import KINDS, InvertStudy, invert_json, study_inverses
+from robots.description.model import load_robot
+
+
+def invert_command(
+    robot: StudiedRobotOption = "kr210",
+    payload: PayloadOption = None,
+    angle: Annotated[float, typer.Option(metavar="DEG", help="By which axes 1 to 3 turn.")] = 5.0,
+    grid: GridOption = 2,
+    spring_error: Annotated[
+        float, typer.Option(metavar="SHARE", help="Every spring of the true robot is up to so much off.")
+    ] = 0.0,
+    seeds: Annotated[int, typer.Option(metavar="N", help="How many robots with such springs.")] = 1,
+    out: PictureOption = Path("out/invert.html"),
+    json_file: JsonOption = None,
+    jobs: JobsOption = None,
+) -> None:
+    """Compare the stable inverse, which moves the motors before the tip, with causal inverse models."""
+    human = human_console(json_file)
+    with (
+        json_output(json_file) as output,
+        refusing(ValueError, OSError),
+        staged_file(out, *PAGE) as page,
+        output.staged(),
+    ):
+        at_least("--jobs", 1, jobs)
+        model = load_robot(robot)
+        mass = model.payload.largest_mass if payload is None else payload
+        runs = max(1, len(KINDS) * grid * grid * (seeds if spring_error else 1))
+        processes = min(jobs or usable_cores(), runs)
+        label = f"{count(runs, 'run')} in {count(processes, 'process', 'processes')}"
+        with progress_bar(label) as progress:
+            study = study_inverses(model, mass, angle, grid, spring_error, seeds, processes, progress)
+        write_invert_page(page, study)
+        output.write(invert_json(study))
+    human.print(_table(study))
+    human.print(escape(verdict(study)))
+    print_files(human, out)
+
+
+def _table(study: InvertStudy) -> Table:
+    title = f"{study.robot.name}, {study.payload:g} kg: the wrist after {study.angle_deg:g} degrees"
+    table = Table(box=box.SIMPLE_HEAD, title=escape(title), title_justify="left", title_style="italic")
+    for name in TABLE_HEAD:
+        table.add_column(name, justify="left" if name == TABLE_HEAD[0] else "right", no_wrap=True)
+    for row in table_rows(study):
+        table.add_row(*row)
+    return table

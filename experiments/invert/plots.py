@@ -1,0 +1,98 @@
+"""The page of a study of inverses: how the wrist rings, and what the motors do beside a rigid robot's."""
+
+from pathlib import Path
+
+import numpy as np
+import plotly.graph_objects as go
+from plotly.subplots import make_subplots
+
+from experiments.invert.study import KINDS, SETTLE, InvertStudy, ahead_of_rigid
+from experiments.report.plot_page import Section, html_table, write_plot_page
+from systems.feedforward import FEEDFORWARDS
+
+TABLE_HEAD = ("inverse", "median C in m/s", "worst C in m/s", "relative to rigid")
+_PERIOD_MS = 4.0
+
+
+def table_rows(study: InvertStudy) -> list[list[str]]:
+    """Criterion of each inverse over all positions and true robots."""
+    rigid = np.median(study.criterion("rigid"))
+    rows = []
+    for kind in KINDS:
+        found = study.found(kind)
+        numbers = ("-",) * 3
+        if len(found):
+            middle = np.median(found)
+            numbers = (f"{middle:.4f}", f"{found.max():.4f}", f"{middle / rigid:.4f}")
+        rows.append([FEEDFORWARDS[kind].title, *numbers])
+    return rows
+
+
+def verdict(study: InvertStudy) -> str:
+    """What the stable inverse leaves, in a sentence or two."""
+    ratio = study.ratio
+    if np.isnan(ratio).all():
+        return "The stable inverse was found in none of the positions."
+    missing = int(np.isnan(ratio).sum())
+    of = f"{ratio.size} motions" + (f" ({missing} without a solution)" if missing else "")
+    robots = f", all springs of {len(ratio)} robots up to {study.spring_error:.0%} off" * bool(
+        study.spring_error
+    )
+    return (
+        f"After {study.angle_deg:g} degrees the wrist rings {np.nanmedian(ratio):.2f} times as much with the "
+        f"stable inverse as with the best causal one (median of {of}{robots}), at worst "
+        f"{np.nanmax(ratio):.2f} times. It takes {study.seconds:.1f} s to compute."
+    )
+
+
+def ringing_figure(study: InvertStudy) -> go.Figure:
+    """How the wrist accelerates after the motion from the first position."""
+    figure = go.Figure()
+    for kind in KINDS:
+        one = study.ringing[kind][0][0]
+        if not len(one.times):
+            continue
+        size = np.linalg.norm(one.accelerations - one.accelerations.mean(axis=0), axis=1)
+        style = {"color": FEEDFORWARDS[kind].colour}
+        time = 1e3 * (one.times - one.times[0])
+        figure.add_trace(go.Scatter(x=time, y=size, name=FEEDFORWARDS[kind].title, line=style))
+    yaxis = {"title": "acceleration in m/s<sup>2</sup>", "type": "log", "dtick": 1, "exponentformat": "none"}
+    return figure.update_layout(xaxis={"title": "time after the motion in ms"}, yaxis=yaxis)
+
+
+def motor_figure(study: InvertStudy) -> go.Figure:
+    """How far motors 1 to 3 are from those of a rigid robot: before, during and after the motion."""
+    figure = make_subplots(3, 1, shared_xaxes=True, vertical_spacing=0.05)
+    for kind in KINDS[1:]:
+        if kind not in study.example:
+            continue
+        turned = 1e3 * ahead_of_rigid(study, kind)
+        time = _PERIOD_MS * np.arange(len(turned)) - 1e3 * SETTLE
+        style = {"color": FEEDFORWARDS[kind].colour}
+        for row in (1, 2, 3):
+            curve = turned[:, row - 1] - turned[0, row - 1]
+            trace = go.Scatter(x=time, y=curve, name=FEEDFORWARDS[kind].title, line=style, legendgroup=kind)
+            figure.add_trace(trace.update(showlegend=row == 1), row, 1)
+            figure.update_yaxes(title=f"motor {row} in mrad", row=row, col=1)
+    figure.add_vline(x=0.0, line={"dash": "dot", "width": 1})
+    return figure.update_xaxes(title="time from the start of the motion in ms", row=3)
+
+
+def write_invert_page(path: Path, study: InvertStudy) -> None:
+    """All of it as a page that opens offline."""
+    text = "C adds up how much the wrist still accelerates in the 0.9 s after it, Reiner (2010), eq. (6.1)."
+    sections = [
+        Section("All motions", text, html_table(TABLE_HEAD, table_rows(study))),
+        Section(
+            "Ringing of the wrist", "After the motion from the first position.", ringing_figure(study), 420
+        ),
+        Section(
+            "What the motors do beside those of a rigid robot",
+            "Less what they do at rest. The stable inverse moves them before the motion begins, which no "
+            "causal one can, and goes on when it has ended.",
+            motor_figure(study),
+            760,
+        ),
+    ]
+    title = f"Stable inverse, {study.robot.name}, {study.payload:g} kg"
+    write_plot_page(path, title, verdict(study), sections)

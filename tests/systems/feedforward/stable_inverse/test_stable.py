@@ -1,0 +1,88 @@
+"""The stable inverse of a robot: exact, from rest to rest, ahead of the motion; and what it refuses."""
+
+from functools import cache
+
+import numpy as np
+import pytest
+
+from experiments.feedforward.trial import Trial
+from robots.description.model import load_robot
+from systems.controller_model import ControllerModel
+from systems.feedforward import FeedforwardConfig, JointReference
+from systems.feedforward.elastic_structure import ElasticStructureFeedforward
+from systems.feedforward.prefilter import PrefilterConfig
+from systems.feedforward.stable_inverse.stable import Plan, StableFeedforward
+from systems.reference.paths import ReferenceConfig, make_path
+from systems.reference.shapes import Circle
+from systems.reference.timing import PolynomialProfile
+
+STEP, SETTLE = 2e-3, 0.35  # s
+START, ANGLE = np.deg2rad([0.0, -60.0, 90.0, 0.0, 0.0, 0.0]), np.deg2rad(5.0)
+PROFILE = PolynomialProfile.lasting(0.25, ANGLE)
+
+
+def inverse(name: str = "kr210", **settings) -> StableFeedforward:
+    robot = load_robot(name)
+    model = ControllerModel(robot, robot.payload.largest_mass)
+    return StableFeedforward(model, FeedforwardConfig("stable", **settings))
+
+
+@cache
+def planned(point: str) -> Plan:
+    times = np.arange(0.0, SETTLE + PROFILE.duration + SETTLE, STEP)
+    axes = np.array([1.0, 1.0, 1.0, 0.0, 0.0, 0.0])
+    return inverse(point=point).plan(times, START + PROFILE.at_times(times - SETTLE)[0][:, None] * axes)
+
+
+@pytest.mark.parametrize("point", ["tip", "wrist"])
+def test_the_point_is_on_its_path_to_a_hundredth_of_a_micrometre(point: str):
+    assert planned(point).history[-1] < 1e-8
+
+
+def test_motors_are_at_rest_at_both_ends():
+    plan = planned("tip")
+    end = SETTLE + PROFILE.duration + SETTLE
+    assert np.abs(plan.velocity([0.0, end + 0.5])).max() < 2e-3  # rad/s, of one
+    assert 0.0 <= plan.first < plan.last
+    assert np.abs(plan.velocity(SETTLE + 0.5 * PROFILE.duration)).max() > 0.5
+
+
+def test_at_rest_it_is_where_the_approximate_inverse_is():
+    """Which is right there but for the share of a sag in the levers."""
+    approximate = ElasticStructureFeedforward(
+        ControllerModel(load_robot("kr210"), 210.0), FeedforwardConfig()
+    )
+    still = JointReference(START, np.zeros(6), np.zeros(6))
+    expected = approximate.answer(still, approximate.fresh_memory()).position
+    found = planned("tip").position(0.0)
+    assert np.abs(expected - START)[:3].max() > 1e-3  # rad, what the robot yields
+    np.testing.assert_allclose(found[:3], expected[:3], atol=1e-4)
+
+
+@pytest.mark.slow
+def test_the_wrist_rings_a_quarter_of_what_it_does_with_the_best_causal_inverse():
+    """Of a KR 210 with 210 kg after five degrees in a fifth of a second."""
+    robot = load_robot("kr210")
+
+    def criterion(kind: str) -> float:
+        config = FeedforwardConfig(kind, point="wrist")
+        return Trial(robot, 210.0, START, ANGLE, config, settle=SETTLE, speeding_up=0.2).run()
+
+    assert criterion("stable") < 0.25 * criterion("elastic_structure")
+
+
+def test_it_refuses_what_it_cannot_invert():
+    with pytest.raises(ValueError, match=r"prefilter\.kind must be none"):
+        inverse(prefilter=PrefilterConfig("bessel"))
+    with pytest.raises(ValueError, match="have parts beyond springs, dampers and friction"):
+        inverse("kr16-realistic")
+
+
+def test_it_refuses_a_path_that_begins_too_soon_is_too_rough_or_out_of_reach():
+    home = np.deg2rad([0.0, 20.0, 20.0, 0.0, 50.0, 0.0])
+    rough = make_path(ReferenceConfig(Circle(), settle=0.5))
+    with pytest.raises(ValueError, match="stable takes 4 derivatives of its path, of which 3 are continuous"):
+        inverse("irb1200").prepare(rough, home)
+    far = make_path(ReferenceConfig(Circle(center_mm=np.array([2000.0, 0, 400])), timing="polynomial"))
+    with pytest.raises(ValueError, match=r"stable: path at 0\.000 s: "):
+        inverse("irb1200").prepare(far, home)
