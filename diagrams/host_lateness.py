@@ -13,6 +13,7 @@ class HostLateness:
         """Starts to count."""
         self.messages = self.late = 0
         self.worst = self.worst_at = 0.0  # s
+        self._since_message = 0.0  # s, the worst since the last message
         self._waited = _waited()
 
     def note(self, late: float, at: float, is_message: bool = False) -> None:
@@ -23,8 +24,11 @@ class HostLateness:
             at: s, when.
             is_message: whether a message has come with it.
         """
-        self.messages += is_message
-        self.late += late > _LATE
+        self._since_message = max(self._since_message, late)
+        if is_message:
+            self.messages += 1
+            self.late += self._since_message > _LATE
+            self._since_message = 0.0
         if late > self.worst:
             self.worst, self.worst_at = late, at
 

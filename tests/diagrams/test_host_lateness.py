@@ -1,0 +1,19 @@
+"""How late the own machine was, as the message that ends a run says it."""
+
+import pytest
+
+from diagrams.host_lateness import HostLateness
+
+
+def test_a_message_is_late_if_anything_before_it_was():
+    host = HostLateness()
+    for late in (0.0, 4e-4, 0.04, 2e-3):  # two polls before each of two messages
+        host.note(late, 112.3 if late == 0.04 else 100.0)
+        host.note(0.0, 100.0, is_message=True)
+    assert (host.messages, host.late) == (4, 2)
+    assert (host.worst, host.worst_at) == (0.04, 112.3)
+    assert host.sentence(100.0).startswith("this machine was late by 40 ms at 12.3 s (2 of 4 messages late, ")
+
+
+def test_waiting_for_a_processor_is_counted_from_the_start():
+    assert HostLateness().waited == pytest.approx(0.0, abs=1.0)
