@@ -347,11 +347,10 @@ class CommandGuard(LeafSystem):
         if math.isnan(mean[0]):
             return
         velocity = limits.bounded(position, last, share * start, period, period)
-        wanted = mean if self._is_speed_only else 0.5 * (last + velocity)
-        state[_BEFORE] = position
-        state[_POSITIONS] = limits.moved(
-            position, limits.bounded(position, mean, wanted, period, period), period
-        )
+        step = 0.5 * (last + velocity)
+        if not self._is_speed_only:  # whose positions are not followed, and may have been anywhere
+            step = limits.bounded(position, mean, step, period, period)
+        state[_BEFORE], state[_POSITIONS] = position, limits.moved(position, step, period)
         state[_VELOCITIES] = velocity
 
     def _remember(self, context: Context, discrete_state: DiscreteValues) -> None:

@@ -150,10 +150,9 @@ class MessageGuard:
             less = passed * min(1.0 / max(stop_time, 1e-6), hardest)
             share = max(0.0, float(np.abs(self._velocity).max()) / top - less)
         span, velocity = 0.5 * (passed + self._span), share * start
-        wanted = self._speed if self._is_speed_only else 0.5 * (self._velocity + velocity)
-        if self._is_speed_only and share == 0.0:
-            wanted = velocity
-        mean = limits.bounded(self._position, self._speed, wanted, passed, span)
+        mean = 0.5 * (self._velocity + velocity)
+        if not self._is_speed_only:
+            mean = limits.bounded(self._position, self._speed, mean, passed, span)
         self._note(limits.moved(self._position, mean, passed), velocity, mean, passed)
         return self._position, self._velocity
 

@@ -173,3 +173,13 @@ def test_a_robot_file_may_say_the_acceleration(limit: float):
     steps = np.diff([np.zeros(6), *(row[0] for row in found)], axis=0)
     assert np.abs(np.diff(steps, axis=0)).max() == pytest.approx(limit * PERIOD**2)
     np.testing.assert_allclose(found[-1][0], 0.2)
+
+
+def test_where_only_speeds_count_a_stop_is_one_of_positions_too():
+    """What is logged as the command comes to rest with the speeds."""
+    rig = GuardRig(ROBOT, GuardConfig(stop_time=0.1), start=MIDDLE, is_speed_only=True)
+    for k in range(50):
+        rig.tick(MIDDLE + 0.002 * k * PERIOD * ROBOT.speed, 0.002 * k * ROBOT.speed)
+    found = [rig.tick(NOTHING, NOTHING) for _ in range(40)]
+    np.testing.assert_array_equal(found[-1][1], 0.0)
+    np.testing.assert_array_equal(found[-1][0], found[-10][0])
