@@ -92,8 +92,8 @@ def test_a_run_with_the_calibrated_robot_is_on_its_path_without_a_camera(calibra
     assert result.exit_code == 0, result.output
     summary = json.loads((tmp_path / "summary.json").read_text())
     assert max(summary["runs"]["open_loop"]["true"]["static_mm"]) < 0.02
-    other = truetip("run", "--robot", robot, "--set", "robot=other.yaml", *SMALL, "--out", str(tmp_path))
-    assert "was calibrated on 'irb1200', the scenario has 'other.yaml'" in refusal(other)
+    other = truetip("run", "--robot", robot, "--set", "robot=irb140", *SMALL, "--out", str(tmp_path))
+    assert "was calibrated on 'irb1200', the scenario has 'irb140'" in refusal(other)
 
 
 def test_bad_rows_are_named_and_do_no_harm(calibrated: Path, tmp_path: Path):
