@@ -16,8 +16,8 @@ from diagrams.scenario.scenario import Scenario, ScenarioError
 from robots.description.model import RobotModel
 from robots.kinematics.forward import Kinematics
 from robots.kinematics.numeric_inverse import NumericInverse
-from robots.kinematics.workspace import arm_length, dexterity, front, shoulder, working_positions
-from robots.measurement_design.constraints import AdmissibleConfig, AdmissibleConfigurations
+from robots.kinematics.workspace import arm_length, dexterity, front, working_positions
+from robots.measurement_design.constraints import AdmissibleConfigurations
 from robots.pose import rotation_from_zyx, zyx_from_rotation
 from systems.cell.events.station_events import PayloadChange
 from systems.reference.paths import ReferenceConfig, make_path
@@ -30,7 +30,6 @@ _SAMPLES = 120  # of a path, at which it is tried
 _JUMP = 0.6  # rad between two of them: another branch
 _MARGIN = np.deg2rad(3.0)  # from the limits of the joints
 _SPEED = 0.4  # share of the largest joint speeds: a quick comparison is twice as fast
-_UPRIGHT, _NO_FLOOR = 0.99, 100.0  # cosine, and m
 _DEXTERITY = 0.25  # on the path, over that of the best position
 
 
@@ -154,7 +153,7 @@ def _place(scenario: Scenario, before: RobotModel, robot: RobotModel) -> _Placed
     old = _middle(scenario.reference)
     _, old_front = front(before, old[:3, 3])
     candidates = np.deg2rad([robot.home_deg]) if robot.home_deg else working_positions(robot)
-    admissible = AdmissibleConfigurations(robot, AdmissibleConfig(floor=_floor(robot)))
+    admissible = AdmissibleConfigurations(robot)
     candidates = candidates[admissible(candidates)] if admissible(candidates).any() else candidates
     X_WE, best = Kinematics(robot).forward(candidates), dexterity(robot, candidates).max()
     larger = arm_length(robot) / arm_length(before)
@@ -170,12 +169,6 @@ def _place(scenario: Scenario, before: RobotModel, robot: RobotModel) -> _Placed
         f"no place was found where {robot.name} can follow the path '{scenario.reference.path.kind}' of "
         f"{before.name}; say where it is: --set reference.path=... and home_deg"
     )
-
-
-def _floor(robot: RobotModel) -> float:
-    """The height in m of the floor on which a robot stands; far below where it hangs or stands on a wall."""
-    _, up = shoulder(robot)
-    return float(robot.base.translation[2]) if up[2] > _UPRIGHT else -_NO_FLOOR
 
 
 def _middle(reference: ReferenceConfig) -> np.ndarray:

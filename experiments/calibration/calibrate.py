@@ -18,7 +18,7 @@ from robots.calibration.validation import ErrorStatistics, prediction_errors, st
 from robots.description.model import NUM_JOINTS, RobotModel
 from robots.kinematics.error_kinematics import ErrorKinematics
 from robots.kinematics.forward import Kinematics
-from robots.measurement_design.candidate_grid import SOURCE_RANGES
+from robots.measurement_design.candidate_grid import own_ranges
 from robots.measurement_design.constraints import AdmissibleConfigurations
 from robots.measurement_design.design import MeasurementDesign
 from robots.measurement_design.visiting_order import visiting_order
@@ -63,13 +63,13 @@ class _Stretch:
 
 
 def validation_configurations(robot: RobotModel, count: int, seed: int) -> np.ndarray:
-    """Admissible configurations spread over the source's ranges, in a short order, (count, 6) in rad.
+    """Admissible configurations spread over the robot's ranges, in a short order, (count, 6) in rad.
 
     The first three joints stand on a grid, 5 by 5 by 5 for the source's 125 configurations, the wrist
     anywhere. What is not admissible is replaced by random configurations.
     """
     rng = np.random.default_rng([seed, 1])
-    lower, upper = np.deg2rad([(axis.lower_deg, axis.upper_deg) for axis in SOURCE_RANGES]).T
+    lower, upper = np.deg2rad([(axis.lower_deg, axis.upper_deg) for axis in own_ranges(robot)]).T
     cells = max(1, round(count ** (1.0 / 3.0)))
     centres = (np.arange(cells) + 0.5) / cells
     arm = np.stack(np.meshgrid(centres, centres, centres, indexing="ij"), -1).reshape(-1, 3)

@@ -1,5 +1,6 @@
 """``truetip design``: optimal measurement configurations."""
 
+import re
 import resource
 import sys
 import time
@@ -7,6 +8,7 @@ from contextlib import ExitStack
 from pathlib import Path
 from typing import Annotated
 
+import numpy as np
 import typer
 from rich.markup import escape
 
@@ -19,10 +21,13 @@ from experiments.report.files import write_text
 from experiments.report.plot_page import Section, write_plot_page
 from experiments.report.robot_plot import joints_figure, tips_figure
 from robots.description.model import RobotModel, load_robot
+from robots.measurement_design.candidate_grid import AxisRange, own_ranges
 from robots.measurement_design.constraints import AdmissibleConfig, AdmissibleConfigurations, View
 from robots.measurement_design.criteria import NAMES
 from robots.measurement_design.design import MeasurementDesign, design_measurements
+from robots.measurement_design.obstacles import read_obstacles
 
+_ROUNDING = 1e-6  # deg
 _MEASURES = {
     "b3": "smallest eigenvalue of the information matrix, in m and rad",
     "d": "root of its determinant: volume of the confidence ellipsoid of the parameters",
@@ -49,6 +54,28 @@ def design_command(
             help="Position of a camera in m that must see the tool; by default cameras are all around.",
         ),
     ] = None,
+    joint_range: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--range",
+            metavar="J=LOW:HIGH",
+            help="Range of joint J in degrees, for example 2=-45:90; repeatable. Others keep their own.",
+        ),
+    ] = None,
+    box: Annotated[
+        str | None,
+        typer.Option(metavar="X,Y,Z,X,Y,Z", help="Two corners in m of the volume in which the tool stays."),
+    ] = None,
+    obstacles: Annotated[
+        str | None, typer.Option(metavar="FILE.yaml", help="Boxes that the arm keeps clear of.")
+    ] = None,
+    complete: Annotated[
+        bool,
+        typer.Option(
+            "--complete",
+            help="For the complete error model even where the parameters of Probst (2024) suffice.",
+        ),
+    ] = False,
     seed: Annotated[int, typer.Option(metavar="N", help="Seed of the search.")] = 0,
     out: Annotated[
         str | None, typer.Option(metavar="FILE.csv", help="The configurations, in the order of the visits.")
@@ -81,15 +108,29 @@ def design_command(
         model = load_robot(robot)
         before, started = _peak_mb(), time.perf_counter()
         view = None if camera is None else View(_place(camera))
-        admissible = None if anywhere else AdmissibleConfigurations(model, AdmissibleConfig(view=view))
+        config = AdmissibleConfig(
+            view=view, box=_box(box), obstacles=read_obstacles(obstacles) if obstacles else ()
+        )
+        admissible = None if anywhere else AdmissibleConfigurations(model, config)
+        ranges = _ranges(model, joint_range or [])
         with progress_bar(f"{count} configurations") as progress:
             design = design_measurements(
-                model, count, criterion, position_only, admissible=admissible, seed=seed, progress=progress
+                model,
+                count,
+                criterion,
+                position_only,
+                ranges,
+                admissible,
+                seed,
+                progress,
+                is_complete=complete or None,
             )
         seconds = time.perf_counter() - started
         result = {
             "criterion": criterion,
             "count": count,
+            "parameters": design.num_parameters,
+            "complete": design.is_complete,
             "b3": design.b3,
             "bound": design.bound,
             "value": design.value,
@@ -114,8 +155,40 @@ def _place(text: str) -> tuple[float, float, float]:
     return x, y, z
 
 
+def _box(text: str | None) -> tuple[np.ndarray, np.ndarray] | None:
+    if text is None:
+        return None
+    try:
+        corners = np.array([float(part) for part in text.split(",")]).reshape(2, 3)
+    except ValueError:
+        raise ValueError(
+            f"--box must be six numbers in m such as 0.2,-0.5,0,0.8,0.5,0.9, got '{text}'"
+        ) from None
+    return corners[0], corners[1]
+
+
+def _ranges(robot: RobotModel, texts: list[str]) -> tuple[AxisRange, ...]:
+    """The robot's own ranges with those of ``--range`` in their places."""
+    ranges = list(own_ranges(robot))
+    for text in texts:
+        found = re.fullmatch(r"([1-6])=(-?[\d.]+):(-?[\d.]+)", text.strip())
+        if not found:
+            raise ValueError(f"--range must be like 2=-45:90 with a joint from 1 to 6, got '{text}'")
+        joint = int(found[1]) - 1
+        low, high = float(found[2]), float(found[3])
+        limits = np.rad2deg([robot.lower[joint], robot.upper[joint]])
+        if not (limits[0] - _ROUNDING <= low < high <= limits[1] + _ROUNDING):
+            raise ValueError(
+                f"--range of joint {joint + 1} must be within {limits[0]:g} to {limits[1]:g} deg, "
+                f"got '{text}'"
+            )
+        ranges[joint] = AxisRange(low, high)
+    return tuple(ranges)
+
+
 def design_verdict(design: MeasurementDesign) -> str:
-    """What was reached, in two sentences."""
+    """What was reached, in a few sentences."""
+    model = "the complete error model" if design.is_complete else "Probst (2024)"
     name = design.criterion.upper()
     restricted = (
         f", {design.num_refused} of those that came into question refused" if design.num_refused else ""
@@ -123,7 +196,8 @@ def design_verdict(design: MeasurementDesign) -> str:
     text = (
         f"{len(design.configurations)} configurations with {name} = {design.value:.5g}; no choice from the "
         f"{design.num_candidates} candidates of the grid{restricted} has more than {design.bound:.5g}, so "
-        f"this one is at least {100.0 * design.value / design.bound:.2f} % of the best."
+        f"this one is at least {100.0 * design.value / design.bound:.2f} % of the best. It determines "
+        f"{design.num_parameters} parameters of {model}."
     )
     return text if design.criterion == "b3" else f"{text} B3 = {design.b3:.4g}."
 

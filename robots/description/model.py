@@ -25,6 +25,7 @@ from robots.description.beam import Beam, beam_surrogate
 from robots.description.calibration import Calibration
 from robots.description.counterbalance_spring import CounterbalanceSpring
 from robots.description.drive_train import DriveTrain, drive_trains
+from robots.description.measuring import MeasuringRange
 from robots.description.placement import Picture, Placement
 from robots.description.urdf_in.reader import is_urdf, read_urdf
 from robots.drivetrain.counterbalance import Counterbalance
@@ -123,6 +124,7 @@ class RobotModel:
     links: list[Link] = field(default_factory=list)
     payload: PayloadLimits = field(default_factory=PayloadLimits)
     home_deg: list[float] = numbers((), (0, NUM_JOINTS), unit="deg")  # where it works best; empty: found
+    measuring: MeasuringRange = field(default_factory=MeasuringRange)
     calibration: Calibration = field(default_factory=Calibration)
     counterbalance: CounterbalanceSpring | None = None
 
@@ -306,6 +308,7 @@ def _problem(robot: RobotModel) -> tuple[_Keys, str]:
     if not any(problem for _, problem in problems):
         problems.append((("counterbalance",), _refusal(lambda: robot.counterbalance_at_axis_2)))
     problems.append((("calibration",), robot.calibration.problem()))
+    problems.append((("measuring",), robot.measuring.problem()))
     if robot.payload.largest_mass > 0.0:
         carried = Link(inertia=robot.payload.inertia)
         problems.append((("payload", "inertia"), _inertia_problem("payload", carried)))

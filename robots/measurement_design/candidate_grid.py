@@ -9,13 +9,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from robots.calibration.identifiability import IdentifiableParameters, identifiable_parameters
-from robots.description.error_parameters import NUM_PARAMETERS
 from robots.description.model import NUM_JOINTS, RobotModel
-from robots.kinematics.error_kinematics import ErrorKinematics
+from robots.measurement_design.parameters import error_parameters
 
 _DEGREE = 2
 _NODES = 2.0 * np.pi * np.arange(2 * _DEGREE + 1) / (2 * _DEGREE + 1)
+_HALF_TURN = 180.0  # deg
 _FULL_TURN = 360.0 * (1.0 - 1e-9)
 
 
@@ -33,11 +32,19 @@ class AxisRange:
         return angles[:-1] if self.upper_deg - self.lower_deg >= _FULL_TURN else angles
 
 
-# Probst (2024), section 4.2: 13^6 = 4,826,809 candidates.
-SOURCE_RANGES = tuple(
-    AxisRange(lower, upper)
-    for lower, upper in ((-100, 100), (-45, 90), (-90, 30), (-180, 180), (-90, 90), (-180, 180))
-)
+def own_ranges(robot: RobotModel) -> tuple[AxisRange, ...]:
+    """The ranges in which a robot is measured: those that its file names, else all of its own, up to a turn.
+
+    Those of the IRB 1200 are those of Probst (2024), section 4.2: 13^6 = 4,826,809 candidates.
+    """
+    measuring = robot.measuring
+    if measuring.lower_deg:
+        return tuple(map(AxisRange, measuring.lower_deg, measuring.upper_deg))
+    limits = np.rad2deg([robot.lower, robot.upper])
+    half = np.minimum(0.5 * (limits[1] - limits[0]), _HALF_TURN)
+    # Of a range of more than a turn, the turn around zero if it has one.
+    middle = np.clip(0.0, limits[0] + half, limits[1] - half)
+    return tuple(AxisRange(float(m - h), float(m + h)) for m, h in zip(middle, half, strict=True))
 
 
 class CandidateGrid:
@@ -46,19 +53,23 @@ class CandidateGrid:
     def __init__(
         self,
         robot: RobotModel,
-        ranges: tuple[AxisRange, ...] = SOURCE_RANGES,
+        ranges: tuple[AxisRange, ...] | None = None,
         position_only: bool = False,
+        is_complete: bool = False,
     ) -> None:
         """Evaluates the regressor at the 5^6 nodes.
 
         Args:
             robot: the nominal robot.
-            ranges: of the six joints.
+            ranges: of the six joints; None for the robot's own.
             position_only: whether only the position of the tool is measured.
+            is_complete: whether its parameters are those of the complete error model, or else those of Probst
+                (2024).
 
         Raises:
             ValueError: if a range is empty or its samples are too few, or there are not six.
         """
+        ranges = own_ranges(robot) if ranges is None else ranges
         if len(ranges) != NUM_JOINTS:
             raise ValueError(f"candidate grid: needs the ranges of {NUM_JOINTS} joints, got {len(ranges)}")
         for number, axis in enumerate(ranges, 1):
@@ -67,13 +78,12 @@ class CandidateGrid:
                     f"candidate grid: joint {number} needs two samples or more in an increasing range, got "
                     f"{axis.samples} from {axis.lower_deg} to {axis.upper_deg} deg"
                 )
-        self.parameters: IdentifiableParameters = identifiable_parameters(robot, position_only)
-        self._model = ErrorKinematics(robot)
+        self.parameters = error_parameters(robot, position_only, is_complete)
         self._rows = slice(3, 6) if position_only else slice(0, 6)
         self.angles = [axis.angles() for axis in ranges]
         self.shape = tuple(len(angles) for angles in self.angles)
         nodes = np.stack(np.meshgrid(*[_NODES] * NUM_JOINTS, indexing="ij"), -1).reshape(-1, NUM_JOINTS)
-        # Block by block: the regressor of all 48 parameters need not fit into memory at once.
+        # Block by block: the regressor of all parameters need not fit into memory at once.
         self._at_nodes = np.concatenate([self.regressor(block) for block in np.array_split(nodes, 25)])
         self._num_rows = self._at_nodes.shape[1]
         self._at_nodes = self._at_nodes.reshape(-1, self.parameters.rank)
@@ -92,7 +102,7 @@ class CandidateGrid:
 
     def regressor(self, q: np.ndarray) -> np.ndarray:
         """Regressors of the identifiable parameters in m and rad, (n, 6) -> (n, 6 or 3, rank)."""
-        return self._model.regressor(q, np.zeros(NUM_PARAMETERS))[:, self._rows, self.parameters.independent]
+        return self.parameters.regressor(q)[:, self._rows]
 
     def information(self, q: np.ndarray) -> np.ndarray:
         """Information matrices Theta^T Theta of single measurements, (n, 6) -> (n, rank, rank)."""

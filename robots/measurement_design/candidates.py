@@ -1,6 +1,6 @@
-"""The admissible candidates of a grid; each is checked only when it is considered."""
+"""The admissible candidates of a grid."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 
 import numpy as np
 
@@ -10,28 +10,43 @@ from robots.measurement_design.candidate_grid import CandidateGrid
 Admissible = Callable[[np.ndarray], np.ndarray]
 
 _UNKNOWN, _ALLOWED, _REFUSED = 0, 1, 2
+_FEW = (
+    60_000  # cases that differ: so many are all checked before anything else, which takes about two seconds
+)
+_MOST_TRIED = 200  # times as many random candidates as are wanted
 _POOL = 20  # times as many candidates as are wanted are sorted at once
 
 
 class Candidates:
-    """A grid with its constraints. Only the candidates with the largest gains are ever checked."""
+    """A grid with its constraints.
 
-    def __init__(self, grid: CandidateGrid, admissible: Admissible | None = None) -> None:
+    Candidates that differ in joints alone on which the constraints do not depend are one case. If there are
+    few cases all of them are checked at once, else only those of the candidates with the largest gains.
+    """
+
+    def __init__(
+        self, grid: CandidateGrid, admissible: Admissible | None = None, indifferent: Sequence[int] = ()
+    ) -> None:
         """Takes a grid.
 
         Args:
             grid: the candidates.
             admissible: which configurations are allowed; None for all of them.
+            indifferent: indices of joints on which that does not depend anywhere on the grid.
         """
         self.grid = grid
         self._admissible = admissible
-        self._state = np.zeros(len(grid), dtype=np.uint8)
-        self._refused: list[np.ndarray] = [np.empty(0, dtype=int)]
+        self._cases = tuple(1 if i in indifferent else n for i, n in enumerate(grid.shape))
+        self._state = np.zeros(self._cases, dtype=np.uint8)
+        self._each = len(grid) // self._state.size  # candidates in a case
+        if admissible is not None and self._state.size <= _FEW:
+            cases = np.stack(np.unravel_index(np.arange(self._state.size), self._cases))
+            self._check(np.asarray(np.ravel_multi_index(tuple(cases), grid.shape)))
 
     @property
     def num_refused(self) -> int:
         """How many candidates have been found to be inadmissible so far."""
-        return sum(map(len, self._refused))
+        return int(np.count_nonzero(self._state == _REFUSED)) * self._each
 
     def best(
         self, root: np.ndarray, count: int, without: np.ndarray | None = None
@@ -53,28 +68,28 @@ class Candidates:
         gains = self.grid.screen(root)
         if without is not None:
             gains[without] = -np.inf
-        gains[np.concatenate(self._refused)] = -np.inf
+        open_ones = np.flatnonzero(np.broadcast_to(self._state != _REFUSED, self.grid.shape))
+        open_gains = gains[open_ones]  # a partition is slow where many gains are the same
         pool = _POOL * count
         while True:
-            pool = min(pool, len(gains))
-            numbers = np.argpartition(gains, -pool)[-pool:]
+            pool = min(pool, len(open_gains))
+            numbers = open_ones[np.argpartition(open_gains, -pool)[-pool:]] if pool else open_ones
             found = self._first_allowed(numbers[np.argsort(-gains[numbers])], count)
             found = found[np.isfinite(gains[found])]
             if len(found) == count:
                 return found, gains[found]
-            if pool == len(gains):
+            if pool == len(open_gains):
                 raise ValueError(f"fewer than {count} candidate configurations are admissible")
             pool *= 8
 
     def _first_allowed(self, numbers: np.ndarray, count: int) -> np.ndarray:
         """The first ``count`` admissible ones of some candidates, or as many as there are."""
-        found = np.empty(0, dtype=int)
-        for start in range(0, len(numbers), count):
-            block = numbers[start : start + count]
-            self._check(block[self._state[block] == _UNKNOWN])
-            found = np.concatenate([found, block[self._state[block] != _REFUSED]])
-            if len(found) >= count:
-                break
+        found, block_size = np.empty(0, dtype=int), count
+        start = 0
+        while start < len(numbers) and len(found) < count:
+            block = numbers[start : start + block_size]
+            found = np.concatenate([found, block[self._check(block)]])
+            start, block_size = start + block_size, 2 * block_size
         return found[:count]
 
     def sample(self, rng: np.random.Generator, count: int) -> np.ndarray:
@@ -83,11 +98,10 @@ class Candidates:
         Raises:
             ValueError: if too few candidates are admissible.
         """
-        order = rng.choice(len(self.grid), min(len(self.grid), 20 * count), replace=False)
+        order = rng.choice(len(self.grid), min(len(self.grid), _MOST_TRIED * count), replace=False)
         found = np.empty(0, dtype=int)
-        for block in np.array_split(order, 20):
-            self._check(block)
-            found = np.concatenate([found, block[self._state[block] != _REFUSED]])
+        for block in np.array_split(order, _MOST_TRIED):
+            found = np.concatenate([found, block[self._check(block)]])
             if len(found) >= count:
                 return found[:count]
         raise ValueError(
@@ -95,9 +109,18 @@ class Candidates:
             "widen the ranges or what is allowed"
         )
 
-    def _check(self, numbers: np.ndarray) -> None:
+    def _check(self, numbers: np.ndarray) -> np.ndarray:
+        """Which candidates are admissible, (n,) bool; what is not known yet is found out."""
         if self._admissible is None or not len(numbers):
-            return
-        allowed = self._admissible(self.grid.configurations(numbers))
-        self._state[numbers] = np.where(allowed, _ALLOWED, _REFUSED)
-        self._refused.append(numbers[~allowed])
+            return np.ones(len(numbers), dtype=bool)
+        indices = np.unravel_index(numbers, self.grid.shape)
+        case = np.ravel_multi_index(
+            tuple(np.minimum(i, n - 1) for i, n in zip(indices, self._cases, strict=True)), self._cases
+        )
+        state = self._state.reshape(-1)
+        unknown, first = np.unique(case[state[case] == _UNKNOWN], return_index=True)
+        if len(unknown):
+            examples = numbers[state[case] == _UNKNOWN][first]
+            allowed = self._admissible(self.grid.configurations(examples))
+            state[unknown] = np.where(allowed, _ALLOWED, _REFUSED)
+        return state[case] == _ALLOWED

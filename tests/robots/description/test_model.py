@@ -52,6 +52,7 @@ def test_every_part_of_a_shipped_robot_names_its_source(name: str):
     robot = load_robot(name)
     found = sources(robot, name)
     assert found.pop(f"{name}.calibration.source") == ""  # a robot as drawn
+    assert bool(found.pop(f"{name}.measuring.source")) == bool(robot.measuring.lower_deg)
     elastic = [joint.tilting for joint in robot.joints] + [link.beam for link in robot.links]
     optional = [part for part in (*elastic, robot.counterbalance) if part is not None]
     # 6 joints with placement, limits, drive train; base, tool; 7 links with 3 each; payload with 2.
