@@ -47,7 +47,7 @@ def test_laws_are_compared(robot: str):
     result = truetip("compare", "--quick", "--robot", robot, "--jobs=1")
     assert result.exit_code == 0, result.output
     assert set(RESULTS) <= {path.name for path in Path("out").iterdir()}
-    laws = json.loads(Path("out/summary.json").read_text())["laws"]
+    laws = json.loads(Path("out/summary.json").read_text())["runs"]
     assert "carried over" in result.stdout
     assert "Guard: no intervention" in result.stdout
     assert {"open_loop", "numerical_ik", "pbvs", "position_level"} <= set(laws)
