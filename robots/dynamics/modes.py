@@ -14,13 +14,12 @@ from pydrake.multibody.tree import JacobianWrtVariable
 from scipy.linalg import eigh
 
 from robots.description.model import NUM_JOINTS, RobotModel
+from robots.dynamics.load_stiffness import load_stiffness
 from robots.dynamics.plant import add_robot
 from robots.kinematics.arm_structure import seen_from_base
 from robots.kinematics.forward import Kinematics
 from robots.kinematics.workspace import shoulder
 
-# rad; central differences of a load that changes over radians are then right to eight digits.
-_STEP = 1e-4
 _ALONG = 0.9  # cosine of an axis that points nearly along a direction
 _STEPS = 61  # of joints 2 and 3, among which the longest reach is looked for
 _UNBALANCED = 1e-6  # of the load; an arm that its springs can carry comes to rest far better
@@ -89,7 +88,7 @@ class ModalAnalysis:
         load, deflection = self._parts.load(self._context)[self._rows], rest[self._rows]
         stiffness = self._parts.tangent_stiffness(deflection)
         M = self._plant.CalcMassMatrix(self._context)[np.ix_(self._rows, self._rows)]
-        K = np.diag(stiffness) + self._load_stiffness(rest)
+        K = np.diag(stiffness) + load_stiffness(self._parts, self._context, self._rows)
         squared, shape = eigh(K, M)
         unbalanced = stiffness * (self._parts.static_deflection(load) - deflection)
         is_at_rest = np.abs(unbalanced).max() <= _UNBALANCED * np.abs(load).max()
@@ -115,22 +114,6 @@ class ModalAnalysis:
             strain / strain.sum(0),
             J[:, self._rows] @ shape,
         )
-
-    def _load_stiffness(self, rest: np.ndarray) -> np.ndarray:
-        """What gravity and counterbalance add to the springs in N m / rad: -d(load) / d(deflections)."""
-        stiffness = np.empty((len(self._rows), len(self._rows)))
-        positions = rest.copy()
-        for column, row in enumerate(self._rows):
-            loads = []
-            for step in (_STEP, -_STEP):
-                positions[row] = rest[row] + step
-                self._plant.SetPositions(self._context, positions)
-                loads.append(self._parts.load(self._context)[self._rows])
-            positions[row] = rest[row]
-            stiffness[:, column] = -(loads[0] - loads[1]) / (2.0 * _STEP)
-        self._plant.SetPositions(self._context, rest)
-        # Loads with a potential have a symmetric stiffness; the differences have rounding.
-        return 0.5 * (stiffness + stiffness.T)
 
 
 def stretched(robot: RobotModel) -> np.ndarray:

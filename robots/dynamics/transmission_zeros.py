@@ -13,12 +13,12 @@ from pydrake.multibody.tree import JacobianWrtVariable
 from scipy.linalg import eig, null_space
 
 from robots.description.model import NUM_JOINTS, RobotModel
+from robots.dynamics.load_stiffness import load_stiffness
 from robots.dynamics.plant import add_robot
 
 # 1/s; where massless parts stand between input and output, zeros lie at infinity, and rounding brings them
 # back to 1e7 and more. The fastest spring and damper of a robot have some 1e4.
 _INFINITE = 1e6
-_LOAD_STEP = 1e-4  # rad; central differences of a load that changes over radians are right to eight digits
 _SINGULAR = 1e-6  # of the largest singular value, with turns in rad and motions in m
 
 
@@ -139,19 +139,8 @@ class ZeroAnalysis:
         return transmission_zeros(M, self._D, self._stiffness(), self._B, J)
 
     def _stiffness(self) -> np.ndarray:
-        """Springs, and what gravity and counterbalance add: -d(load) / dq, in N m / rad."""
+        """Springs, and what gravity and counterbalance add, in N m / rad."""
         rest = self._plant.GetPositions(self._context)
-        stiffness = np.zeros((len(rest), len(rest)))
-        for column in range(len(rest)):
-            step = np.zeros(len(rest))
-            step[column] = _LOAD_STEP
-            loads = []
-            for positions in (rest + step, rest - step):
-                self._plant.SetPositions(self._context, positions)
-                loads.append(self._parts.load(self._context))
-            stiffness[:, column] = -(loads[0] - loads[1]) / (2.0 * _LOAD_STEP)
-        self._plant.SetPositions(self._context, rest)
-        # Loads with a potential have a symmetric stiffness; the differences have rounding.
-        stiffness = 0.5 * (stiffness + stiffness.T)
+        stiffness = load_stiffness(self._parts, self._context, range(len(rest)))
         stiffness[self._sprung, self._sprung] += self._parts.tangent_stiffness(rest[self._sprung])
         return stiffness
