@@ -1,4 +1,4 @@
-"""The stiffness that gravity and counterbalance add to springs, for all that linearises a robot about rest."""
+"""The stiffness that gravity and counterbalance add to springs, about rest."""
 
 from collections.abc import Sequence
 
