@@ -10,6 +10,7 @@ from diagrams.runs.simulation import Experiment
 from diagrams.scenario.scenario import ScenarioError, load_scenario, scenario_text, shipped_scenarios
 from systems.cell.events.station_events import PayloadChange, ToolShift
 from systems.cell.pose_camera import PoseCameraConfig
+from systems.link.makers import AbbEgm
 from systems.reference.shapes import Circle, FigureEight, Points, Shape
 
 
@@ -100,7 +101,9 @@ def test_a_tag_may_say_whose_gains_and_whose_link_they_are(tmp_path: Path):
     scenario = load_scenario(name, ["servo.laws.numerical_ik.rotation=2"])
     gains = scenario.servo.laws["numerical_ik"]
     assert (gains.translation, gains.rotation, gains.drive) == (3.0, 2.0, "cascade")
-    assert scenario.station.link.run.timeout == 5.0
+    link = scenario.station.link
+    assert isinstance(link, AbbEgm)
+    assert link.run.timeout == 5.0
     wrong = written(tmp_path, "servo: {laws: {numerical_ik: !Pbvs {translation: 3}}}\n", "wrong.yaml")
     with pytest.raises(
         ScenarioError, match=r"line 1: servo\.laws\.numerical_ik takes .* !NumericalIk, got !Pbvs"
