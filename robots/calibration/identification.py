@@ -171,6 +171,7 @@ class _Search:
         kept = clean if self._config.leave_out_outliers else np.ones(n, dtype=bool)
         fit, noise, found = self._solve(kept, start, theta)
         if not fit.is_converged:
+            self._refuse_what_is_hidden(fit, kept, reducible)  # too few rows are a reason that one can mend
             rms = 1e3 * float(np.sqrt(np.mean(fit.at.residuals[kept, -3:] ** 2)))
             raise IdentificationError(
                 f"the identification has not converged after {self._iterations} iterations and leaves "
