@@ -6,50 +6,27 @@ from robots.description.model import NUM_JOINTS
 from systems.link.abb.client import EgmClient
 from systems.link.abb.messages import Command, Mode, RobotReport
 from systems.link.abb.signal_client import SignalClient
+from systems.link.guided import GuidedRobot
 from systems.link.session import Link
 
 _SIGNAL_AGE = 0.1  # s, beyond which signals and earlier messages say nothing of the present motion
 
 
-class AbbRobotLink:
+class AbbRobotLink(GuidedRobot[RobotReport]):
     """Fits `systems.link.protocols.RobotLink`."""
 
     def __init__(self, client: EgmClient, signals: SignalClient | None = None) -> None:
         """Takes over sockets that are open; signals of None where the controller sends none."""
-        self._client, self._signals = client, signals
+        super().__init__(client)
+        self._client: EgmClient = client
+        self._signals = signals
         self._last: RobotReport | None = None
         self.velocity = self.effort = np.zeros(NUM_JOINTS)
-
-    @property
-    def arrived(self) -> float:
-        """Steady time at which the newest report came, in s."""
-        return self._client.arrived
-
-    @property
-    def place(self) -> str:
-        """Where the controller is waited for."""
-        address, port = self._client.channel.address
-        return f"UDP {address}:{port}"
 
     @property
     def ports(self) -> tuple[int, int]:
         """Where reports and test signals come in; 0 for no signals."""
         return self._client.channel.address[1], self._signals.channel.address[1] if self._signals else 0
-
-    @property
-    def epoch(self) -> int:
-        """Grows whenever commands must start anew."""
-        return self._client.session.epoch
-
-    @property
-    def heard(self) -> float:
-        """Steady time at which anything last came from the controller, in s."""
-        return self._client.session.heard
-
-    @property
-    def trouble(self) -> str:
-        """Why the controller's newest messages are refused, or commands had to start anew; else empty."""
-        return self._client.session.trouble
 
     def why_not_ready(self) -> str:
         """What keeps the robot from following commands."""
@@ -77,14 +54,6 @@ class AbbRobotLink:
     def stop(self, position: np.ndarray, velocity: np.ndarray, is_speed_only: bool = False) -> bool:
         """Answers the newest message on the way to rest, also one that was refused."""
         return self._client.stop(_mode(is_speed_only), Command(position=position, velocity=velocity))
-
-    def warm_up(self) -> None:
-        """Reads the last report and writes the last command once more."""
-        self._client.warm_up()
-
-    def counters(self) -> dict[str, int]:
-        """What has come and gone, by name."""
-        return self._client.session.counters.as_dict()
 
     def _note_motion(self, last: RobotReport | None, report: RobotReport) -> None:
         """Speeds and torques: from test signals if there are new ones, else from the messages themselves."""

@@ -6,6 +6,7 @@ import numpy as np
 
 from robots.description.model import NUM_JOINTS
 from systems.link.client import LinkClient
+from systems.link.guided import GuidedRobot
 from systems.link.kuka.telegrams import RobotTelegram, RsiError, SensorTelegram, read_robot, write_sensor
 from systems.link.session import Link
 
@@ -86,45 +87,19 @@ class RsiCodec:
         return RsiCommand(safe.position, np.zeros(NUM_JOINTS), safe.is_speed_only)
 
 
-class KukaRobotLink:
+class KukaRobotLink(GuidedRobot[RsiReport]):
     """Fits `systems.link.protocols.RobotLink`."""
 
     def __init__(self, client: LinkClient[RsiReport]) -> None:
         """Takes over a socket that is open."""
-        self._client = client
+        super().__init__(client)
         self._last: RsiReport | None = None
         self.velocity, self.effort = np.zeros(NUM_JOINTS), np.zeros(NUM_JOINTS)
-
-    @property
-    def arrived(self) -> float:
-        """Steady time at which the newest report came, in s."""
-        return self._client.arrived
-
-    @property
-    def place(self) -> str:
-        """Where the controller is waited for."""
-        address, port = self._client.channel.address
-        return f"UDP {address}:{port}"
 
     @property
     def ports(self) -> tuple[int, int]:
         """Where reports come in; there are no test signals."""
         return self._client.channel.address[1], 0
-
-    @property
-    def epoch(self) -> int:
-        """Grows whenever commands must start anew."""
-        return self._client.session.epoch
-
-    @property
-    def heard(self) -> float:
-        """Steady time at which anything last came from the controller, in s."""
-        return self._client.session.heard
-
-    @property
-    def trouble(self) -> str:
-        """Why the controller's newest messages are refused, or commands had to start anew; else empty."""
-        return self._client.session.trouble
 
     def why_not_ready(self) -> str:
         """What keeps the robot from following commands."""
@@ -153,11 +128,7 @@ class KukaRobotLink:
         """Answers the newest message on the way to rest, also one that was refused."""
         return self._client.answer_stopping(RsiCommand(position, velocity, is_speed_only))
 
-    def warm_up(self) -> None:
-        """Reads the last report and writes the last command once more."""
-        self._client.warm_up()
-
     def counters(self) -> dict[str, int]:
         """What has come and gone, by name; ``late_replies`` as the controller counts them."""
         late = 0 if self._last is None else self._last.telegram.late
-        return self._client.session.counters.as_dict() | {"late_replies": late}
+        return super().counters() | {"late_replies": late}
