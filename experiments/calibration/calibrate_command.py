@@ -31,7 +31,7 @@ from experiments.cli.console import print_files, progress_bar, refusing
 from experiments.cli.json_output import human_console, json_output
 from experiments.cli.option_limits import at_least
 from experiments.cli.options import JsonOption, OutOption, RobotOption, ScenarioOption, SetOption
-from experiments.cli.prepare import Prepared, check, prepare
+from experiments.cli.prepare import Prepared, check, prepare, simulated_only
 from experiments.cli.staging import YAML, staged_file, staged_folder
 from experiments.metrics.run_metrics import summary
 from experiments.report.files import write_text
@@ -146,6 +146,8 @@ def calibrate_command(
         if cell is not None:
             raise ValueError("--cell is for a table with a column target, instrument or distance")
         if not measurements:  # of tables nothing but the kinematics is asked
+            measure = "measure there (truetip design --program) and give the table with --measurements"
+            simulated_only(prepared, "calibrate", measure)
             check(prepared, ["open_loop"])
         stage = stack.enter_context(staged_folder(out))
         robot_file = stack.enter_context(staged_file(write, *YAML)) if write else None

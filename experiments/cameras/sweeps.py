@@ -119,6 +119,11 @@ def _cameras(setup: SweepSetup) -> Cameras:
     return setup.cell.camera_model(setup.robot.base.pose())
 
 
+def _to_target(setup: SweepSetup) -> float:
+    """The mean distance in m of the cameras from what they are aimed at."""
+    return float(_cameras(setup).depth(setup.robot.base.pose().multiply(1e-3 * setup.cell.target_mm)).mean())
+
+
 def _number(setup: SweepSetup, value: float) -> SweepPoint:
     """The best cameras for the path, so many of them; never more than there are."""
     cameras, windows = _cameras(setup), setup.cell.windows
@@ -214,6 +219,14 @@ SWEEPS = {
         f"{_PICTURED} at the largest speed of the path: light, saturation and blur.",
         (0.2, 0.3, 0.4, 0.8, 1.6, 3.2),
         lambda setup, value: _pictured(setup, value, replace(setup.images, exposure=1e-3 * value)),
+    ),
+    "aperture": Sweep(
+        "Aperture", "", "f-number",
+        f"{_PICTURED}; the lenses are focused at the target's mean distance, and the light is kept.",
+        (1.4, 2.8, 5.6, 11.0),
+        lambda setup, value: _pictured(
+            setup, value, replace(setup.images, f_number=value, focus_distance=_to_target(setup))
+        ),
     ),
     "sensor_noise": Sweep(
         "Noise of the sensor", "", "standard deviation of a pixel in full scales", f"{_PICTURED}.",

@@ -106,6 +106,20 @@ def _fitted(
     return carried_over(scenario, load_robot(before), load_robot(scenario.robot), stated)
 
 
+def simulated_only(prepared: Prepared, command: str, instead: str) -> None:
+    """Refuses a scenario of a real station for a command that would only simulate one.
+
+    Raises:
+        ValueError: that names the kind of the station and what to do instead.
+    """
+    kind = prepared.scenario.station.kind
+    if kind != "simulated":
+        raise ValueError(
+            f"{command} does not drive a real station, got station.kind={kind}: {instead}, or set "
+            "station.kind=simulated"
+        )
+
+
 def quick(scenario: Scenario, settings: Sequence[str] = ()) -> tuple[Scenario, str]:
     """A scenario that takes a few seconds in one cycle, and in words what makes it quick.
 

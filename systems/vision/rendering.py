@@ -36,7 +36,7 @@ class Sensor:
     brightness: float  # of a light
     background: float
     noise_sigma: float  # standard deviation of a pixel
-    blur_sigma: float  # px, of the lens
+    blur_sigma: float | np.ndarray  # px, of the lens; one, or that of each light, (k,)
 
 
 def draw(
@@ -59,8 +59,9 @@ def draw(
     """
     size = np.maximum(windows[:, 2:] - windows[:, :2] + 1, 0)
     begin = np.concatenate([[0], np.cumsum(np.prod(size, axis=1))])
-    sigma = float(np.sqrt(sensor.blur_sigma**2 + _PIXEL_SIGMA2))
-    reach = np.sqrt(np.diagonal(lights.shape, axis1=1, axis2=2)) + _EDGE * sigma + 0.5 * np.abs(way)
+    sigma = np.broadcast_to(np.sqrt(np.square(sensor.blur_sigma) + _PIXEL_SIGMA2), len(camera))
+    half = np.sqrt(np.diagonal(lights.shape, axis1=1, axis2=2))
+    reach = half + _EDGE * sigma[:, None] + 0.5 * np.abs(way)
     light, place = _places(lights.center, reach, windows[camera])
     offset = (place - lights.center[light]).astype(np.float32)
     share = _lit_share(offset, np.linalg.inv(lights.shape), way, light, sigma)
@@ -94,26 +95,28 @@ def _places(center: np.ndarray, reach: np.ndarray, windows: np.ndarray) -> tuple
 
 
 def _lit_share(
-    offset: np.ndarray, S_inverse: np.ndarray, way: np.ndarray, light: np.ndarray, sigma: float
+    offset: np.ndarray, S_inverse: np.ndarray, way: np.ndarray, light: np.ndarray, sigma: np.ndarray
 ) -> np.ndarray:
     """How bright pixels are, 0 to 1, from their offsets (p, 2) in px from the centres of their lights.
 
-    The distance from the outline is measured along the radius, and the edge is taken as straight. A straight
-    edge about a circle of radius r would spread its light over pi (r^2 + sigma^2), so r is made smaller.
+    Edges are as wide as ``sigma`` of each light in px says, (k,). The distance from the outline is measured
+    along the radius, and the edge is taken as straight. A straight edge about a circle of radius r would
+    spread its light over pi (r^2 + sigma^2), so r is made smaller.
     """
     r2 = 1.0 / np.sqrt(np.linalg.det(S_inverse))
     S_inverse = S_inverse * (1.0 + sigma * sigma / r2)[:, None, None]
     a, b, c = (S_inverse[:, i, j].astype(np.float32)[light] for i, j in ((0, 0), (0, 1), (1, 1)))
     longest = float(np.abs(way).max(initial=0.0))
     nodes, weights = _quadrature(
-        1 if longest < _STILL else 2 + int(longest / (2.0 * sigma))
+        1 if longest < _STILL else 2 + int(longest / (2.0 * sigma.min(initial=np.inf)))
     )  # blur fills the gaps
+    width = sigma.astype(np.float32)[light]
     share = np.zeros(len(offset), np.float32)
     for node, weight in zip(nodes, weights, strict=True):
         u, v = (offset - (0.5 * node * way).astype(np.float32)[light]).T
         radius = np.sqrt(u * u + v * v)
         relative = np.sqrt(a * u * u + 2.0 * b * u * v + c * v * v) + np.float32(1e-6)
-        share += np.float32(0.5 * weight) * ndtr((radius / relative - radius) / np.float32(sigma))
+        share += np.float32(0.5 * weight) * ndtr((radius / relative - radius) / width)
     return share
 
 

@@ -12,6 +12,7 @@ import numpy as np
 
 from systems.vision.arm_capsules import Capsules
 from systems.vision.camera_model import Cameras
+from systems.vision.depth_of_field import DepthOfField
 from systems.vision.marker_body import DetectionBody
 from systems.vision.rendering import Picture, Sensor, draw
 from systems.vision.sphere_images import Ellipses, sphere_images
@@ -34,6 +35,9 @@ class ImageConfig:
     blur_sigma: float = 0.7  # px, of the lens; assumed
     reflections: float = 0.0  # false lights in a window on average
     margin: float = 16.0  # px, of a window beyond the markers that are expected in it
+    f_number: float = 0.0  # of the aperture; 0: equally sharp at all distances
+    focus_distance: float = 5.0  # m, at which the lenses are focused; assumed
+    pixel_pitch_um: float = 5.5  # assumed
 
 
 class ImageSource:
@@ -113,18 +117,33 @@ class ImageSource:
             shown &= ~occluded(self._cameras.p_WC, p_W, arm)
         camera, marker = np.nonzero(shown)
         way = self._way(X_WE, V_WE)[camera, marker]
+        blur = self._blur(p_W)[camera, marker]
         lights = Ellipses(spheres.center[camera, marker], spheres.shape[camera, marker])
         if self._config.reflections > 0.0:
             count, lights = self._with_reflections(lights, windows, rng)
             camera = np.concatenate([camera, np.repeat(np.arange(len(windows)), count)])
             way = np.concatenate([way, np.zeros((count.sum(), 2))])
+            blur = np.concatenate([blur, np.full(count.sum(), self._config.blur_sigma)])
         sensor = Sensor(
             self._config.brightness * self._config.exposure,
             self._config.background,
             self._config.noise_sigma,
-            self._config.blur_sigma,
+            blur,
         )
         return draw(camera, lights, way, windows, sensor, rng)
+
+    def _blur(self, p_W: np.ndarray) -> np.ndarray:
+        """Standard deviations of the edges of the markers in px, (n, m): of the lens, and out of focus."""
+        distance = self._cameras.depth(p_W)
+        sharp = np.full(distance.shape, self._config.blur_sigma)
+        if not self._config.f_number:
+            return sharp
+        pitch = 1e-6 * self._config.pixel_pitch_um
+        apart = [
+            DepthOfField(f * pitch, self._config.f_number, self._config.focus_distance, pitch)
+            for f in self._cameras.focal.mean(1)
+        ]
+        return np.hypot(sharp, [lens.blur_sigma_px(d) for lens, d in zip(apart, distance, strict=True)])
 
     def _way(self, X_WE: np.ndarray, V_WE: np.ndarray) -> np.ndarray:
         """How far the images of the markers move during the exposure in px, (n, m, 2)."""
@@ -151,10 +170,10 @@ class ImageSource:
 
 
 def _check(config: ImageConfig, threshold: float) -> None:
-    for name in ("exposure", "brightness", "blur_sigma"):
+    for name in ("exposure", "brightness", "blur_sigma", "focus_distance", "pixel_pitch_um"):
         if not 0.0 < getattr(config, name) < np.inf:
             raise ValueError(f"images: {name} must be positive, got {getattr(config, name)}")
-    for name in ("background", "noise_sigma", "reflections", "margin"):
+    for name in ("background", "noise_sigma", "reflections", "margin", "f_number"):
         if not 0.0 <= getattr(config, name) < np.inf:
             raise ValueError(f"images: {name} must not be negative, got {getattr(config, name)}")
     dark = config.background + CLEAR_OF_NOISE * config.noise_sigma

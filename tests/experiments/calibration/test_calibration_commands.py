@@ -122,6 +122,7 @@ def test_bad_rows_are_named_and_do_no_harm(calibrated: Path, tmp_path: Path):
         (["calibrate", "--measurements", "x.csv", "--count", "30"], "--count is for simulated measurements"),
         (["calibrate", "--validation", "x.csv"], "--validation needs --measurements"),
         (["calibrate", "--measurements", "none.csv"], "measurements none.csv: no such file"),
+        (["calibrate", "--set", "station.kind=egm"], "calibrate does not drive a real station"),
         (["calibrate", "--count", "2"], "--count must be at least 5, got 2"),
     ],
 )

@@ -48,6 +48,23 @@ def test_the_light_in_a_picture_is_the_area_of_the_ellipse_and_its_mean_the_cent
         np.testing.assert_allclose(spread, spheres.shape[i, 0] / 4.0 + blur * np.eye(2), rtol=0.1, atol=0.3)
 
 
+def test_out_of_focus_a_marker_is_spread_by_its_blur_circle():
+    """A disc of diameter b has the variance b^2/16 along an axis; straight edges add a little light."""
+    lens = {"f_number": 5.0, "focus_distance": 2.0, **DARK}
+    sharp, soft = (
+        expose(ImageSource(CAMERAS, CELL.windows, ONE, ImageConfig(**config))) for config in (DARK, lens)
+    )
+    distance = CAMERAS.depth(X[:3, 3])
+    f = CAMERAS.focal.mean(1) * 5.5e-6
+    circle = f**2 / 5.0 * np.abs(distance - 2.0) / (distance * (2.0 - f)) / 5.5e-6  # px
+    assert circle.min() > 1.5
+    for before, after, b in zip(sharp, soft, circle, strict=True):
+        (light, middle, spread), (light_too, middle_too, wider) = moments(before), moments(after)
+        assert light_too == pytest.approx(light, rel=0.06)
+        np.testing.assert_allclose(middle_too, middle, atol=0.03)
+        np.testing.assert_allclose(np.diag(wider - spread), b * b / 16.0, rtol=0.15)
+
+
 def test_motion_stretches_the_picture_along_its_way_and_leaves_its_middle():
     """2 m/s for 4 ms: a box of width w has the variance w^2/12; eight bits cut the faint ends."""
     images = ImageSource(CAMERAS, CELL.windows, ONE, ImageConfig(exposure=4e-3, brightness=200.0, **DARK))
