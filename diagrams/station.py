@@ -11,6 +11,7 @@ from pydrake.systems.primitives import (
 )
 
 from diagrams.driven_robot import add_driven_robot
+from diagrams.inertial_sensors import add_inertial_sensors, seed_noise
 from diagrams.integration import Change
 from diagrams.scenario.scenario import StationConfig
 from diagrams.true_robot import true_robot, with_payload_centre
@@ -27,6 +28,7 @@ from systems.cell.events.station_events import (
     of_kind,
 )
 from systems.cell.events.true_geometry import TrueGeometry
+from systems.cell.inertial_sensors import InertialLoggerConfig
 from systems.cell.joint_sensor import JointSensor
 from systems.cell.marker_camera import MarkerCamera
 from systems.cell.pose_camera import BLOCK, PoseCamera
@@ -58,6 +60,8 @@ class SimulatedStation(Diagram):
         out ``pose_sample``       PoseSample
     and if its drives take it:
         in  ``torque_feedforward``  vector 6 in N m, joint side
+    and for each logger of inertial sensors on it:
+        out ``inertial_sample_1``   vector, see `systems.cell.inertial_sensors`
 
     Only a simulated station has these; nothing but logs and metrics may use them:
         out ``truth.X_WE``          RigidTransform
@@ -77,6 +81,7 @@ class SimulatedStation(Diagram):
         config: StationConfig,
         drive: str,
         takes_torque: bool = False,
+        inertial: list[InertialLoggerConfig] | None = None,
     ) -> None:
         """Builds the cell.
 
@@ -87,6 +92,7 @@ class SimulatedStation(Diagram):
             drive: ``"position"``, ``"velocity"`` or ``"cascade"``; behind a controller that
                 plans, where ``"velocity"`` follows speeds alone, there is no other difference.
             takes_torque: whether the drives take a torque feedforward; behind such a controller they do not.
+            inertial: loggers with gyros and accelerometers on the robot.
 
         Raises:
             ValueError: if a part refuses its configuration.
@@ -116,6 +122,7 @@ class SimulatedStation(Diagram):
         self._connect_commands(builder)
         self._add_joint_sensor(builder, _RUNAWAY * float(robot.speed.max()))
         self._noise = self._add_camera(builder, _camera(robot, config), config)
+        self._inertial_noise = add_inertial_sensors(builder, self.plant, inertial or [])
         builder.ExportOutput(self.plant.get_state_output_port(), "truth.state")
         builder.ExportOutput(self._driven.motor_state, "truth.motor_state")
         builder.ExportOutput(self._driven.motor_torque, "truth.motor_torque")
@@ -195,6 +202,7 @@ class SimulatedStation(Diagram):
         self._noise.SetRandomContext(
             self._noise.GetMyMutableContextFromRoot(root_context), RandomGenerator(seed)
         )
+        seed_noise(self._inertial_noise, root_context, seed)
 
     def changes(self) -> list[Change]:
         """What a run has to do to the context of the plant at times of events; the rest happens by itself."""
