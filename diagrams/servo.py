@@ -33,6 +33,7 @@ class Servo(Diagram):
         out ``torque_feedforward``  vector 6 in N m, only with a feedforward or a law that knows torques
     and to look at:
         out ``X_WE_desired``      RigidTransform
+        out ``path_time``         vector 2: the time on the path in s and its rate
         out ``correction``        vector 6 in rad and m, rotation first
         out ``guard_status``      counts of `systems.guard.guard.KINDS`
 
@@ -70,7 +71,10 @@ class Servo(Diagram):
         if self.traits.uses_camera:
             _refuse_slow_camera(scenario)
         builder = DiagramBuilder()
-        self.reference = builder.AddNamedSystem("reference", Reference(scenario.reference, self.model.period))
+        slowed_by = ["law"] if self.law.HasOutputPort("speed_share") else []
+        self.reference = builder.AddNamedSystem(
+            "reference", Reference(scenario.reference, self.model.period, slowed_by)
+        )
         check_path = getattr(self.law, "check_path", None)  # of laws that cannot follow every path
         if check_path is not None:
             check_path(self.reference.path)
@@ -93,6 +97,10 @@ class Servo(Diagram):
         for name, source in _FROM_REFERENCE.items():
             if self.law.HasInputPort(name):
                 builder.Connect(self.reference.GetOutputPort(source), self.law.GetInputPort(name))
+        if self.reference.is_slowed:
+            for name, port in (("speed_share", "speed_share_law"), ("look_ahead", "look_ahead")):
+                if self.law.HasOutputPort(name):
+                    builder.Connect(self.law.GetOutputPort(name), self.reference.GetInputPort(port))
         if self.law.HasInputPort("deviation"):
             builder.Connect(guard.GetOutputPort("deviation"), self.law.GetInputPort("deviation"))
         joints = builder.ExportInput(guard.GetInputPort("joint_sample"), "joint_sample")
@@ -103,6 +111,11 @@ class Servo(Diagram):
                 commands[name] = self.law.GetOutputPort(name)
         if feedforward.kind != "none":
             model = FEEDFORWARDS.find(feedforward.kind)(self.model, feedforward)
+            if self.reference.is_slowed and model.is_computed_beforehand:
+                raise ScenarioError(
+                    f"servo.feedforward.kind={feedforward.kind} is computed before the run and needs the "
+                    "planned speed, but reference.override or the law slows the path"
+                )
             model.prepare(self.reference.path, np.deg2rad(scenario.home_deg))
             ahead = builder.AddNamedSystem("feedforward", model)
             builder.ConnectInput(joints, ahead.GetInputPort("joint_sample"))
@@ -112,10 +125,17 @@ class Servo(Diagram):
         for name in ("position_command", "velocity_command", "torque_feedforward", "guard_status"):
             if guard.HasOutputPort(name):
                 builder.ExportOutput(guard.GetOutputPort(name), name)
-        builder.ExportOutput(self.reference.GetOutputPort("X_WE_desired"), "X_WE_desired")
+        for name in ("X_WE_desired", "path_time"):
+            builder.ExportOutput(self.reference.GetOutputPort(name), name)
         builder.ExportOutput(commands["correction"], "correction")
         builder.BuildInto(self)
         self.set_name("servo")
+
+    def path_time(self, root_context: Context) -> float:
+        """The time on the path in s at the time of a context; the same unless the path is slowed."""
+        if not self.reference.is_slowed:
+            return root_context.get_time()
+        return float(self.GetOutputPort("path_time").Eval(self.GetMyContextFromRoot(root_context))[0])
 
     def _connect_camera(self, builder: DiagramBuilder) -> dict[str, OutputPort]:
         """The camera to the law; what the law says of it and of its correction, or what stands for that."""

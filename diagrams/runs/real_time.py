@@ -15,9 +15,10 @@ from diagrams.hardware_link import EndedOnRequest, HardwareLink, StationError, n
 from diagrams.host_lateness import HostLateness
 from diagrams.record.log import GuardEvent, RunLog
 from diagrams.record.packed_log import PackedLog
+from diagrams.record.played import measured_along, path_marks, played
 from diagrams.record.run_record import RunRecord, marks, write_event, write_tick
 from diagrams.record.topics import POSE, pose_message
-from diagrams.runs.simulation import guard_events, measured_along, start_position
+from diagrams.runs.simulation import guard_events, start_position
 from diagrams.scenario.scenario import Scenario, ScenarioError
 from diagrams.servo import Servo, calibrated, law_name, learnt
 from robots.description.model import NUM_JOINTS, RobotModel, load_robot
@@ -83,7 +84,9 @@ class RealTimeRun:
             builder.Connect(self.servo.GetOutputPort(name), self.station.GetInputPort(name))
         for name in ("joint_sample", "pose_sample"):
             builder.Connect(self.station.GetOutputPort(name), self.servo.GetInputPort(name))
-        ports = ("position_command", "velocity_command", "correction", "guard_status")
+        ports = ["position_command", "velocity_command", "correction", "guard_status"]
+        if self.servo.reference.is_slowed:
+            ports.append("path_time")
         self._log = PackedLog(builder, {name: self.servo.GetOutputPort(name) for name in ports}, self.period)
         self.diagram: Diagram = builder.Build()
         self.diagram.set_name("truetip")
@@ -170,9 +173,8 @@ class RealTimeRun:
     ) -> str:
         """Runs the path to its end; returns why it ended."""
         epoch, tick, shown = wire.epoch, -1, 0.0
-        end = round(self.path.duration / self.period)
         wire.start_path()
-        while tick < end:
+        while self.servo.path_time(self._context) < self.path.duration + 0.5 * self.period:
             if is_asked_to_end():
                 return REQUESTED
             report = wire.next_report(warm_up=self._warm_up_next)
@@ -207,7 +209,7 @@ class RealTimeRun:
             # Telling people takes time that belongs to the next message.
             if tick * self.period - shown > 0.5:
                 shown = tick * self.period
-                progress(min(1.0, tick / end))
+                progress(min(1.0, self.servo.path_time(self._context) / self.path.duration))
         return "path"
 
     def _write(
@@ -294,6 +296,7 @@ class RealTimeRun:
         self, counters: dict[str, int], camera: PoseSource | None, wire: HardwareLink, ended: str
     ) -> RealTimeRecord:
         times, data = self._log.read(self._context)
+        path = played(self.path, times, data)
         n = len(times)
         positions, efforts = np.full((n, NUM_JOINTS), np.nan), np.full((n, NUM_JOINTS), np.nan)
         stamps = np.full(n, np.nan)
@@ -313,9 +316,9 @@ class RealTimeRun:
             law=self.law,
             seed=self.scenario.seed,
             time=times,
-            X_WE_desired=self.path.sample(times)[0],
+            X_WE_desired=path.sample(times)[0],
             X_WE_true=unknown,
-            X_WE_measured=measured_along(self.path, times, exposure_times, poses),
+            X_WE_measured=measured_along(path, times, exposure_times, poses),
             joint_position=positions,
             joint_effort=efforts,
             link_position=positions,
@@ -324,10 +327,7 @@ class RealTimeRun:
             correction=data["correction"],
             guard_counts=dict(zip(KINDS, counts[-1].tolist() if n else [0] * len(KINDS), strict=True)),
             guard_events=sorted([*guard_events(times, counts), *self._events], key=lambda event: event.time),
-            path_start=self.path.path_start,
-            dwell_start=self.path.dwell_start,
-            path_end=self.path.duration,
-            lap_starts=tuple(self.path.lap_starts.tolist()) if len(self.path.lap_starts) > 1 else (),
+            **path_marks(path),
             learnt=learnt(self.servo, self._context),
             calibrated=calibrated(self.servo, self._context, self.scenario.robot),
             wall_time=float(times[-1]) if n else 0.0,

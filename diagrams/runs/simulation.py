@@ -12,6 +12,7 @@ from diagrams.integration import Integration
 from diagrams.record.coverage import Prediction, coverage
 from diagrams.record.log import GuardEvent, RunLog
 from diagrams.record.packed_log import PackedLog
+from diagrams.record.played import measured_along, path_marks, played
 from diagrams.scenario.scenario import Scenario, ScenarioError
 from diagrams.servo import Servo, calibrated, law_name, learnt, predicted_tip
 from diagrams.station import SimulatedStation
@@ -23,6 +24,7 @@ from systems.guard.guard import KINDS
 from systems.reference.paths import CartesianPath, make_path
 
 _CHUNK = 0.2  # s of simulated time between two reports of progress
+_LONGEST_HOLD = 30.0  # s, after which a run is over whose path is held
 
 
 def run(
@@ -90,6 +92,8 @@ class Experiment:
         shown = ("position_command", "velocity_command", "correction", "guard_status")
         ports = {name: self.servo.GetOutputPort(name) for name in shown}
         ports |= {name: self.station.GetOutputPort(name) for name in self.station.LOGGED}
+        if self.servo.reference.is_slowed:
+            ports["path_time"] = self.servo.GetOutputPort("path_time")
         # In one log: what stands in a diagram costs time at every step of the integrator.
         self._log = PackedLog(builder, ports, scenario.station.period)
         self.diagram = builder.Build()
@@ -108,8 +112,7 @@ class Experiment:
         self._predictions: list[Prediction] = []  # of the tip, one a chunk, by a law that says where it is
 
     def advance(self, until: float | None = None, progress: Callable[[float], None] | None = None) -> None:
-        """Advances to a time in s, or to the end of the path."""
-        end = self.path.duration if until is None else until
+        """Advances to a time in s, or to the end of the path, which is later where it is slowed."""
         # Chunks that end on a tick cost nothing: the integrator stops there anyway.
         ticks = max(1, round(_CHUNK / self.scenario.station.period))
         started = time.perf_counter()
@@ -117,11 +120,26 @@ class Experiment:
         collecting = gc.isenabled()
         gc.disable()
         try:
-            self._advance(end, ticks, progress)
+            if until is None:
+                self._advance_to_path_end(ticks, progress)
+            else:
+                self._advance(until, ticks, progress)
         finally:
             if collecting:
                 gc.enable()
         self._wall_time += time.perf_counter() - started
+
+    def _advance_to_path_end(self, ticks: int, progress: Callable[[float], None] | None) -> None:
+        """Advances until the time on the path is over, or has not gone on for long."""
+        end, moved_at = self.path.duration, 0.0
+        remaining = end - self.servo.path_time(self.context)
+        while remaining > 1e-9 and self.context.get_time() < moved_at + _LONGEST_HOLD:
+            self._advance(
+                self.context.get_time() + max(remaining, self.scenario.station.period), ticks, progress
+            )
+            last, remaining = remaining, end - self.servo.path_time(self.context)
+            if remaining < last:
+                moved_at = self.context.get_time()
 
     def _advance(self, end: float, ticks: int, progress: Callable[[float], None] | None) -> None:
         done = round(self.context.get_time() / self.scenario.station.period)
@@ -132,24 +150,25 @@ class Experiment:
             if prediction is not None:
                 self._predictions.append(prediction)
             if progress:
-                progress(self.context.get_time() / end)
+                progress(min(1.0, self.servo.path_time(self.context) / self.path.duration))
 
     def log(self) -> RunLog:
         """The record of what has happened so far."""
         times, data = self._log.read(self.context)
         record = self.station.record(times, data)
+        path = played(self.path, times, data)
         counts = np.round(data["guard_status"]).astype(int)
         found = learnt(self.servo, self.context)
         if found is not None and self._predictions:
-            on_path = [row for row in self._predictions if row[0] >= self.path.path_start]
+            on_path = [row for row in self._predictions if row[0] >= path.path_start]
             found["coverage"] = coverage(on_path, record.time, record.X_WE_true)
         return RunLog(
             law=self.law,
             seed=self.seed,
             time=record.time,
-            X_WE_desired=self.path.sample(record.time)[0],
+            X_WE_desired=path.sample(record.time)[0],
             X_WE_true=record.X_WE_true,
-            X_WE_measured=measured_along(self.path, record.time, record.exposure_time, record.X_WE_measured),
+            X_WE_measured=measured_along(path, record.time, record.exposure_time, record.X_WE_measured),
             joint_position=record.joint_position,
             joint_effort=record.joint_effort,
             link_position=record.link_position,
@@ -158,40 +177,12 @@ class Experiment:
             correction=data["correction"],
             guard_counts=dict(zip(KINDS, counts[-1].tolist(), strict=True)),
             guard_events=guard_events(record.time, counts),
-            path_start=self.path.path_start,
-            dwell_start=self.path.dwell_start,
-            path_end=self.path.duration,
-            lap_starts=tuple(self.path.lap_starts.tolist()) if len(self.path.lap_starts) > 1 else (),
+            **path_marks(path),
             learnt=found,
             calibrated=calibrated(self.servo, self.context, self.scenario.robot),
             tick_seconds=self.servo.tick_clock.seconds,
             wall_time=self._wall_time,
         )
-
-
-def measured_along(
-    path: CartesianPath, times: np.ndarray, exposure_times: np.ndarray, X_WE: np.ndarray
-) -> np.ndarray:
-    """Measured poses at the times of a log, NaN where there is none, shape (n, 4, 4).
-
-    A pose that was exposed between two times of the log is carried along the path to the nearest one, so
-    that its difference from the wanted pose stays what it was.
-    """
-    poses = np.full((len(times), 4, 4), np.nan)
-    if not len(times) or not len(exposure_times):
-        return poses
-    half = 0.5 * float(np.median(np.diff(times))) if len(times) > 1 else 0.0
-    nearest = np.clip(np.searchsorted(times, exposure_times - half - 1e-9), 0, len(times) - 1)
-    kept = np.abs(times[nearest] - exposure_times) <= half + 1e-9
-    wanted_then, wanted_now = path.sample(exposure_times[kept])[0], path.sample(times[nearest[kept]])[0]
-    seen, now = X_WE[kept], nearest[kept]
-    is_same = np.abs(times[now] - exposure_times[kept]) < 1e-9
-    shift = wanted_now[:, :3, :3] @ wanted_then[:, :3, :3].swapaxes(1, 2)
-    poses[now] = seen
-    moved = now[~is_same]
-    poses[moved, :3, :3] = (shift @ seen[:, :3, :3])[~is_same]
-    poses[moved, :3, 3] = (seen[:, :3, 3] + wanted_now[:, :3, 3] - wanted_then[:, :3, 3])[~is_same]
-    return poses
 
 
 def nominal_robot(scenario: Scenario, robot: RobotModel | None) -> RobotModel:

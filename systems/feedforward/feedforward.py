@@ -72,6 +72,7 @@ class Feedforward(LeafSystem):
     colour = ""  # in figures, #rrggbb
     memory_size = 0  # how many numbers a model remembers
     derivatives = 2  # the highest derivative of the joint positions on which the outputs depend
+    is_computed_beforehand = False  # for the whole path at its planned speed, which then must not be slowed
 
     def __init__(
         self,

@@ -22,6 +22,14 @@ _CLOSED = 1e-9  # m and rad, the ends of a path that is closed are that near to 
 
 
 @dataclass
+class SpeedOverride:
+    """From a time on the path is run at a share of its planned speed: a controller's override."""
+
+    at: float = quantity(0.0, 0.0, 1e6, "s")
+    share: float = quantity(1.0, 0.0, 1.0)
+
+
+@dataclass
 class ReferenceConfig:
     """Which path the tool shall take, and when; read from a scenario file."""
 
@@ -35,6 +43,8 @@ class ReferenceConfig:
     # How often the path is run, one after the other; more than once it must be closed
     laps: int = quantity(1, 1, 10000)
     preview: float = quantity(0.0, 0.0, 1.0, "s")  # that the preview ports of the Reference look ahead
+    slowing: float = quantity(0.5, 0.05, 10.0, "s")  # from one speed to another
+    override: list[SpeedOverride] = field(default_factory=list)
 
 
 class CartesianPath:

@@ -16,6 +16,8 @@ SIZES = {  # of ports of numbers; all others are abstract
     "correction": 6,
     "measurement": 3,
     "torque_feedforward": NUM_JOINTS,
+    "speed_share": 1,
+    "look_ahead": 1,
 }
 _PATH = ("X_WE_desired", "V_WE_desired")
 _INPUTS = (*_PATH, "reference", "joint_sample", "pose_sample", "deviation")

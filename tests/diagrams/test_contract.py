@@ -9,7 +9,7 @@ from tests.diagrams.rigs import LAWS, scenario
 COMMANDS = {"position_command", "velocity_command"}
 SAMPLES = {"joint_sample", "pose_sample"}
 TRUTH = {f"truth.{name}" for name in ("X_WE", "state", "motor_state", "motor_torque", "exposure")}
-TO_LOOK_AT = {"X_WE_desired", "correction", "guard_status"}
+TO_LOOK_AT = {"path_time", "X_WE_desired", "correction", "guard_status"}
 
 
 def inputs(diagram: Diagram) -> set[str]:

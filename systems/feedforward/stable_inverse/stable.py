@@ -58,6 +58,7 @@ class StableFeedforward(Feedforward):
     title = "stable"
     colour = "#2a9d5c"
     derivatives = 4
+    is_computed_beforehand = True
 
     def __init__(self, model: ControllerModel, config: FeedforwardConfig) -> None:
         """Builds the models.

@@ -42,19 +42,19 @@ def largest_and_static(log, e: np.ndarray) -> tuple[float, float]:
 
 
 @pytest.mark.parametrize(
-    "law",
+    ("law", "settings"),
     [
-        "numerical_ik",
-        "pbvs",
-        pytest.param("position_level", marks=pytest.mark.slow),
-        pytest.param("open_loop", marks=pytest.mark.slow),
+        ("numerical_ik", []),
+        ("pbvs", ["reference.override=[{at: 2.5, share: 0.7}]"]),
+        pytest.param("position_level", [], marks=pytest.mark.slow),
+        pytest.param("open_loop", [], marks=pytest.mark.slow),
     ],
 )
-def test_over_the_wire_a_law_is_as_accurate_as_in_simulation(law: str):
+def test_over_the_wire_a_law_is_as_accurate_as_in_simulation(law: str, settings: list[str]):
     """Same delays, other noise: the largest error agrees to 2 %, at rest only noise is left."""
-    record, e, _ = guided(quick(), law)
+    record, e, _ = guided(quick(*settings), law)
     largest, static = largest_and_static(record.log, e)
-    log = run(quick(), law)
+    log = run(quick(*settings), law)
     expected, at_rest = largest_and_static(log, pose_error(log.X_WE_desired, log.X_WE_true))
     assert record.ended == "path"
     assert largest == pytest.approx(expected, rel=0.02)
