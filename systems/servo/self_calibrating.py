@@ -36,6 +36,8 @@ _UNREST = 0.5  # m/s^2, while the robot is led onto its plan, or the plan is not
 _STARTING = 1.5  # s
 _LOOK_EVERY = 5  # ticks, between two searches for the dead time
 _KINDS = (TOOL_DISPLACED, LOAD_CHANGED, DEAD_TIME_CHANGED, CLOCK_DRIFTS)
+_CAREFUL = 0.25  # of the planned speed, while the dead time or the load is not what it was
+_BEFORE_PATH = 0.6  # s, at which it is held until the dead time is found; a slowed path needs time to stop
 _GIVE_UP = 1.6  # s after the start: what is believed of the dead time has to do
 
 # A row of the plan: motors, loads, links, tip, unrest, columns and correction of the drive model,
@@ -68,6 +70,9 @@ class SelfCalibrating(LeafSystem):
                                     moves the tip by
         out ``measurement``         vector 3: when the last usable sample arrived (s), how many were refused,
                                     when the newest one was exposed (s)
+        out ``speed_share``         1: less than all of the planned speed while the dead time is wrong, none
+                                    before it is found
+        out ``look_ahead``          1 in s: how far ahead of now the plan is
 
     Of each camera sample the encoder positions of the same instant are found; the pair teaches the
     `TipEstimator`. The `ParameterLead` takes the estimate over, and the `PreviewPlanner` inverts the robot as
@@ -132,10 +137,12 @@ class SelfCalibrating(LeafSystem):
             self.DeclareDiscreteState(np.zeros(NUM_JOINTS)),
             self.DeclareDiscreteState(np.zeros(6)),
             self.DeclareDiscreteState(np.array([-np.inf, 0.0, -np.inf])),
+            self.DeclareDiscreteState([1.0]),
+            self.DeclareDiscreteState([model.command_delay]),
         ]
         self._memory = self.DeclareDiscreteState(self._first_memory())
         names = "position_command", "velocity_command", "torque_feedforward", "correction", "measurement"
-        for name, state in zip(names, self._outputs, strict=True):
+        for name, state in zip((*names, "speed_share", "look_ahead"), self._outputs, strict=True):
             self.DeclareStateOutputPort(name, state)
         self.DeclarePeriodicDiscreteUpdateEvent(model.period, 0.0, self._tick)
 
@@ -216,8 +223,21 @@ class SelfCalibrating(LeafSystem):
             commands = self._command(memory, reference, time, joints.position)
         for state, command in zip(self._outputs, commands, strict=False):
             discrete_state.set_value(int(state), command)
+            ahead = float(memory.planned[0]) - time
+            share = self._speed_share(memory, reference, time)
+            for state, value in zip(self._outputs[5:], (share, ahead), strict=True):
+                discrete_state.set_value(int(state), [value])
         learnt = memory.lead.x - self.tip_model.mean
         discrete_state.set_value(int(self._outputs[3]), memory.columns @ learnt)
+
+    def _speed_share(self, memory: SimpleNamespace, reference: PathAhead, time: float) -> float:
+        """The share of the planned speed at which the path may be run with what is known of the dead time."""
+        instant = float(memory.planned[0])
+        if not memory.delay.known[0]:
+            is_near = reference.path_time(instant) > reference.path.path_start - _BEFORE_PATH
+            return 0.0 if is_near else 1.0
+        is_upset = time < memory.paused_until[0] or not self._delay.is_settled(memory.delay, instant)
+        return _CAREFUL if is_upset else 1.0
 
     def _note(self, memory: SimpleNamespace, time: float, event: Event) -> None:
         """Keeps an event for whoever asks what happened; the last eight."""

@@ -96,6 +96,8 @@ def test_a_dead_time_that_changes_on_the_path_is_learnt_while_the_tip_stays_on_i
         np.linalg.norm(track - p, axis=1).min() for p in log.X_WE_true[on_track][:125:5, :3, 3]
     ]  # to the nearest of points 4 ms apart
     assert max(aside) < 0.25 * late
+    # It went slowly meanwhile.
+    assert 0.2 < 8.0 - experiment.servo.path_time(experiment.context) < 1.2
     assert log.learnt is not None
     assert [event["kind"] for event in log.learnt["events"]] == ["dead time changed"]
     assert log.learnt["dead_time_s"] == pytest.approx(0.037, abs=0.2e-3)
