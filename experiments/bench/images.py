@@ -14,10 +14,10 @@ from experiments.bench.tracking import PERIOD, PIXEL_SIGMA, Row
 from experiments.cameras.accuracy import centroid_errors
 from robots.description.model import load_robot
 from robots.kinematics.analytic_inverse import InverseKinematics
+from robots.kinematics.arm_capsules import ArmCapsules
 from robots.pose import pose_error
 from systems.cell.imaging.images import ImageConfig, ImageSource
 from systems.reference.paths import ReferenceConfig, make_path
-from systems.vision.arm_capsules import ArmCapsules
 from systems.vision.camera_rig import load_cell
 from systems.vision.centroids import CentroidConfig, blobs_in
 from systems.vision.marker_body import load_body

@@ -17,10 +17,10 @@ from scipy.spatial.transform import Rotation
 from experiments.cameras.accuracy import Places, information, places_in_workspace, pose_covariance
 from robots.description.model import RobotModel, load_robot
 from robots.kinematics.analytic_inverse import InverseKinematics
+from robots.kinematics.arm_capsules import ArmCapsules
 from robots.pose import pose_error
 from systems.cell.imaging.features import FeatureConfig, FeatureSource
 from systems.reference.paths import ReferenceConfig, make_path
-from systems.vision.arm_capsules import ArmCapsules
 from systems.vision.camera_model import Cameras
 from systems.vision.camera_rig import MeasuringCell, load_cell
 from systems.vision.marker_body import DetectionBody, load_body

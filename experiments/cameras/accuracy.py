@@ -15,11 +15,11 @@ from diagrams.scenario.controller_model import controller_model
 from diagrams.scenario.scenario import Scenario
 from robots.description.model import RobotModel
 from robots.dynamics.newton_inverse import inverse_kinematics
+from robots.kinematics.arm_capsules import ArmCapsules
 from robots.kinematics.forward import Kinematics
 from robots.measurement_design.constraints import AdmissibleConfigurations
 from systems.cell.imaging.images import ImageConfig, ImageSource
 from systems.reference.paths import CartesianPath
-from systems.vision.arm_capsules import ArmCapsules
 from systems.vision.camera_model import Cameras
 from systems.vision.centroids import CentroidConfig, blobs_in
 from systems.vision.marker_body import DetectionBody

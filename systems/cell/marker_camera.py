@@ -15,13 +15,13 @@ from pydrake.systems.framework import Context, DiscreteValues, LeafSystem
 from scipy.stats import norm
 
 from robots.description.model import NUM_JOINTS, RobotModel
+from robots.kinematics.arm_capsules import ArmCapsules
 from robots.pose import pose_error
 from systems.cell.imaging.features import FeatureConfig, FeatureSource
 from systems.cell.imaging.image_blobs import ImageBlobs
 from systems.cell.imaging.images import ImageConfig
 from systems.cell.pose_camera import BLOCK, ExposureConfig
 from systems.samples import PoseSample
-from systems.vision.arm_capsules import ArmCapsules
 from systems.vision.camera_rig import load_cell
 from systems.vision.centroids import CentroidConfig
 from systems.vision.marker_body import load_body

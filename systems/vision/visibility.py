@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from systems.vision.arm_capsules import Capsules
+from robots.kinematics.arm_capsules import Capsules
 
 _TINY = 1e-15  # m^2, squared lengths below this are points
 

@@ -11,7 +11,7 @@ import numpy as np
 from scipy.special import ndtr
 from scipy.stats import poisson
 
-from systems.vision.arm_capsules import Capsules
+from robots.kinematics.arm_capsules import Capsules
 from systems.vision.camera_model import Cameras
 from systems.vision.marker_body import DetectionBody
 from systems.vision.tracking.marker_images import marker_diameters, merged_images

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from systems.vision.arm_capsules import Capsules
+from robots.kinematics.arm_capsules import Capsules
 from systems.vision.camera_model import Cameras
 from systems.vision.depth_of_field import DepthOfField
 from systems.vision.marker_body import DetectionBody

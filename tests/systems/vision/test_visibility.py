@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.optimize import minimize
 
-from systems.vision.arm_capsules import Capsules
+from robots.kinematics.arm_capsules import Capsules
 from systems.vision.visibility import in_window, occluded
 
 CAMERA, MARKER = np.array([[0.0, 0.0, 0.0]]), np.array([[4.0, 0.0, 0.0]])

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
+from robots.kinematics.arm_capsules import Capsules
 from systems.cell.imaging.features import FeatureConfig, FeatureSource
-from systems.vision.arm_capsules import Capsules
 from systems.vision.tracking.marker_images import marker_diameters
 from tests.systems.vision.rigs import BODY, CAMERAS, CELL, placed, random_pose
 

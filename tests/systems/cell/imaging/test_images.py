@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
+from robots.kinematics.arm_capsules import Capsules
 from systems.cell.imaging.images import ImageConfig, ImageSource
-from systems.vision.arm_capsules import Capsules
 from systems.vision.marker_body import DetectionBody
 from systems.vision.rendering import FULL_SCALE, Picture
 from systems.vision.sphere_images import sphere_images

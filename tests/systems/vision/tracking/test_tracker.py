@@ -8,10 +8,10 @@ import pytest
 
 from robots.description.model import load_robot
 from robots.kinematics.analytic_inverse import InverseKinematics
+from robots.kinematics.arm_capsules import ArmCapsules
 from robots.pose import pose_error
 from systems.cell.imaging.features import FeatureConfig, FeatureSource
 from systems.reference.paths import ReferenceConfig, make_path
-from systems.vision.arm_capsules import ArmCapsules
 from systems.vision.tracking.pose_refinement import moved
 from systems.vision.tracking.tracker import TrackedPose, Tracker, TrackerConfig, TrackerState
 from tests.systems.vision.rigs import BODY, CAMERAS, CELL, placed, random_pose, shuffled

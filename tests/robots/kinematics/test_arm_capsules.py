@@ -5,7 +5,7 @@ from pydrake.multibody.plant import MultibodyPlant
 
 from robots.description.model import NUM_JOINTS, load_robot
 from robots.dynamics.plant import add_robot
-from systems.vision.arm_capsules import ArmCapsules
+from robots.kinematics.arm_capsules import ArmCapsules
 
 ROBOT = load_robot("irb1200")
 

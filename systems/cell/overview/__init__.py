@@ -1,0 +1,1 @@
+"""Whole images of a simulated cell with people in it."""

@@ -1,0 +1,150 @@
+"""The system that decides how fast the robot may go while people are near. An aid, not a safety function."""
+
+import numpy as np
+from pydrake.common.value import Value
+from pydrake.systems.framework import BasicVector, Context, DiscreteValues, LeafSystem
+
+from robots.description.model import NUM_JOINTS, RobotModel
+from robots.kinematics.arm_capsules import ArmCapsules
+from systems.guard.separation.protective_distance import (
+    ProtectiveDistance,
+    ReactionTime,
+    SeparationConfig,
+    largest_share,
+    protective_distance,
+    stopping_time,
+)
+from systems.samples import JointSample, PersonSample
+
+ZONES = ("free", "slow", "stop")
+STATUS = ("distance", "protective_distance", "zone", "age")  # of the output ``separation``; m, m, index, s
+_FREE, _SLOW, _STOP = 0.0, 1.0, 2.0
+_SHARE, _STOPPED, _TRUSTED, _STATUS, _FULL = 0, 1, 2, slice(3, 7), slice(7, 13)
+_WIDTH = 13
+_STEP = 1e-4  # s, over which speeds of the arm are told from differences
+_LEAST_SHARE = 0.2  # below which the full speed of the path is not told from the commands
+_FORGET = 0.02  # of the largest full speed per decision
+_FAR = 1e3  # m, where nobody is
+
+
+class SeparationMonitor(LeafSystem):
+    """Compares the distance of the nearest person with the protective one of ISO/TS 15066.
+
+    Ports:
+        in  ``person_sample``     PersonSample
+        in  ``joint_sample``      JointSample
+        in  ``velocity_command``  vector 6 in rad/s, as it is with the share that is put out
+        in  ``acknowledge``       vector 1, optional: above 0.5 somebody lets the robot go on after a stop
+        out ``speed_share``       vector 1: how fast the path may be run, 1 as planned, 0 at rest
+        out ``stop``              vector 1: 1 from a stop until it is over, else 0
+        out ``separation``        vector of `STATUS`
+
+    Three zones: *free* where the distance suffices at full speed, *slow* where it suffices at a share of it,
+    *stop* where it does not suffice for a robot at rest or where no trusted images have come for too long.
+    """
+
+    def __init__(
+        self,
+        robot: RobotModel,
+        arm: ArmCapsules,
+        config: SeparationConfig,
+        reaction: ReactionTime,
+    ) -> None:
+        """Makes the system.
+
+        Args:
+            robot: whose accelerations count.
+            arm: its capsules with what it carries.
+            config: distances and times.
+            reaction: T_r of the chain that this system is in.
+
+        Raises:
+            ValueError: if it would stop before it slows, or a fresh image would count as late.
+        """
+        super().__init__()
+        if not config.slow_after < config.stop_after:
+            raise ValueError(
+                f"separation: slow_after={config.slow_after:g} s must be below "
+                f"stop_after={config.stop_after:g} s"
+            )
+        usual = reaction.images + reaction.transport + reaction.computation
+        if not usual < config.slow_after:
+            raise ValueError(
+                f"separation: slow_after={config.slow_after:g} s must be above the {usual:g} s that images "
+                "are old at most when all is well"
+            )
+        self._arm, self._config, self._reaction = arm, config, reaction
+        self._acceleration = robot.acceleration
+        self._people = self.DeclareAbstractInputPort("person_sample", Value[object](PersonSample()))
+        self._joints = self.DeclareAbstractInputPort("joint_sample", Value(JointSample()))
+        self._velocity = self.DeclareVectorInputPort("velocity_command", NUM_JOINTS)
+        self._acknowledge = self.DeclareVectorInputPort("acknowledge", 1)
+        start = np.zeros(_WIDTH)
+        start[[_SHARE, _TRUSTED]] = 0.0, -np.inf
+        self._state = self.DeclareDiscreteState(start)
+        for name, size, part in (
+            ("speed_share", 1, slice(_SHARE, _SHARE + 1)),
+            ("stop", 1, slice(_STOPPED, _STOPPED + 1)),
+            ("separation", len(STATUS), _STATUS),
+        ):
+            self.DeclareVectorOutputPort(name, size, self._shown(part), {self.xd_ticket()})
+        self.DeclarePeriodicDiscreteUpdateEvent(config.period, 0.0, self._decide)
+
+    def _shown(self, part: slice):
+        def calc(context: Context, output: BasicVector) -> None:
+            output.set_value(context.get_discrete_state(self._state).value()[part])
+
+        return calc
+
+    def terms(self, velocity: np.ndarray, q: np.ndarray, human_speed: float = 0.0) -> ProtectiveDistance:
+        """The protective distance at joint speeds (6,) in rad/s and positions (6,) in rad."""
+        now, later = self._arm.at(q), self._arm.at(q + _STEP * velocity)
+        ends = np.concatenate([later.start - now.start, later.end - now.end])
+        speed = float(np.linalg.norm(ends, axis=1).max()) / _STEP
+        stop = stopping_time(self._config, velocity, self._acceleration)
+        fastest = max(self._config.human_speed, human_speed)
+        return protective_distance(self._config, self._reaction, speed, stop, fastest)
+
+    def _decide(self, context: Context, discrete_state: DiscreteValues) -> None:
+        state = context.get_discrete_state(self._state).value().copy()
+        sample, joints = self._people.Eval(context), self._joints.Eval(context)
+        time, config = context.get_time(), self._config
+        if sample.trusted:
+            state[_TRUSTED] = max(state[_TRUSTED], sample.time)
+        age = time - state[_TRUSTED]
+        full = self._full_speed(state, np.asarray(self._velocity.Eval(context)))
+        arm = self._arm.at(joints.position)
+        distance = min(
+            (float(arm.distances(each.points).min()) - each.reach for each in sample.people), default=_FAR
+        )
+        walking = max((float(np.linalg.norm(each.velocity)) for each in sample.people), default=0.0)
+        terms = self.terms(full, joints.position, walking)
+        allowed = min(largest_share(distance, terms), self._by_age(age))
+        needed = terms.at_rest
+        if state[_STOPPED]:
+            needed += config.clearance
+            is_clear = distance > needed and age < config.slow_after
+            if is_clear and (not config.acknowledge or self._is_acknowledged(context)):
+                state[_STOPPED] = 0.0
+        elif time > config.stop_after or distance < _FAR:  # nobody was there before the first images
+            state[_STOPPED] = float(distance < needed or age >= config.stop_after)
+        share = 0.0 if state[_STOPPED] else min(allowed, state[_SHARE] + config.rise * config.period)
+        state[_SHARE], state[_FULL] = share, full
+        zone = _STOP if state[_STOPPED] else (_SLOW if allowed < 1.0 else _FREE)
+        state[_STATUS] = distance, terms.total, zone, min(age, _FAR)
+        discrete_state.set_value(self._state, state)
+
+    def _full_speed(self, state: np.ndarray, velocity: np.ndarray) -> np.ndarray:
+        """The joint speeds that the path has at full speed, as commands at a share of it tell, rad/s (6,)."""
+        if state[_SHARE] < _LEAST_SHARE:
+            return state[_FULL]
+        return np.maximum(np.abs(velocity) / state[_SHARE], (1.0 - _FORGET) * state[_FULL])
+
+    def _by_age(self, age: float) -> float:
+        """The share that images of an age in s allow."""
+        span = self._config.stop_after - self._config.slow_after
+        return float(np.clip((self._config.stop_after - age) / span, 0.0, 1.0))
+
+    def _is_acknowledged(self, context: Context) -> bool:
+        port = self._acknowledge
+        return bool(port.HasValue(context) and port.Eval(context)[0] > 0.5)

@@ -1,0 +1,36 @@
+"""Rendered cells: the robot is where its silhouette says, the person where the cameras project it."""
+
+import numpy as np
+
+from systems.cell.overview.person import COLORS
+from systems.cell.overview.rendering import CellPictures
+from systems.vision.people.silhouettes import silhouettes
+from tests.systems.vision.people.rigs import CAMERAS, SIZE, SURROUNDINGS, detector, person_at
+
+SOME = CAMERAS.subset([1, 6])
+ARM = [detector().arm.at(np.array([turn, 0.5, -0.3, 0.4, 0.8, 0.0])) for turn in (-1.2, 0.6)]
+PERSON = person_at(0.9, 1.2)
+PICTURES = CellPictures(SOME, SIZE, SURROUNDINGS, ARM[0], [PERSON], COLORS)
+EMPTY = PICTURES.take(ARM[0], [None])
+
+
+def differs(image: np.ndarray) -> np.ndarray:
+    return np.abs(image.astype(int) - EMPTY.astype(int)).max(axis=-1) > 18
+
+
+def test_only_pixels_of_the_silhouettes_change_when_the_robot_moves():
+    moved = differs(PICTURES.take(ARM[1], [None]))
+    drawn = [silhouettes(SOME, arm, SIZE, 0.04) > 0 for arm in ARM]
+    bare = [silhouettes(SOME, arm, SIZE) > 0 for arm in ARM]
+    assert moved.any(axis=(1, 2)).all()
+    assert not (moved & ~drawn[0] & ~drawn[1]).any()
+    one = bare[0] ^ bare[1]  # where only one of the two is, the half-covered pixels of its edge included
+    assert (moved & one).sum() > 0.85 * one.sum()
+
+
+def test_a_person_covers_the_pixels_to_which_the_cameras_project_it():
+    """Lenses included: they shift pixels at the rim of these images by up to four."""
+    shown, drawn = differs(PICTURES.take(ARM[0], [PERSON])), silhouettes(SOME, PERSON, SIZE) > 0
+    robot = silhouettes(SOME, ARM[0], SIZE, 0.04) > 0
+    both, either = (shown & drawn & ~robot).sum(), ((shown | drawn) & ~robot).sum()
+    assert both > 0.85 * either

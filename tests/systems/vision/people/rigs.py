@@ -1,0 +1,53 @@
+"""What tests of people share: the cell with small images, and pictures painted without a renderer."""
+
+from functools import cache
+
+import numpy as np
+
+from robots.description.model import load_robot
+from robots.kinematics.arm_capsules import Capsules
+from systems.cell.overview.person import figure
+from systems.vision.camera_rig import load_cell
+from systems.vision.people.people_detector import DetectorConfig, PeopleDetector, reduced
+from systems.vision.people.silhouettes import silhouettes
+from systems.vision.people.surroundings import load_surroundings
+from systems.vision.people.visual_hull import HullConfig
+
+ROBOT = load_robot("irb1200")
+SURROUNDINGS = load_surroundings("probst")
+CELL = load_cell("probst")
+CAMERAS, SIZE = reduced(CELL.camera_model(ROBOT.base.pose()), CELL.sensor_px, 320)
+CONFIG = DetectorConfig(hull=HullConfig(edge=0.08))
+ARMS = [np.array([turn, 0.4, -0.2, 0.0, 0.6, 0.0]) for turn in (-1.4, 0.0, 1.4)]
+
+
+@cache
+def detector() -> PeopleDetector:
+    return PeopleDetector(ROBOT, CAMERAS, SIZE, SURROUNDINGS, CONFIG)
+
+
+def painted(
+    capsules: Capsules | None, q: np.ndarray, rng: np.random.Generator, gain: float = 1.0
+) -> np.ndarray:
+    """Images of a mottled cell with the robot and a person in front of everything, with noise of 3/255."""
+    width, height = SIZE
+    mottled = np.random.default_rng(7).uniform(60, 140, (len(CAMERAS), height, width, 3))
+    images = mottled.astype(np.float32)
+    images[silhouettes(CAMERAS, detector().arm.at(q), SIZE) > 0] = (20, 120, 230)
+    if capsules is not None:
+        images[silhouettes(CAMERAS, capsules, SIZE) > 0] = (170, 60, 30)
+    images = gain * images + 3.0 * rng.standard_normal(images.shape, dtype=np.float32)
+    return np.clip(np.rint(images), 0, 255).astype(np.uint8)
+
+
+def person_at(x: float, y: float) -> Capsules:
+    return figure(np.array([x, y]), 0.3, SURROUNDINGS.floor)
+
+
+def gap(person: Capsules, arm: Capsules) -> float:
+    """The distance in m between a person and the arm, from points along the axes of its limbs."""
+    along = np.linspace(0.0, 1.0, 50)[:, None]
+    return min(
+        float(arm.distances(start + along * (end - start)).min() - radius)
+        for start, end, radius in zip(person.start, person.end, person.radius, strict=True)
+    )
