@@ -25,6 +25,7 @@ from robots.measurement_design.visiting_order import visiting_order
 
 # The source's validation set has 125 configurations, Probst (2024) section 4.3.
 VALIDATION_COUNT = 125
+_HARMFUL = 1.5  # times the error of the nominal robot; a perfect one gets worse by the noise
 _STRETCHES = 8  # into which a set is divided to be measured side by side; part of the result
 
 
@@ -148,6 +149,17 @@ def validated(
         return None
     return statistics(
         prediction_errors(robot, measurements.without_rotation() if position_only else measurements)
+    )
+
+
+def refuse_the_harmful(before: ErrorStatistics | None, after: ErrorStatistics | None) -> None:
+    """Raises ValueError if fresh configurations show a calibrated robot to be worse than the nominal one."""
+    if before is None or after is None or after.mean_norm_mm <= _HARMFUL * before.mean_norm_mm:
+        return
+    raise ValueError(
+        f"calibration: on fresh configurations the mean error rises from {before.mean_norm_mm:.3g} mm of the "
+        f"nominal robot to {after.mean_norm_mm:.3g} mm; the measurements do not show what is wrong with it "
+        "(do both tables belong to this robot, and does it yield or carry a load that is not said?)"
     )
 
 

@@ -18,6 +18,7 @@ from experiments.calibration.calibrate import (
     identification_config,
     measure_sets,
     path_runs,
+    refuse_the_harmful,
     true_values,
     validated,
     validation_configurations,
@@ -282,6 +283,9 @@ def _study(prepared: Prepared, wanted: _Wanted, measured: _Measured) -> Calibrat
         plausible = plausible_rows(identified, validation)
         bad = tuple(map(int, validation.rows[~plausible]))
         validation = validation.select(plausible)
+    before = validated(identified.robot, validation, position_only)
+    after = validated(calibrated, validation, position_only)
+    refuse_the_harmful(before, after)
     return CalibrationStudy(
         nominal=identified.robot,
         calibrated=calibrated,
@@ -290,8 +294,8 @@ def _study(prepared: Prepared, wanted: _Wanted, measured: _Measured) -> Calibrat
         sets=replace(sets, validation=validation),
         identified=identified,
         truth=true_values(prepared.scenario, robot, identified) if is_simulated else None,
-        before=validated(identified.robot, validation, position_only),
-        after=validated(calibrated, validation, position_only),
+        before=before,
+        after=after,
         geometry_only=validated(rigid, validation, position_only) if rigid else None,
         after_noise_free=validated(calibrated, sets.validation_truth, position_only),
         validation_outliers=bad,

@@ -137,7 +137,7 @@ def calibration_verdict(study: CalibrationStudy, path: Mapping[str, Any] | None)
     identified = study.identified
     text = f"{len(identified.names)} parameters from {len(identified.residuals)} measurements"
     text += f" in {identified.iterations} iterations."
-    text += noise_sentence(identified)
+    text += noise_sentence(identified) + unexplained_sentence(identified)
     if identified.frame is not None:
         far = float(np.linalg.norm(identified.frame[:3, 3]))
         text += f" The instrument measures in a frame of its own, {far:.2f} m from the world of the robot."
@@ -153,10 +153,11 @@ def calibration_verdict(study: CalibrationStudy, path: Mapping[str, Any] | None)
         text += f" {repeated.rows} rows repeat {repeated.configurations} configurations, "
         text += f"to {repeated.position_mm:.3g} mm."
     if study.before and study.after:
-        before, after = (float(np.linalg.norm(each.mean_mm)) for each in (study.before, study.after))
-        text += f" On fresh configurations the mean error falls from {before:.3f} to {after:.3f} mm"
+        before, after = study.before.mean_norm_mm, study.after.mean_norm_mm
+        way = "falls" if after <= before else "rises"
+        text += f" On fresh configurations the mean error {way} from {before:.3f} to {after:.3f} mm"
         if study.after_noise_free:
-            text += f" ({np.linalg.norm(study.after_noise_free.mean_mm):.4f} mm without noise)"
+            text += f" ({study.after_noise_free.mean_norm_mm:.4f} mm without noise)"
         text += "."
     if path:
         before, after = (path[name]["errors"] for name in ("before", "after"))
@@ -184,6 +185,19 @@ def noise_sentence(found: Identified) -> str:
             "believed, or the model lacks something, and the intervals are too small."
         )
     return text
+
+
+def unexplained_sentence(found: Identified) -> str:
+    """That the rows agree on something that the parameters cannot describe; empty if they do not."""
+    if not found.lacks_something:
+        return ""
+    position = float(np.sqrt(np.mean(np.sum(found.residuals[found.kept, -3:] ** 2, axis=1))))
+    has_springs = len(found.parameters) > len(found.model)
+    cause = "are joints in error (--joint-errors)" if has_springs else "does the robot yield (--compliance)"
+    return (
+        f" These parameters do not explain the measurements: {1e3 * position:.2g} mm (rms) are left that are "
+        f"not noise; {cause}?"
+    )
 
 
 def _print(console: Console, title: str, rows: Sequence[Sequence[str]]) -> None:

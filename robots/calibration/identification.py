@@ -26,7 +26,7 @@ from robots.calibration.reduction import ReducibleModel
 from robots.calibration.solver.levenberg_marquardt import Fit, minimise
 from robots.calibration.solver.noise_model import FLOOR, JOINT, POSITION, ROTATION, NoiseModel, row_shape
 from robots.calibration.solver.problem import Problem
-from robots.calibration.solver.robust import CleanRows, least_distances
+from robots.calibration.solver.robust import CleanRows, lacks_something, least_distances
 from robots.calibration.solver.variance_components import (
     VarianceComponents,
     components_to_estimate,
@@ -162,6 +162,7 @@ class _Search:
         needed = [POSITION, ROTATION] if self._has_rotation else [POSITION]
         self._is_known = bool(self._known[needed].all())
         self._iterations = 0
+        self._lacks_something = False
 
     def result(self, robot: RobotModel, frame: np.ndarray | None, reducible: ReducibleModel) -> Identified:
         """Searches. Raises IdentificationError."""
@@ -193,6 +194,7 @@ class _Search:
             noise=noise.as_noise(),
             is_noise_known=self._is_known,
             misfit=self._misfit(fit, noise, kept),
+            lacks_something=self._lacks_something,
             design=self._design(fit, noise, kept),
             outliers=tuple(map(int, problem.measurements.rows[~clean])),
             kept=kept,
@@ -222,7 +224,8 @@ class _Search:
                 return everything, *perfect
         if not self._config.search_outliers:
             return everything, fit.u, self._theta
-        u, theta = least_distances(problem)
+        least, theta = least_distances(problem)
+        u = least
         theta = self._theta if self._is_known else np.where(self._known, self._theta, theta)
         kept = everything
         for turn in range(_ROBUST_ROUNDS):
@@ -237,7 +240,11 @@ class _Search:
                 at = _selected(problem.linearise(u), kept)
                 theta = variance_components(at, noise.select(kept), self._estimated(kept)).theta
                 noise = NoiseModel(theta, self._shape)
-        return kept, u, theta
+        usable = lacks_something(problem, NoiseModel(self._theta, self._shape), least, u, kept)
+        if usable is None:
+            return kept, u, theta
+        self._lacks_something = True
+        return usable, least, self._theta
 
     def _is_as_expected(self, fit: Fit, noise: NoiseModel) -> bool:
         """Whether residuals are what known noise makes them: then no row needs to be tested."""

@@ -35,6 +35,7 @@ class Identified:
     noise: MeasurementNoise  # known or estimated
     is_noise_known: bool
     misfit: float  # size of the residuals in units of the noise: about one where the noise explains them
+    lacks_something: bool  # whether rows that fit together are not explained by these parameters
     design: np.ndarray  # triangle of the whitened derivatives by the free parameters in units of the prior
     outliers: tuple[int, ...]  # the numbers of rows with gross errors
     kept: np.ndarray  # (n,) bool, the rows that were used

@@ -31,6 +31,11 @@ class ErrorStatistics:
     max_deg: list[float]
     p90_deg: list[float]
 
+    @property
+    def mean_norm_mm(self) -> float:
+        """Length of the mean absolute errors of the position."""
+        return float(np.linalg.norm(self.mean_mm))
+
     def as_dict(self) -> dict[str, list[float]]:
         """The numbers by name; positions only where no rotation was measured."""
         return {name: numbers for name, numbers in asdict(self).items() if numbers}

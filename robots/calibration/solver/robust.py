@@ -20,6 +20,8 @@ _TRIMMED = 0.25  # share of the rows that least trimmed squares leave out
 _STARTS, _FINALISTS, _CONCENTRATIONS = 300, 20, 12
 _RISK = 0.005  # that a clean table loses a row
 _GROSS = 2e-5  # m or rad: what is less is no gross error, however quiet the other rows are
+_BELONGS = 0.7  # of how far clean rows say that others are off: what is nearer to all rows belongs to them
+_FAR = 20.0  # times the median distance in least squares: gross, whatever the model lacks
 
 
 def least_distances(problem: Problem) -> tuple[np.ndarray, np.ndarray]:
@@ -43,6 +45,38 @@ def least_distances(problem: Problem) -> tuple[np.ndarray, np.ndarray]:
         parts.append(np.median(np.sum(e[:, :-3] ** 2, 1)) if width == 6 else 1.0)
         theta = np.array([0.0, *np.maximum(np.array(parts) / _MEDIAN_CHI2_3, FLOOR**2)])
     return u, theta
+
+
+def lacks_something(
+    problem: Problem, noise: NoiseModel, least: np.ndarray, found: np.ndarray, clean: np.ndarray
+) -> np.ndarray | None:
+    """Tells rows with gross errors from rows that show what the model lacks.
+
+    A gross error fits to nothing: the least sum of distances leaves the row as far off as the clean rows say.
+    Where the model lacks something, such as springs, it may explain some rows to the noise by parameters that
+    are wrong for all others. These seem far off then, and yet all rows together have a place for them.
+
+    Args:
+        problem: predicts the rows.
+        noise: to weigh rotation against position.
+        least: parameters with the least sum of distances, (m,).
+        found: parameters of the clean rows, (m,).
+        clean: rows that these parameters explain, (n,) bool.
+
+    Returns:
+        The rows to be used if the model lacks something, (n,) bool; None if the others have gross errors.
+    """
+    if clean.all():
+        return None
+    together, apart = _distances(problem, least), _distances(problem, found)
+    if np.median(together[~clean] / np.maximum(apart[~clean], 1e-300)) > _BELONGS:
+        return None
+    squares = _distances(problem, minimise(problem, least, noise, np.ones(len(clean)), is_rough=True).u)
+    return together <= _FAR * np.median(squares)
+
+
+def _distances(problem: Problem, u: np.ndarray) -> np.ndarray:
+    return np.linalg.norm(problem.residuals(u)[:, -3:], axis=1)
 
 
 class CleanRows:

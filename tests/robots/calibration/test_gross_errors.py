@@ -10,7 +10,9 @@ from robots.calibration.identified import Identified
 from robots.calibration.measurements import SOURCE_NOISE, Measurements
 from robots.calibration.repeatability import repeatability
 from robots.calibration.validation import plausible_rows
+from robots.description.calibration import Calibration
 from robots.description.model import load_robot
+from robots.dynamics.compliant_kinematics import CompliantKinematics
 from robots.kinematics.forward import Kinematics
 from tests.robots.calibration.matrix_robot import MatrixRobot
 
@@ -132,3 +134,27 @@ def test_repeated_rows_are_used_and_tell_how_well_the_robot_repeats():
     assert found.position_mm == pytest.approx(1e3 * SOURCE_NOISE.position_sigma, rel=0.25)
     assert found.rotation_deg == pytest.approx(np.rad2deg(SOURCE_NOISE.rotation_sigma), rel=0.25)
     assert repeatability(identify(NOMINAL, noisy_table(40, rng)[0])) is None
+
+
+def yielding_table(rng: np.random.Generator) -> tuple[Measurements, MatrixRobot]:
+    """A robot that yields by a millimetre, measured at corners of its ranges, as designs are."""
+    true, count = DRAWN.displaced(rng), 75
+    q = DRAWN.configurations(count, rng)
+    q[:, [1, 2, 4]] = np.where(rng.random((count, 3)) < 0.5, [-0.79, -1.5, -1.57], [1.57, 0.5, 1.57])
+    soft = replace(NOMINAL, calibration=Calibration(compliance=[3e-5] * 6))
+    X_WE = true.forward(CompliantKinematics(soft, 7.0).link_positions(q))
+    table = Measurements(q, X_WE[:, :3, 3], X_WE[:, :3, :3], np.full(count, 7.0))
+    quiet = replace(SOURCE_NOISE, joint_sigma=1e-6, position_sigma=5e-6, rotation_sigma=5e-5)
+    return table.noisy(quiet, rng), true
+
+
+def test_rows_that_show_what_the_model_lacks_are_no_gross_errors():
+    """Wrong parameters of a stiff robot explain the most rows to the noise, and miss the others by far."""
+    table, true = yielding_table(np.random.default_rng(5))
+    found = identify(NOMINAL, table)
+    assert found.lacks_something
+    assert found.outliers == ()
+    assert error(found, true) < 2e-3  # m, as far as the robot yields
+    rows = np.array([4, 40])
+    spoilt_rows = identify(NOMINAL, spoilt(table, rows, 0.05, np.random.default_rng(1)))
+    assert spoilt_rows.outliers == (5, 41)
