@@ -9,9 +9,11 @@ from robots.calibration.identifiability import IdentifiableParameters, identifia
 from robots.description.error_parameters import NUM_PARAMETERS, TOOL, error_parameters
 from robots.description.model import load_robot
 from systems.controller_model import ControllerModel
-from systems.estimation.arm_geometry import Arm, ArmGeometry, Constants, skew
+from systems.estimation import kernels
+from systems.estimation.arm_geometry import Arm, ArmGeometry, Constants
 from systems.estimation.arm_loads import ArmLoads
 from systems.estimation.gear_errors import NUM_SHAPES, GearErrors
+from systems.estimation.kernels.arrays import Seen, Unknowns
 from systems.estimation.learnt_robot import known_before
 
 HELD = 1e5  # information on the drift of a clock as long as nothing shows that there is one
@@ -185,10 +187,11 @@ class TipModel:
             shapes: of the gears' errors, (n, 7, 6); None if there are none.
             time: since the camera's clock was compared first, s, (n,).
         """
-        unit = -self.compliance * self.total_load(x, loads)
-        yields = x[self.K] * unit
-        X_WE, arm = self.forward(constants, x, theta + yields[:, :6] + self.gear_error(x, shapes))
-        return self._complete(arm, X_WE, x, (unit, yields, shapes), loads, (twist, time))
+        n = len(theta)
+        out = np.empty((n, 4, 4)), np.empty((n, 6, self.size)), np.empty((n, 6))
+        seen = self._seen(n, twist, shapes, time)
+        kernels.tip.predict(constants, self._unknowns(constants, x), theta, loads, seen, *out)
+        return Prediction(*out)
 
     def predict_anew(
         self,
@@ -207,37 +210,32 @@ class TipModel:
             configuration: encoder positions and about by how much the gears yield, in rad, (n, 6) each.
             motion: velocities and accelerations of the joints, (n, 6) each.
         """
-        theta, gears = configuration
-        q = theta + gears + self.gear_error(x, shapes)
-        X_WE, arm = self.forward(constants, x, q)
-        loads = self.loads.at(arm.frames, q, *motion)
-        unit = -self.compliance * self.total_load(x, loads)
-        yields = x[self.K] * unit
-        change = yields[:, :6] - gears
-        X_WE = moved(X_WE, (arm.columns[..., :6] @ change[..., None])[..., 0])
-        return self._complete(arm, X_WE, x, (unit, yields, shapes), loads, (twist, time))
+        theta, gears = (np.array(part) for part in configuration)
+        n = len(theta)
+        out, loads = (np.empty((n, 4, 4)), np.empty((n, 6, self.size))), self.loads.masses
+        unknowns, seen = self._unknowns(constants, x), self._seen(n, twist, shapes, time)
+        moving = np.concatenate(motion, axis=1)
+        kernels.tip.predict_anew(constants, unknowns, loads, theta, gears, moving, seen, *out)
+        return Prediction(*out, gears)
 
-    def _complete(self, arm: Arm, X_WE, x, deflection, loads, seen) -> Prediction:
-        """Adds the tilting bearings and the clock to a pose, and makes the columns."""
-        unit, yields, shapes = deflection
-        twist, time = seen
-        later = np.asarray(time)[..., None] * twist
-        columns = arm.columns
-        springs = columns[..., :18]
-        step = (columns[..., 6:18] @ yields[:, 6:, None])[..., 0] + twist * x[self.C] + later * x[self.D]
-        H = np.empty((len(X_WE), 6, self.size))
-        H[..., self.G] = columns[..., 18:]
-        H[..., self.K] = springs * unit[:, None]
-        by_mass = (-x[self.K] * self.compliance) * loads[:, 1:]
-        H[..., self.M] = springs @ by_mass.swapaxes(-1, -2)
-        H[..., self.C], H[..., self.D] = twist, later
-        if self.has_gear_errors and shapes is None:
-            H[..., self.E] = 0.0
-        elif self.has_gear_errors:
-            by_shape = columns[:, :, None, :6] * shapes[:, None]
-            H[..., self.E] = by_shape.reshape(len(H), 6, -1)
-        H *= self.sigma
-        return Prediction(moved(X_WE, step), H, yields[:, :6])
+    def _unknowns(self, constants: Constants, x: np.ndarray) -> Unknowns:
+        return Unknowns(x, constants.p[self.chosen], self.sigma, self.compliance)
+
+    def _seen(self, n: int, twist: np.ndarray, shapes: np.ndarray | None, time: np.ndarray | float) -> Seen:
+        if shapes is None:
+            shapes = np.empty((n, 0, 6))
+        times = np.empty(n)
+        times[:] = time
+        return Seen(np.array(twist), times, np.ascontiguousarray(shapes))
+
+    def warm_up(self) -> None:
+        """Has everything compiled, or read from where it was kept, before it is wanted in a tick."""
+        still, constants = np.zeros((1, 6)), self.constants(self.mean)
+        arm = self.forward(constants, self.mean, still)[1]
+        loads = self.loads.at(arm.frames, still, still, still)
+        self.predict(constants, self.mean, still, loads, still)
+        found = self.predict_anew(constants, self.mean, (still, still), (still, still), still)
+        kernels.poses.pose_errors(found.X_WE, arm.X_WE)
 
     def tool_directions(self) -> np.ndarray:
         """A displaced tool in units of the spreads: columns for 2 mm along x, y, z and 5 mrad about them."""
@@ -265,11 +263,6 @@ def moved(X_WE: np.ndarray, steps: np.ndarray) -> np.ndarray:
 
     The rotation is that of Cayley's formula: exact as a rotation, and the angle to third order.
     """
-    half = 0.5 * steps[:, :3]
-    across = skew(half)
-    share = 2.0 / (1.0 + (half * half).sum(-1))
     out = X_WE.copy()
-    R = X_WE[:, :3, :3]
-    out[:, :3, :3] += (share[:, None, None] * (across + across @ across)) @ R
-    out[:, :3, 3] += steps[:, 3:]
+    kernels.poses.move_all(out, steps)
     return out

@@ -98,6 +98,7 @@ class SelfCalibrating(LeafSystem):
         self._model, self._config, self._guard = model, config, guard
         self.period = model.period
         self.tip_model = TipModel(model, config.estimator.spread)
+        self.tip_model.warm_up()
         self.estimator = TipEstimator(self.tip_model, config.estimator)
         self._lead = ParameterLead(self.tip_model.size, config.lead_frequency, config.lead_acceleration)
         self._planner = PreviewPlanner(self.tip_model, model.period)

@@ -1,0 +1,65 @@
+"""The arrays that compiled functions are given, by name."""
+
+from typing import NamedTuple
+
+import numpy as np
+
+SHIFTS, TURNS_BEFORE, TURNS_BEHIND = 0, 1, 2  # what a parameter does to the placement of its body
+
+
+class Drawing(NamedTuple):
+    """What does not depend on parameters: C columns are joints, two tilts of each bearing, parameters."""
+
+    entries: np.ndarray  # (m, 5) of body after body: parameter, body, what it does, axis, column or -1
+    translation: np.ndarray  # (8, 3) of base, links and tool in the frame before
+    rotation: np.ndarray  # (8, 3, 3)
+    nominal: np.ndarray  # (48,), of angles to which parameters are added
+    joint_turns: np.ndarray  # (3, 6, 3, 3): a joint turns by the first + sin second + cos third
+    axes: np.ndarray  # (C, 3), of columns in their frame, where they are constant
+    is_shift: np.ndarray  # (C,)
+    frame: np.ndarray  # (C,), to which a column belongs: 0 for the world, 1 to 6 for the links
+
+
+class Constants(NamedTuple):
+    """What a value of the parameters makes of the robot."""
+
+    p: np.ndarray  # (48,)
+    along: np.ndarray  # (6, 3, 4), the pose of a link in the one before is along + sin sine + cos cosine
+    sine: np.ndarray
+    cosine: np.ndarray
+    tool: np.ndarray  # (3, 4), in the last link
+    turn: np.ndarray  # (C, 3), axes of turning columns in the frame that they belong to
+    way: np.ndarray  # (C, 3), by which the tool would move if it were at the origin of that frame
+    frame: np.ndarray  # (C,), as of `Drawing`
+
+
+class Masses(NamedTuple):
+    """Six links, then a kilogram of payload, which moves with the last link."""
+
+    mass: np.ndarray  # (7,) kg
+    centres: np.ndarray  # (7, 3) m, in the frame of the link
+    inertia: np.ndarray  # (7, 3, 3) kg m^2, about the centre, in the axes of the link
+    axes: np.ndarray  # (6, 3, 3), rows: axis of the joint, two axes about which its bearing tilts
+    spring: np.ndarray  # (7,) of the counterbalance: stiffness (0 if there is none) and preload,
+    # radii of its base and its arm, angle of the dead centre, way along the axis, least length; SI
+
+
+class Unknowns(NamedTuple):
+    """A value of the unknowns, and where they are in units of what.
+
+    In the vector x are g geometric errors, 18 factors of compliance, mass and first moment of the payload,
+    offset and drift of the clock, and errors of gears if there are any.
+    """
+
+    x: np.ndarray  # (size,)
+    p: np.ndarray  # (g,), the geometry that the constants are for
+    sigma: np.ndarray  # (size,), units of the columns
+    compliance: np.ndarray  # (18,) rad per N m
+
+
+class Seen(NamedTuple):
+    """What is known of n instants beside encoder positions."""
+
+    twist: np.ndarray  # (n, 6), of the tip
+    time: np.ndarray  # (n,) s, since the camera's clock was compared first
+    shapes: np.ndarray  # (n, 7, 6) of the gears' errors, or (n, 0, 6)

@@ -1,0 +1,120 @@
+"""The tip of an elastic arm and its columns at n pairs of one instant each, compiled."""
+
+import numpy as np
+
+from systems.estimation.kernels.geometry import place
+from systems.estimation.kernels.loads import load
+from systems.estimation.kernels.poses import compiled, move
+
+
+@compiled
+def _yields(unknowns, loads, unit, yields):
+    """Deflections in rad for a factor of one, and with the factors of now, (18,) each."""
+    x, g = unknowns.x, len(unknowns.p)
+    for j in range(18):
+        total = loads[0, j]
+        for k in range(4):
+            total += x[g + 18 + k] * loads[1 + k, j]
+        unit[j] = -unknowns.compliance[j] * total
+        yields[j] = x[g + j] * unit[j]
+
+
+@compiled
+def _error_of_gear(unknowns, shapes, j):
+    total, first = 0.0, len(unknowns.p) + 24
+    for k in range(len(shapes)):
+        total += shapes[k, j] * unknowns.x[first + 6 * k + j]
+    return total
+
+
+@compiled
+def _geometric_step(unknowns, columns, step):
+    g = len(unknowns.p)
+    for i in range(6):
+        step[i] = 0.0
+        for k in range(g):
+            step[i] += columns[i, 18 + k] * (unknowns.x[k] - unknowns.p[k])
+
+
+@compiled
+def _complete(unknowns, loads, unit, yields, seen, n, columns, X_WE, H):
+    """Adds the tilting bearings and the clock to a pose, and makes the columns."""
+    x, sigma, g = unknowns.x, unknowns.sigma, len(unknowns.p)
+    clock, time, step = x[g + 22], seen.time[n], np.empty(6)
+    for i in range(6):
+        twist = seen.twist[n, i]
+        step[i] = twist * clock + time * twist * x[g + 23]
+        for j in range(6, 18):
+            step[i] += columns[i, j] * yields[j]
+        for k in range(g):
+            H[i, k] = columns[i, 18 + k] * sigma[k]
+        for j in range(18):
+            H[i, g + j] = columns[i, j] * unit[j] * sigma[g + j]
+        for k in range(4):
+            total = 0.0
+            for j in range(18):
+                total += columns[i, j] * (-x[g + j] * unknowns.compliance[j]) * loads[1 + k, j]
+            H[i, g + 18 + k] = total * sigma[g + 18 + k]
+        H[i, g + 22], H[i, g + 23] = twist * sigma[g + 22], time * twist * sigma[g + 23]
+        for k in range(g + 24, len(x)):
+            H[i, k] = 0.0
+        for k in range(seen.shapes.shape[1]):
+            for j in range(6):
+                entry = g + 24 + 6 * k + j
+                H[i, entry] = columns[i, j] * seen.shapes[n, k, j] * sigma[entry]
+    move(X_WE, step)
+
+
+@compiled
+def predict(c, unknowns, theta, loads, seen, X_WE, H, gears):
+    """The tip at encoder positions.
+
+    Args:
+        c: `Constants` of a geometry near that of the unknowns.
+        unknowns: `Unknowns`.
+        theta: encoder positions in rad, (n, 6).
+        loads: (n, 5, 18).
+        seen: `Seen`.
+        X_WE: (n, 4, 4), H: (n, 6, size), gears: deflections in rad (n, 6), are written.
+    """
+    unit, yields, q, step = np.empty(18), np.empty(18), np.empty(6), np.empty(6)
+    frames, columns = np.empty((7, 4, 4)), np.empty((6, len(c.frame)))
+    for n in range(len(theta)):
+        _yields(unknowns, loads[n], unit, yields)
+        for j in range(6):
+            gears[n, j] = yields[j]
+            q[j] = theta[n, j] + yields[j] + _error_of_gear(unknowns, seen.shapes[n], j)
+        place(c, q, X_WE[n], frames, columns)
+        _geometric_step(unknowns, columns, step)
+        move(X_WE[n], step)
+        _complete(unknowns, loads[n], unit, yields, seen, n, columns, X_WE[n], H[n])
+
+
+@compiled
+def predict_anew(c, unknowns, masses, theta, gears, motion, seen, X_WE, H):
+    """The same with loads worked out anew at the geometry of now.
+
+    Args:
+        c, unknowns, theta, seen, X_WE, H: as of `predict`.
+        masses: `Masses`.
+        gears: about by how much the gears yield in rad, (n, 6); is renewed.
+        motion: velocities and accelerations of the joints, (n, 12).
+    """
+    unit, yields, q, step = np.empty(18), np.empty(18), np.empty(6), np.empty(6)
+    frames, columns, loads = np.empty((7, 4, 4)), np.empty((6, len(c.frame))), np.empty((5, 18))
+    for n in range(len(theta)):
+        for j in range(6):
+            q[j] = theta[n, j] + gears[n, j] + _error_of_gear(unknowns, seen.shapes[n], j)
+        place(c, q, X_WE[n], frames, columns)
+        _geometric_step(unknowns, columns, step)
+        move(X_WE[n], step)
+        load(masses, frames, q, motion[n, :6], motion[n, 6:], loads)
+        _yields(unknowns, loads, unit, yields)
+        for i in range(6):
+            step[i] = 0.0
+            for j in range(6):
+                step[i] += columns[i, j] * (yields[j] - gears[n, j])
+        for j in range(6):
+            gears[n, j] = yields[j]
+        move(X_WE[n], step)
+        _complete(unknowns, loads, unit, yields, seen, n, columns, X_WE[n], H[n])
