@@ -5,6 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from robots.configuration.quantity import positive
 from robots.description.drive_parts import (
     Backlash,
     Cubic,
@@ -97,6 +98,18 @@ class DriveTrain:
             soft=self.backlash.part() if isinstance(self.backlash, ViscoElastic) else None,
             hysteresis=self.hysteresis.part(self.stiffness) if self.hysteresis else None,
         )
+
+
+@dataclass
+class DriveLimits:
+    """Limits of one joint's motor and gear; what is left open is not known and does not limit a motion."""
+
+    motor_torque: float | None = positive(None, "N m")  # of the motor's shaft, at any time
+    # Likewise, root of the mean square over a motion: the current that heats the motor
+    continuous_torque: float | None = positive(None, "N m")
+    gear_torque: float | None = positive(None, "N m")  # joint side, that the gear carries
+    gear_torque_rate: float | None = positive(None, "N m/s")  # joint side: jolts wear gears
+    source: str = ""
 
 
 def drive_trains(trains: Sequence[DriveTrain]) -> DriveTrains | None:

@@ -24,7 +24,7 @@ from robots.configuration.typed import typed
 from robots.description.beam import Beam, beam_surrogate
 from robots.description.calibration import Calibration
 from robots.description.counterbalance_spring import CounterbalanceSpring
-from robots.description.drive_train import DriveTrain, drive_trains
+from robots.description.drive_train import DriveLimits, DriveTrain, drive_trains
 from robots.description.measuring import MeasuringRange
 from robots.description.placement import Picture, Placement
 from robots.description.urdf_in.reader import is_urdf, read_urdf
@@ -50,6 +50,7 @@ class JointLimits:
     source: str = ""
     # Of a command; 0 where it is not known: the largest speed is then reached within `SPEED_UP`
     acceleration_deg_s2: float = quantity(0.0, 0.0, unit="deg/s^2")
+    jerk_deg_s3: float = quantity(0.0, 0.0, unit="deg/s^3")  # of a planned motion; 0 for no limit
 
 
 @dataclass
@@ -67,13 +68,17 @@ class Tilting:
 
 @dataclass
 class Joint:
-    """A revolute joint and the frame of the link that it moves; without ``tilting`` its bearing is stiff."""
+    """A revolute joint and the frame of the link that it moves; without ``tilting`` its bearing is stiff.
+
+    Without ``drive_limits`` only its speed and its acceleration limit a planned motion.
+    """
 
     axis: np.ndarray = field(default_factory=lambda: np.array([0.0, 0.0, 1.0]))
     placement: Placement = field(default_factory=Placement)
     limits: JointLimits = field(default_factory=JointLimits)
     drive_train: DriveTrain = field(default_factory=DriveTrain)
     tilting: Tilting | None = None
+    drive_limits: DriveLimits | None = None
 
 
 @dataclass

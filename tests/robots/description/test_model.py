@@ -53,8 +53,9 @@ def test_every_part_of_a_shipped_robot_names_its_source(name: str):
     found = sources(robot, name)
     assert found.pop(f"{name}.calibration.source") == ""  # a robot as drawn
     assert bool(found.pop(f"{name}.measuring.source")) == bool(robot.measuring.lower_deg)
-    elastic = [joint.tilting for joint in robot.joints] + [link.beam for link in robot.links]
-    optional = [part for part in (*elastic, robot.counterbalance) if part is not None]
+    of_joints = [part for joint in robot.joints for part in (joint.tilting, joint.drive_limits)]
+    parts = [*of_joints, *(link.beam for link in robot.links), robot.counterbalance]
+    optional = [part for part in parts if part is not None]
     # 6 joints with placement, limits, drive train; base, tool; 7 links with 3 each; payload with 2.
     assert len(found) == 6 * 3 + 2 + 7 * 3 + 2 + len(optional)
     assert not [where for where, source in found.items() if not source.strip()]

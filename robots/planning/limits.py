@@ -1,0 +1,82 @@
+"""What a motion must keep to: limits of joints, motors, gears and of the tool."""
+
+from dataclasses import dataclass, fields, replace
+
+import numpy as np
+
+from robots.description.model import RobotModel
+
+# Of each joint, in the order of figures: name, unit and what people call it.
+JOINT_LIMITS = {
+    "speed": ("rad/s", "speed"),
+    "acceleration": ("rad/s^2", "acceleration"),
+    "jerk": ("rad/s^3", "jerk"),
+    "motor_torque": ("N m", "motor torque"),
+    "continuous_torque": ("N m", "motor torque, root mean square"),
+    "gear_torque": ("N m", "gear torque"),
+    "gear_torque_rate": ("N m/s", "rate of gear torque"),
+}
+
+
+DUTY = 0.6  # of a cycle that is motion, as in the rating S3 60 %; in between brakes hold the arm
+
+
+@dataclass(frozen=True)
+class MotionLimits:
+    """Largest magnitudes, infinite where nothing is known; joints in shape (6,), torques behind the gear."""
+
+    speed: np.ndarray  # rad/s, of the motors seen behind the gear
+    acceleration: np.ndarray  # rad/s^2, of the links
+    jerk: np.ndarray  # rad/s^3, of the links
+    motor_torque: np.ndarray  # N m
+    continuous_torque: np.ndarray  # N m, root mean square over the motion: how warm motors get
+    gear_torque: np.ndarray  # N m
+    gear_torque_rate: np.ndarray  # N m/s
+    tool_speed: float = np.inf  # m/s
+    tool_acceleration: float = np.inf  # m/s^2
+
+    def scaled(self, share: float) -> "MotionLimits":
+        """All of them times a share."""
+        return replace(self, **{each.name: share * getattr(self, each.name) for each in fields(self)})
+
+
+def motion_limits(
+    robot: RobotModel,
+    tool_speed: float = np.inf,
+    tool_acceleration: float = np.inf,
+    duty: float = DUTY,
+) -> MotionLimits:
+    """The limits of a robot file, with those of the tool.
+
+    Args:
+        robot: whose limits.
+        tool_speed: m/s.
+        tool_acceleration: m/s^2.
+        duty: share of a cycle that is motion, over which the motors' torque is averaged.
+
+    Raises:
+        ValueError: if a limit of the tool is not positive, or the duty is no share.
+    """
+    if not 0.0 < duty <= 1.0:
+        raise ValueError(f"planning: the duty must be above 0 and at most 1, got {duty}")
+    for name, value in (("speed", tool_speed), ("acceleration", tool_acceleration)):
+        if not value > 0.0:
+            raise ValueError(f"planning: the {name} of the tool must be positive, got {value}")
+    ratio = robot.gear_ratio
+    jerk = np.deg2rad([joint.limits.jerk_deg_s3 for joint in robot.joints])
+    return MotionLimits(
+        speed=robot.speed,
+        acceleration=robot.acceleration,
+        jerk=np.where(jerk > 0.0, jerk, np.inf),
+        motor_torque=ratio * _known(robot, "motor_torque"),
+        continuous_torque=ratio * _known(robot, "continuous_torque") / np.sqrt(duty),
+        gear_torque=_known(robot, "gear_torque"),
+        gear_torque_rate=_known(robot, "gear_torque_rate"),
+        tool_speed=tool_speed,
+        tool_acceleration=tool_acceleration,
+    )
+
+
+def _known(robot: RobotModel, name: str) -> np.ndarray:
+    values = [getattr(joint.drive_limits, name, None) for joint in robot.joints]
+    return np.array([np.inf if value is None else value for value in values])

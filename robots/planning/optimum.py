@@ -1,0 +1,156 @@
+"""The quickest or most frugal motion along a path within all limits: a spline s(t), found by IPOPT."""
+
+from dataclasses import dataclass
+
+import casadi as ca
+import numpy as np
+
+from robots.description.model import NUM_JOINTS
+from robots.planning.joint_path import PathError
+from robots.planning.limits import MotionLimits
+from robots.planning.path_dynamics import ORDERS, PathDynamics
+from robots.planning.spline_program import PointProgram, Solution, solve
+from robots.planning.time_spline import AT_REST, TimeSpline, at_rest, bases, points, weights
+from robots.planning.use import OVER_TIME, energy
+
+OBJECTIVES = ("time", "energy")
+ITERATIONS = 60  # of IPOPT, at most
+_SMOOTH = {
+    "time": 1e-10,
+    "energy": 1e-9,
+}  # weight of the fourth derivative, which nothing else holds where no limit binds
+_ROUNDED = 0.03  # of the mean power at the start, below which the magnitude of a power is rounded
+_SLOWEST = 20.0  # times the duration of the start
+_NEAR = 0.3  # use of a limit at the start, from which on the optimiser looks at it
+_MISSED = 1.002  # use of a limit that it did not look at, for which it looks again
+_ROUNDS = 3
+
+
+@dataclass(frozen=True)
+class Optimum:
+    """What the optimiser found."""
+
+    motion: TimeSpline
+    iterations: int
+    status: str  # of IPOPT
+
+
+def optimum(
+    dynamics: PathDynamics,
+    limits: MotionLimits,
+    start: TimeSpline,
+    objective: str = "time",
+    recuperation: bool = False,
+    duration: float | None = None,
+) -> Optimum:
+    """Optimises a motion.
+
+    Args:
+        dynamics: robot and path.
+        limits: that are kept at some points of every interval of the spline.
+        start: a motion to begin with; it need not keep them.
+        objective: of `OBJECTIVES`; energy needs a duration.
+        recuperation: whether braking gives energy back.
+        duration: s, of the motion; None if it is free.
+
+    Raises:
+        ValueError: if there is no such objective, or energy has no duration.
+        PathError: if the limits admit no motion.
+    """
+    if objective not in OBJECTIVES:
+        raise ValueError(f"--objective must be one of {', '.join(OBJECTIVES)}, got '{objective}'")
+    if objective == "energy" and duration is None:
+        raise ValueError("planning: the least energy needs a duration, or the motion would take forever")
+    iterations = 0
+    rows = _used(dynamics, limits, start) > _NEAR
+    motion = start
+    for _ in range(_ROUNDS):
+        found, motion = _solved(dynamics, limits, motion, rows, (objective, recuperation, duration))
+        iterations += found.iterations
+        if "Infeasible" in found.status:
+            break
+        used = _used(dynamics, limits, motion)
+        if not (used[~rows] > _MISSED).any():
+            return Optimum(motion, iterations, found.status)
+        rows = rows | (used > _NEAR)
+    raise PathError("the limits admit no motion of this duration along the path")
+
+
+def _scales(limits: MotionLimits) -> np.ndarray:
+    """What is one in each row of `PathDynamics.function`."""
+    of_tool = np.square([limits.tool_speed, limits.tool_acceleration])
+    return np.concatenate([*(getattr(limits, name) for name in OVER_TIME), of_tool])
+
+
+def _used(dynamics: PathDynamics, limits: MotionLimits, motion: TimeSpline) -> np.ndarray:
+    """The largest share of each row of `PathDynamics.function`."""
+    rates = motion.rates(points(len(motion.coefficients)) * motion.duration)
+    return np.abs(dynamics.rows(rates)).max(axis=1) / _scales(limits)
+
+
+def _solved(
+    dynamics: PathDynamics,
+    limits: MotionLimits,
+    start: TimeSpline,
+    rows: np.ndarray,
+    aim: tuple[str, bool, float | None],
+) -> tuple[Solution, TimeSpline]:
+    count, unit, duration = len(start.coefficients), start.duration, aim[2]
+    free = slice(AT_REST, count - AT_REST)
+    splines, x, held = bases(count), points(count), at_rest(count)
+    # y of a point: s and four derivatives by the share of the duration, then the duration over that at first.
+    matrix = np.zeros((len(x), ORDERS + 1, count - 2 * AT_REST + 1))
+    matrix[:, :ORDERS, :-1] = np.stack([basis[:, free] for basis in splines], axis=1)
+    matrix[:, ORDERS, -1] = 1.0
+    offset = np.zeros((len(x), ORDERS + 1))
+    offset[:, :ORDERS] = np.stack([basis @ held for basis in splines], axis=1)
+    first = 1.0 if duration is None else duration / unit
+    low, high = (0.02, _SLOWEST) if duration is None else (first, first)
+    inside = np.ones(count - 2 * AT_REST)
+    found = solve(
+        _program(dynamics, limits, start, rows, aim),
+        ca.sparsify(ca.DM(matrix.reshape(-1, matrix.shape[-1]))),
+        offset.ravel(),
+        weights(count),
+        np.append(start.coefficients[free], first),
+        (np.append(-0.5 * inside, low), np.append(1.5 * inside, high)),
+        ITERATIONS,
+    )
+    coefficients = held.copy()
+    coefficients[free] = found.x[:-1]
+    return found, TimeSpline(coefficients, float(found.x[-1]) * unit)
+
+
+def _program(
+    dynamics: PathDynamics,
+    limits: MotionLimits,
+    start: TimeSpline,
+    rows: np.ndarray,
+    aim: tuple[str, bool, float | None],
+) -> PointProgram:
+    objective, recuperation, _ = aim
+    unit = start.duration
+    y, w = ca.SX.sym("y", ORDERS + 1), ca.SX.sym("w")
+    T = y[ORDERS]
+    rates = ca.vertcat(*[y[d] / (T * unit) ** d for d in range(ORDERS)])
+    values = dynamics.function(rates)
+    scales, chosen = _scales(limits), [int(row) for row in np.flatnonzero(rows)]
+    bounded = [values[row] / scales[row] for row in chosen] + [y[1]]  # never backwards
+    speed, torque = values[:NUM_JOINTS], values[3 * NUM_JOINTS : 4 * NUM_JOINTS]
+    lasting = [int(joint) for joint in np.flatnonzero(np.isfinite(limits.continuous_torque))]
+    means = [(torque[joint] / float(limits.continuous_torque[joint])) ** 2 for joint in lasting]
+    cost = w * T + _SMOOTH[objective] * w * y[ORDERS - 1] ** 2
+    if objective == "energy":
+        times = points(len(start.coefficients)) * unit
+        of_start = energy(dynamics.demand(start.rates(times)), times)
+        power = torque * speed
+        if not recuperation:
+            power = ca.sqrt(power**2 + (_ROUNDED * of_start / unit) ** 2)
+        cost = w * ca.sum1(power) * T * unit / of_start + _SMOOTH[objective] * w * y[ORDERS - 1] ** 2
+    return PointProgram(
+        ca.Function("bounded", [y], [ca.vertcat(*bounded)]),
+        np.append([-1.0 if row < 6 * NUM_JOINTS else -0.1 for row in chosen], 0.0),
+        np.append(np.ones(len(chosen)), np.inf),
+        ca.Function("means", [y], [ca.vertcat(*means)]),
+        ca.Function("cost", [y, w], [cost]),
+    )

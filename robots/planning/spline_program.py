@@ -1,0 +1,127 @@
+"""A nonlinear program whose variables are the coefficients of splines and the duration of a motion.
+
+At every point the motion is given by few numbers y, linear in the variables: the derivatives of the splines
+by the share of the duration, and the duration. What is bounded and what it costs are functions of y, the same
+at all points. So Jacobian and Hessian are those of one point, put together by the matrix of the splines:
+differentiating the whole program would take far longer.
+"""
+
+from dataclasses import dataclass
+
+import casadi as ca
+import numpy as np
+
+TOLERANCE = 1e-5
+_ACCEPTABLE = 1e-4
+
+
+@dataclass(frozen=True)
+class PointProgram:
+    """Functions of y at one point; y has n numbers and the weight of the point in integrals is w.
+
+    Attributes:
+        bounded: of y, r numbers.
+        lower: their limits, shape (r,).
+        upper: likewise.
+        means: of y, m numbers whose weighted sums over all points are at most 1.
+        cost: of (y, w), whose sum over all points is minimised.
+    """
+
+    bounded: ca.Function
+    lower: np.ndarray
+    upper: np.ndarray
+    means: ca.Function
+    cost: ca.Function
+
+
+@dataclass(frozen=True)
+class Solution:
+    """What IPOPT found."""
+
+    x: np.ndarray
+    iterations: int
+    status: str
+
+
+def solve(
+    program: PointProgram,
+    matrix: ca.DM,
+    offset: np.ndarray,
+    weights: np.ndarray,
+    start: np.ndarray,
+    bounds: tuple[np.ndarray, np.ndarray],
+    iterations: int,
+) -> Solution:
+    """Minimises the cost within the bounds.
+
+    Args:
+        program: of one point.
+        matrix: sparse, shape (points n, size): y of all points is matrix x + offset.
+        offset: shape (points n,).
+        weights: of the points, shape (points,).
+        start: x to begin with, shape (size,).
+        bounds: of x, shape (size,) each.
+        iterations: at most.
+    """
+    size, count = matrix.shape[1], len(weights)
+    n, r, m = program.bounded.size1_in(0), len(program.lower), program.means.size1_out(0)
+    x, w = ca.MX.sym("x", size), ca.DM(weights).T
+    y = ca.reshape(matrix @ x + ca.DM(offset), n, count)
+    bounded = program.bounded.map(count)(y)
+    means = program.means.map(count)(y) @ w.T
+    g = ca.vertcat(ca.vec(bounded), means)
+    f = ca.sum2(program.cost.map(count)(y, w))
+    parts = _parts(program, n, r, m)
+    nothing, of_f, of_g = ca.MX.sym("p", 0), ca.MX.sym("lam_f"), ca.MX.sym("lam_g", g.shape[0])
+    slopes = _blocks(parts["slope"].map(count)(y), n) @ matrix
+    of_means = ca.reshape(parts["mean_slope"].map(count)(y), m, n * count)
+    spread = ca.repmat(w, n, 1)
+    jacobian = ca.vertcat(slopes, (of_means * ca.repmat(ca.vec(spread).T, m, 1)) @ matrix)
+    multipliers = ca.reshape(of_g[: r * count], r, count)
+    of_each = ca.repmat(of_g[r * count :], 1, count)
+    curvature = parts["curvature"].map(count)(y, w, multipliers, of_each, ca.repmat(of_f, 1, count))
+    hessian = ca.triu(matrix.T @ _blocks(curvature, n) @ matrix)
+    options = {
+        "print_time": False,
+        "ipopt.print_level": 0,
+        "ipopt.sb": "yes",
+        "ipopt.max_iter": iterations,
+        "ipopt.tol": TOLERANCE,
+        "ipopt.acceptable_tol": _ACCEPTABLE,
+        "ipopt.acceptable_iter": 5,
+        "ipopt.mu_strategy": "adaptive",
+        "jac_g": ca.Function("jac_g", [x, nothing], [g, jacobian]),
+        "hess_lag": ca.Function("hess_lag", [x, nothing, of_f, of_g], [hessian]),
+    }
+    solver = ca.nlpsol("motion", "ipopt", {"x": x, "f": f, "g": g}, options)
+    found = solver(
+        x0=start,
+        lbx=bounds[0],
+        ubx=bounds[1],
+        lbg=np.append(np.tile(program.lower, count), np.full(m, -np.inf)),
+        ubg=np.append(np.tile(program.upper, count), np.ones(m)),
+    )
+    stats = solver.stats()
+    return Solution(np.array(found["x"]).ravel(), int(stats["iter_count"]), str(stats["return_status"]))
+
+
+def _parts(program: PointProgram, n: int, r: int, m: int) -> dict[str, ca.Function]:
+    """Derivatives at one point: of what is bounded, of the means, and of the Lagrangian twice."""
+    y, w = ca.SX.sym("y", n), ca.SX.sym("w")
+    of_rows, of_means, of_cost = ca.SX.sym("mu", r), ca.SX.sym("nu", m), ca.SX.sym("lam")
+    bounded, means = program.bounded(y), program.means(y)
+    lagrangian = ca.dot(of_rows, bounded) + w * ca.dot(of_means, means) + of_cost * program.cost(y, w)
+    return {
+        "slope": ca.Function("slope", [y], [ca.densify(ca.jacobian(bounded, y))]),
+        "mean_slope": ca.Function("mean_slope", [y], [ca.densify(ca.jacobian(means, y))]),
+        "curvature": ca.Function(
+            "curvature",
+            [y, w, of_rows, of_means, of_cost],
+            [ca.densify(ca.hessian(lagrangian, y)[0])],
+        ),
+    }
+
+
+def _blocks(side_by_side: ca.MX, columns: int) -> ca.MX:
+    """Matrices that stand side by side, along the diagonal."""
+    return ca.diagcat(*ca.horzsplit(side_by_side, columns))

@@ -1,0 +1,94 @@
+"""Optimal motions against closed forms and against the best jerk-limited profile."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from robots.description.model import load_robot
+from robots.planning.jerk_profile import JerkProfile, best_jerk_profile
+from robots.planning.joint_path import straight_joint_path
+from robots.planning.limits import MotionLimits, motion_limits
+from robots.planning.optimum import optimum
+from robots.planning.path_dynamics import PathDynamics
+from robots.planning.rigid_start import quickest_rigid, rigid_start
+from robots.planning.use import energy, use_of
+
+ANGLE = np.deg2rad(40.0)
+FREE = np.full(6, np.inf)
+
+
+@pytest.fixture(scope="module")
+def robot():
+    return load_robot("kr16")
+
+
+def limits(**given) -> MotionLimits:
+    every = (
+        "speed",
+        "acceleration",
+        "jerk",
+        "motor_torque",
+        "continuous_torque",
+        "gear_torque",
+        "gear_torque_rate",
+    )
+    return MotionLimits(**{name: given.get(name, FREE) for name in every})
+
+
+def axis_1(robot) -> PathDynamics:
+    """Axis 1 alone: neither gravity nor a change of inertia, so torque is proportional to acceleration."""
+    start, goal = np.deg2rad([0.0, -90.0, 90.0, 0.0, 30.0, 0.0]), np.zeros(6)
+    goal[:] = start
+    goal[0] = ANGLE
+    return PathDynamics(robot, 16.0, straight_joint_path(start, goal), "rigid")
+
+
+def inertia(dynamics) -> float:
+    return float(dynamics.demand(np.array([[0.5], [0.0], [1.0], [0.0], [0.0]])).gear_torque[0, 0]) / ANGLE
+
+
+def test_with_limited_torque_and_rate_it_takes_as_long_as_the_closed_form(robot):
+    dynamics = axis_1(robot)
+    acceleration, jerk = 8.0, 100.0  # rad/s^2, rad/s^3
+    of_torque = inertia(dynamics) * np.array([1.0, *FREE[1:]])
+    wanted = JerkProfile(1e3, acceleration / ANGLE, jerk / ANGLE).duration
+    kept = limits(
+        gear_torque=acceleration * of_torque, gear_torque_rate=jerk * of_torque, speed=np.full(6, 50.0)
+    )
+    start = rigid_start(robot, 16.0, dynamics.path, replace(kept, acceleration=np.full(6, acceleration)), 80)
+    found = optimum(dynamics, kept, start)
+    assert found.status == "Solve_Succeeded"
+    # What five continuous derivatives cost where the closed form has jumps of the jerk.
+    assert wanted * 0.999 < found.motion.duration < wanted * 1.01
+
+
+def test_with_limited_torque_alone_it_comes_near_bang_bang(robot):
+    """2 sqrt(S / a), which no motion with five continuous derivatives reaches."""
+    dynamics, acceleration = axis_1(robot), 8.0
+    kept = limits(acceleration=np.full(6, acceleration), speed=np.full(6, 50.0))
+    wanted = 2.0 * np.sqrt(ANGLE / acceleration)
+    times, s = quickest_rigid(robot, 16.0, dynamics.path, kept)
+    assert times[-1] == pytest.approx(wanted, rel=2e-3)
+    assert s[len(s) // 2] == pytest.approx(0.5, abs=0.01)
+    found = optimum(dynamics, kept, rigid_start(robot, 16.0, dynamics.path, kept, 46))
+    assert wanted < found.motion.duration < wanted * 1.03
+
+
+@pytest.mark.slow
+def test_quicker_and_more_frugal_than_the_best_jerk_profile_in_the_same_limits(robot):
+    path = straight_joint_path(np.zeros(6), np.deg2rad([-20.0, -20.0, -20.0, 0.0, 0.0, 0.0]))
+    dynamics, kept = PathDynamics(robot, 16.0, path, "elastic_structure"), motion_limits(robot)
+    base = best_jerk_profile(dynamics, kept)
+    quick = optimum(dynamics, kept, rigid_start(robot, 16.0, path, kept, 46))
+    frugal = optimum(dynamics, kept, quick.motion, "energy", duration=base.duration)
+    used = [
+        use_of(dynamics.demand(each.rates(each.times)), kept, each.times)
+        for each in (base, quick.motion, frugal.motion)
+    ]
+    work = [energy(dynamics.demand(each.rates(each.times)), each.times) for each in (base, frugal.motion)]
+    assert max(use.largest for use in used) < 1.01
+    assert "rate of gear torque 1" in used[1].binding
+    assert quick.motion.duration < 0.92 * base.duration
+    assert work[1] < 0.85 * work[0]
+    assert max(quick.iterations, frugal.iterations) <= 60
