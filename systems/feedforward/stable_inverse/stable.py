@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -24,12 +25,14 @@ from systems.feedforward.stable_inverse.bounded_inverse import (
     derivatives,
 )
 from systems.feedforward.stable_inverse.flexible_arm import FlexibleArm, Pencil
+from systems.feedforward.stable_inverse.relaxed_inverse import relaxed_motion
 from systems.reference.paths import CartesianPath
 
 _SAMPLE = 2e-3  # s; at 30 Hz differences of fourth order err by some hundredths of a percent
 _MARGIN = 0.8  # s at rest before and after: what a motion needs there dies away by some 5 1/s
 _LINEARISED = 5  # samples from one linearisation to the next; they change as slowly as the arm turns
-_ENOUGH = 5e-5  # m, where zeros change sides
+_ENOUGH = 5e-5  # m, what the point may be off its path where an exact motion does not exist
+_EFFORT = 1e-6  # m per rad/s^2 of the motors beyond a motion that is nearly right; costs some micrometres
 _MATRICES = ("mass", "damping", "stiffness")
 _AT_REST = 1e-3  # rad/s; where the structure rings at some 10 Hz that is a hundredth of a millirad
 
@@ -51,8 +54,9 @@ class StableFeedforward(Feedforward):
     """Motors that begin to move before the tip shall: no causal inverse of an elastic structure is exact.
 
     Computed once, before the run, from the whole path; then it is played. The position of the tip (or of the
-    wrist, `FeedforwardConfig.point`) and the links of the wrist are exact; the orientation is off by what
-    bearings and beams turn the wrist. It starts at rest, so there must be time before the path.
+    wrist, `FeedforwardConfig.point`) and the links of the wrist are exact, or nearly so where no exact motion
+    exists (see `plan`); the orientation is off by what bearings and beams turn the wrist. It starts at rest,
+    so there must be time before the path.
     """
 
     title = "stable"
@@ -82,8 +86,7 @@ class StableFeedforward(Feedforward):
         """Computes the motion for a path; see `Feedforward.prepare`.
 
         Raises:
-            ValueError: also if the path is out of reach, needs more time at rest before it, or the iteration
-                does not end.
+            ValueError: also if the path is out of reach, or as `plan`.
         """
         super().prepare(path, home)
         times = np.arange(0.0, path.duration + 0.5 * _SAMPLE, _SAMPLE)
@@ -93,30 +96,58 @@ class StableFeedforward(Feedforward):
                 last = row[:] = self._link_positions(RigidTransform.MakeUnchecked(X[:3]), last)
             except (UnreachableError, JointLimitError) as error:
                 raise ValueError(f"feedforward stable: path at {time:.3f} s: {error}") from error
-        self._plan = plan = self.plan(times, q)
-        if plan.first < 0.0:
-            needed = path.path_start - plan.first
-            raise ValueError(
-                f"feedforward stable: motors begin to move {needed:.2f} s before the end of reference.settle="
-                f"{path.path_start:g} s, which must be at least so long"
-            )
+        self._plan = self.plan(times, q)
 
     def plan(self, times: np.ndarray, q: np.ndarray) -> Plan:
         """The motion of the motors for links of a rigid robot that go from rest to rest.
+
+        It is exact where such a motion exists and begins within these times. Where zeros change sides on the
+        path, or nearly do, it is the one within these times that leaves the path least.
 
         Args:
             times: s, evenly spaced, shape (n,).
             q: rad, shape (n, 6).
 
         Raises:
-            NoBoundedMotionError: if the iteration does not end.
+            NoBoundedMotionError: if it is off the path by more than 0.05 mm, or the iteration does not end.
         """
         step = times[1] - times[0]
         margin = round(_MARGIN / step)
-        q = np.concatenate([np.tile(q[0], (margin, 1)), q, np.tile(q[-1], (margin, 1))])
-        times = times[0] + step * (np.arange(len(q)) - margin)
+        try:
+            plan = self._plan_with(times, q, (margin, margin), bounded_motion)
+            if plan.first >= times[0]:
+                return plan
+        except NoBoundedMotionError:
+            pass
+        relaxed = partial(relaxed_motion, motors=self._arm.motors, effort=_EFFORT)
+        plan = self._plan_with(times, q, (0, margin), relaxed)
+        if plan.history[-1] > _ENOUGH:
+            raise NoBoundedMotionError(
+                f"feedforward stable: off the path by {1e3 * plan.history[-1]:.3g} mm with motors at rest "
+                f"at its beginning, more than {1e3 * _ENOUGH:g}: more time before the motion helps "
+                "(reference.settle)"
+            )
+        return plan
+
+    def _plan_with(
+        self,
+        times: np.ndarray,
+        q: np.ndarray,
+        margins: tuple[int, int],
+        solver: Callable[..., BoundedMotion],
+    ) -> Plan:
+        """The same by one method, with so many samples at rest before and after."""
+        before, after = margins
+        step = times[1] - times[0]
+        q = np.concatenate([np.tile(q[0], (before, 1)), q, np.tile(q[-1], (after, 1))])
+        times = times[0] + step * (np.arange(len(q)) - before)
         wanted = np.array([self._arm.rigid_place(row) for row in q])
-        found = self._found(q, wanted, step)
+
+        def residuals(motion: Motion) -> tuple[np.ndarray, np.ndarray]:
+            return self._arm.residuals(motion, q, wanted)
+
+        start, linear = self._linearised(q, step)
+        found = solver(start, step, linear, residuals)
         theta, rate, acceleration = (part[:, self._arm.motors] for part in found.motion)
         load = self._inertia * (found.others - self._rotor * acceleration - self._viscous * rate)
         torque = [
@@ -124,7 +155,7 @@ class StableFeedforward(Feedforward):
             for position, v, a, tau in zip(theta, rate, acceleration, load, strict=True)
         ]
         # Where the circle of samples closes, what is left of the end dies away.
-        moving = times[(np.abs(rate).max(axis=1) > _AT_REST) & (times > times[0] + 0.5 * _MARGIN)]
+        moving = times[(np.abs(rate).max(axis=1) > _AT_REST) & (times >= times[before // 2])]
         first, last = (moving[0], moving[-1]) if len(moving) else (times[-1], times[0])
         return Plan(
             CubicSpline(times, theta),
@@ -135,31 +166,6 @@ class StableFeedforward(Feedforward):
             float(last),
             found.history,
         )
-
-    def _found(self, q: np.ndarray, wanted: np.ndarray, step: float) -> BoundedMotion:
-        """Newton's method; with one linearisation for all of the path where zeros change sides on it.
-
-        A zero that crosses the imaginary axis leaves more or fewer conditions at the ends than there are
-        modes, so that there is no solution, or more than one. With the zeros of the middle there often is a
-        motion that hardly misses the path.
-        """
-
-        def residuals(motion: Motion) -> tuple[np.ndarray, np.ndarray]:
-            return self._arm.residuals(motion, q, wanted)
-
-        start, linear = self._linearised(q, step)
-        try:
-            return bounded_motion(start, step, linear, residuals)
-        except NoBoundedMotionError:
-            length = np.linalg.norm(np.diff(q, axis=0), axis=1).cumsum()
-            middle = int(np.searchsorted(length, 0.5 * length[-1]))
-            frozen = Pencil(
-                *(
-                    np.broadcast_to(getattr(linear, name)[middle], getattr(linear, name).shape)
-                    for name in _MATRICES
-                )
-            )
-            return bounded_motion(start, step, frozen, residuals, enough=_ENOUGH)
 
     def _linearised(self, q: np.ndarray, step: float) -> tuple[np.ndarray, Pencil]:
         """A motion that is exact where it rests, and the equations about it, linear between some samples."""
@@ -178,14 +184,12 @@ class StableFeedforward(Feedforward):
         """Commands at ticks from rest to rest, see `Feedforward.play`.
 
         Raises:
-            ValueError: if motors move before the first tick, or the iteration does not end.
+            ValueError: as `plan`.
         """
         ticks = self._period * np.arange(len(references))
         moments = np.array([[each.position, each.velocity, each.acceleration] for each in references])
         times = np.arange(0.0, ticks[-1] + 0.5 * _SAMPLE, _SAMPLE)
         plan = self.plan(times, BPoly.from_derivatives(ticks, moments)(np.minimum(times, ticks[-1])))
-        if plan.first < 0.0:
-            raise ValueError(f"feedforward stable: motors begin to move {-plan.first:.2f} s too early")
         middles = ticks + 0.5 * self._period
         return np.stack([plan.position(ticks), plan.velocity(ticks), plan.torque(middles)], axis=1)
 

@@ -60,6 +60,18 @@ def test_at_rest_it_is_where_the_approximate_inverse_is():
 
 
 @pytest.mark.slow
+def test_where_zeros_change_sides_it_is_a_hundredth_of_a_millimetre_off_and_starts_within_its_time():
+    """From -72.5 and 17.5 degrees of axes 2 and 3 a pair crosses the imaginary axis in these five degrees."""
+    start = np.deg2rad([0.0, -72.5, 17.5, 0.0, 0.0, 0.0])
+    times = np.arange(0.0, SETTLE + PROFILE.duration + SETTLE, STEP)
+    axes = np.array([1.0, 1.0, 1.0, 0.0, 0.0, 0.0])
+    plan = inverse(point="wrist").plan(times, start + PROFILE.at_times(times - SETTLE)[0][:, None] * axes)
+    assert 1e-7 < plan.history[-1] < 1e-5  # m: not exact
+    assert plan.first >= 0.0
+    assert np.abs(plan.velocity([0.0, plan.rigid.x[-1]])).max() < 2e-3  # rad/s
+
+
+@pytest.mark.slow
 def test_the_wrist_rings_a_quarter_of_what_it_does_with_the_best_causal_inverse():
     """Of a KR 210 with 210 kg after five degrees in a fifth of a second."""
     robot = load_robot("kr210")
