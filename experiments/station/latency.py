@@ -1,5 +1,6 @@
 """Delays from recorded motions: the time shift at which one motion matches the other."""
 
+import math
 from dataclasses import dataclass
 from typing import Any
 
@@ -12,6 +13,11 @@ from diagrams.runs.latency import LatencyRecord
 
 _LONGEST = 0.5  # s, of a delay that is looked for
 _TRIM = 0.6  # s at both ends, where the shifted motion is not known
+_SURE = 3.0  # standard errors
+
+
+class ImpossibleDelayError(ValueError):
+    """A measurement whose result cannot be."""
 
 
 @dataclass(frozen=True)
@@ -21,8 +27,10 @@ class Latency:
     cycle: float  # between two messages of the controller
     loop: float  # from a command to the joint at it, as the controller's stamps have it
     dead_time: float  # of that, what is more than the one cycle in which a reply is heard
+    loop_sigma: float  # standard error, of the dead time too
     residual: float  # rad, root mean square of what is left of the motion
     camera: float | None  # from exposure to arrival
+    camera_sigma: float | None
     camera_residual: float | None  # m
     drift_ppm: float | None  # the camera's clock gains this on the controller's
     drift_sigma_ppm: float | None
@@ -39,7 +47,9 @@ class Latency:
             "cycle_ms": ms(self.cycle),
             "loop_ms": ms(self.loop),
             "dead_time_ms": ms(self.dead_time),
+            "loop_sigma_ms": ms(self.loop_sigma),
             "camera_ms": ms(self.camera),
+            "camera_sigma_ms": ms(self.camera_sigma),
             "drift_ppm": self.drift_ppm,
             "drift_sigma_ppm": self.drift_sigma_ppm,
             "jitter_ms": {
@@ -56,44 +66,79 @@ def evaluate(record: LatencyRecord) -> Latency:
     """Finds the delays.
 
     Raises:
-        ValueError: if nothing moved, or the motions do not resemble each other.
+        ImpossibleDelayError: if nothing moved, the motions do not resemble each other, or what comes out
+            cannot be.
     """
     cycle = float(np.median(np.diff(record.stamp)))
-    loop, residual = delay_between(record.stamp, record.commanded, record.stamp, record.measured[:, None], 1)
+    loop, residual, loop_sigma = delay_between(
+        record.stamp, record.commanded, record.stamp, record.measured[:, None], 1
+    )
     spread = float(record.commanded.std())
     if residual > 0.1 * spread:
-        raise ValueError(
+        raise ImpossibleDelayError(
             f"the joint does not follow: {residual:.1e} rad are left of a motion of {spread:.1e} rad"
         )
-    camera = camera_residual = drift = drift_sigma = None
+    # Where in a cycle a controller takes its set-point and reads its joints is not known.
+    within_cycle = cycle / math.sqrt(12.0)
+    camera = camera_residual = camera_sigma = drift = drift_sigma = None
     jitter = {"controller": record.robot_clock.jitter}
     if record.camera_clock is not None and len(record.seen) > 10:
         # A tool on a circle: its coordinates are polynomials of the joint's angle.
-        camera, camera_residual = delay_between(
+        camera, camera_residual, camera_sigma = delay_between(
             record.reported, record.measured, record.seen, record.position, 3
         )
+        camera_sigma = math.hypot(camera_sigma, within_cycle)
         # Both drifts are those of our clock against theirs.
         drift = record.robot_clock.drift_ppm - record.camera_clock.drift_ppm
         drift_sigma = float(np.hypot(record.camera_clock.drift_sigma_ppm, record.robot_clock.drift_sigma_ppm))
         jitter["camera"] = record.camera_clock.jitter
     levels = dict(zip(("50%", "99%", "100%"), np.percentile(record.turn_around, [50, 99, 100]), strict=True))
-    return Latency(
+    found = Latency(
         cycle,
         loop,
         loop - cycle,
+        math.hypot(loop_sigma, within_cycle),
         residual,
         camera,
+        camera_sigma,
         camera_residual,
         _finite(drift),
         _finite(drift_sigma),
         jitter,
         {level: float(value) for level, value in levels.items()},
     )
+    _refuse_impossible(found)
+    return found
+
+
+def _refuse_impossible(found: Latency) -> None:
+    """Raises ImpossibleDelayError for delays that no station has."""
+    delays = [
+        ("the loop takes", found.loop, found.loop_sigma),
+        ("the dead time is", found.dead_time, found.loop_sigma),
+    ]
+    if found.camera is not None:
+        assert found.camera_sigma is not None
+        delays.append(("the camera's delay is", found.camera, found.camera_sigma))
+    for what, delay, sigma in delays:
+        if delay < -_SURE * sigma:
+            raise ImpossibleDelayError(
+                f"the measurement failed: {what} {1e3 * delay:.2f} ms +- {1e3 * sigma:.2f} ms, an effect "
+                "before its cause"
+            )
+    for line, delay in (("controller", found.loop), ("camera", found.camera)):
+        jitter = found.jitter.get(line, {}).get("50%", math.nan)
+        # Clocks are related by the quickest messages: half of the others are late by more than there is.
+        if delay is not None and jitter > max(delay, found.cycle):
+            raise ImpossibleDelayError(
+                f"the measurement failed: half of the messages of the {line} come {1e3 * jitter:.1f} ms "
+                f"later than the quickest, but its whole delay would be {1e3 * delay:.1f} ms"
+            )
 
 
 def delay_between(
     cause_time: np.ndarray, cause: np.ndarray, effect_time: np.ndarray, effect: np.ndarray, degree: int
-) -> tuple[float, float]:
+) -> tuple[float, float, float]:
     """The delay after which an effect follows its cause, and what it does not explain.
 
     The effect is a polynomial of the delayed cause, with coefficients that are found too: their scale does
@@ -107,24 +152,42 @@ def delay_between(
         degree: of the polynomial.
 
     Returns:
-        Delay in s, negative if the effect comes first, and the root mean square of the rest.
+        Delay in s, negative if the effect comes first, the root mean square of the rest, and the standard
+        error of the delay, for which the rest counts as its correlation in time leaves it.
     """
     spline = CubicSpline(cause_time, cause)
     inside = (effect_time > cause_time[0] + _TRIM) & (effect_time < cause_time[-1] - _TRIM)
     time, values = effect_time[inside], effect[inside] - effect[inside].mean(axis=0)
 
-    def rest(delay: float) -> float:
-        moved = spline(time - delay)
-        scaled = (moved - moved.mean()) / (moved.std() or 1.0)
-        A = scaled[:, None] ** np.arange(degree + 1)
+    def fitted(delay: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Powers of the delayed cause (m, degree + 1), what is left (m, k), and its slope over the delay."""
+        moved, scale = spline(time - delay), spline(time).std() or 1.0
+        powers = np.arange(degree + 1)
+        scaled = (moved - moved.mean()) / scale
+        A = scaled[:, None] ** powers
         solution = np.linalg.lstsq(A, values, rcond=None)[0]
-        return float(np.sqrt(np.mean((values - A @ solution) ** 2)))
+        slope = (powers[1:] * scaled[:, None] ** powers[:-1]) @ solution[1:]
+        return A, values - A @ solution, slope * (spline(time - delay, 1) / scale)[:, None]
+
+    def rest(delay: float) -> float:
+        return float(np.sqrt(np.mean(fitted(delay)[1] ** 2)))
 
     first = _correlation_peak(spline, time, values)
-    found = minimize_scalar(
+    found: Any = minimize_scalar(
         rest, bounds=(first - 0.05, first + 0.05), method="bounded", options={"xatol": 1e-7}
     )
-    return float(found.x), float(found.fun)
+    A, left, slope = fitted(float(found.x))
+    # What of the slope no coefficient can stand for.
+    seen = slope - A @ np.linalg.lstsq(A, slope, rcond=None)[0]
+    information = float((seen**2).sum() / max((left**2).mean(), 1e-300)) / _memory_of(left)
+    return float(found.x), float(found.fun), 1.0 / math.sqrt(max(information, 1e-300))
+
+
+def _memory_of(left: np.ndarray) -> float:
+    """How many successive rows (n, k) stand for one independent one, from the correlation of neighbours."""
+    square = float((left[:-1] ** 2).sum()) or 1.0
+    rho = float(np.clip((left[1:] * left[:-1]).sum() / square, 0.0, 0.999))
+    return (1.0 + rho) / (1.0 - rho)
 
 
 def _correlation_peak(spline: CubicSpline, time: np.ndarray, values: np.ndarray) -> float:

@@ -12,7 +12,7 @@ from rich.table import Table
 
 from diagrams.runs.latency import LatencyConfig, LatencyRecord, measure_latency
 from diagrams.scenario.scenario import Scenario, load_scenario
-from experiments.cli.console import print_files, progress_bar, refusing
+from experiments.cli.console import BROKEN_OFF, fail, print_files, progress_bar, refusing
 from experiments.cli.json_output import human_console, json_output
 from experiments.cli.options import (
     JsonOption,
@@ -28,7 +28,7 @@ from experiments.report.files import write_text
 from experiments.report.plot_page import Section, write_plot_page
 from experiments.station.clients import station_clients
 from experiments.station.guided_command import ask_before_moving, on_station
-from experiments.station.latency import Latency, evaluate
+from experiments.station.latency import ImpossibleDelayError, Latency, evaluate
 
 
 def latency_command(
@@ -57,7 +57,11 @@ def latency_command(
         written = stack.enter_context(staged_file(write, *YAML)) if write else None
         stack.enter_context(output.staged())
         record = _measured(prepared, LatencyConfig(joint, amplitude, duration), with_cell)
-        found = evaluate(record)
+        try:
+            found = evaluate(record)
+        except ImpossibleDelayError as error:
+            fail(f"{error}; nothing was written", BROKEN_OFF)
+            raise
         write_latency_page(page, found, record)
         if written:
             write_text(written, scenario_with(scenario, found))
@@ -83,20 +87,26 @@ def latency_table(found: Latency) -> Table:
     table.add_column("what", no_wrap=True)
     table.add_column("value", justify="right", no_wrap=True)
     table.add_column("which is")
+    loop_sigma, camera_sigma = 1e3 * found.loop_sigma, 1e3 * (found.camera_sigma or 0.0)
     rows: list[tuple[str, float | None, str, str]] = [
         ("controller: cycle", 1e3 * found.cycle, "ms", "between two messages"),
-        ("controller: loop", 1e3 * found.loop, "ms", "from a command to the joint at it, by its own stamps"),
+        (
+            "controller: loop",
+            1e3 * found.loop,
+            "ms",
+            f"± {loop_sigma:.2f}, from a command to the joint at it, by its own stamps",
+        ),
         (
             "controller: dead time",
             1e3 * found.dead_time,
             "ms",
-            "the loop less one cycle, in which it is heard",
+            f"± {loop_sigma:.2f}, the loop less one cycle, in which it is heard",
         ),
         (
             "camera: delay",
             None if found.camera is None else 1e3 * found.camera,
             "ms",
-            "from exposure to arrival",
+            f"± {camera_sigma:.2f}, from exposure to arrival",
         ),
         (
             "camera: drift",

@@ -2,12 +2,14 @@
 
 import numpy as np
 import pytest
+from scipy.signal import lfilter
 
-from diagrams.runs.latency import LatencyConfig, measure_latency, motion
+from diagrams.runs.latency import LatencyConfig, LatencyRecord, measure_latency, motion
 from diagrams.scenario.scenario import load_scenario
-from experiments.station.latency import Latency, delay_between, evaluate
+from experiments.station.latency import ImpossibleDelayError, Latency, delay_between, evaluate
 from experiments.station.latency_command import scenario_with
 from robots.description.model import load_robot
+from systems.link.clock import ClockQuality
 from tests.diagrams.lockstep import Lockstep
 
 ROBOT = load_robot("irb1200")
@@ -47,6 +49,48 @@ def test_lost_and_late_messages_only_add_what_they_cost():
     assert 0.052 - 5e-4 < found.dead_time < 0.052 + 3e-3
 
 
+def test_the_standard_error_of_a_delay_is_how_far_it_is_off():
+    """White noise on the effect, and noise that remembers itself for ten samples; twenty times each."""
+    time = np.arange(0.0, 10.0, 4e-3)
+    cause, _ = motion(LatencyConfig(duration=10.0), time)
+    effect, _ = motion(LatencyConfig(duration=10.0), time - 0.02)
+    rng = np.random.default_rng(5)
+    for memory in (0.0, 0.9):
+        off = []
+        for _ in range(20):
+            noise = lfilter([1.0], [1.0, -memory], rng.normal(0.0, 1e-4, len(time)))
+            delay, _, sigma = delay_between(time, cause, time, (effect + noise)[:, None], 1)
+            off.append((delay - 0.02) / sigma)
+        # The root mean square of twenty normal numbers is within a factor of two of one.
+        assert 0.5 < np.sqrt(np.mean(np.square(off))) < 2.0
+
+
+def record_of(delay: float, camera_delay: float, jitter: float) -> LatencyRecord:
+    """A motion that follows its command after a delay, seen after another one."""
+    time = 0.004 * np.arange(3000)
+    config = LatencyConfig(duration=12.0)
+    (commanded, _), (moved, _), (seen, _) = (
+        motion(config, time - late) for late in (0.0, delay, delay + camera_delay)
+    )
+    clock = ClockQuality(3000, 12.0, 0.0, 0.1, 1e-6, {"50%": jitter, "99%": jitter}, 1)
+    position = np.stack([seen, seen, seen], axis=1)
+    return LatencyRecord(time, commanded, moved, time, time, position, time, clock, clock, {})
+
+
+@pytest.mark.parametrize(
+    ("delays", "reason"),
+    [
+        ((-0.02, 0.01, 0.0), r"loop takes -20\.\d+ ms .* an effect before its cause"),
+        ((0.05, -0.02, 0.0), r"camera's delay is -20\.\d+ ms"),
+        ((0.05, 0.01, 0.08), r"half of the messages of the controller come 80\.0 ms later"),
+    ],
+)
+def test_delays_that_no_station_has_are_a_failed_measurement(delays, reason):
+    with pytest.raises(ImpossibleDelayError, match=reason):
+        evaluate(record_of(*delays))
+    assert evaluate(record_of(0.05, 0.01, 0.002)).camera == pytest.approx(0.01, abs=1e-5)
+
+
 def test_a_delay_between_sampled_motions_is_found_to_microseconds():
     """The effect is a cubic of the cause, sampled at other times; without noise nothing is left."""
     time = np.arange(0.0, 10.0, 4e-3)
@@ -54,7 +98,7 @@ def test_a_delay_between_sampled_motions_is_found_to_microseconds():
     later = np.arange(0.5, 9.5, 7e-3)
     moved, _ = motion(LatencyConfig(duration=10.0), later - 0.0371)
     effect = np.stack([3.0 * moved + 40.0 * moved**2, 1.0 - moved**3], axis=1)
-    delay, rest = delay_between(time, cause, later, effect, 3)
+    delay, rest, _ = delay_between(time, cause, later, effect, 3)
     assert delay == pytest.approx(0.0371, abs=2e-6)
     assert rest < 1e-6
 
