@@ -21,7 +21,7 @@ def measured(*settings: str, **config) -> Latency:
     record = measure_latency(
         scenario,
         ROBOT,
-        LatencyConfig(**{"duration": 12.0, **config}),
+        LatencyConfig(**{"duration": 6.0, **config}),
         wire.link,
         wire.camera(),
         now=wire.now,
@@ -34,7 +34,7 @@ def measured(*settings: str, **config) -> Latency:
     [pytest.param(0.012, marks=pytest.mark.slow), 0.052, pytest.param(0.14, marks=pytest.mark.slow)],
 )
 def test_a_dead_time_is_found_to_a_millisecond(dead_time: float):
-    found = measured(f"station.drive.dead_time={dead_time}", duration=20.0)
+    found = measured(f"station.drive.dead_time={dead_time}", duration=8.0)
     assert found.dead_time == pytest.approx(dead_time, abs=5e-4)
     assert found.cycle == pytest.approx(4.032e-3)
     # The camera of this rig tells its exposures themselves.
@@ -119,7 +119,7 @@ def test_the_motion_begins_and_ends_at_rest_and_its_speed_is_its_derivative():
         ({"joint": 7}, "joint must be 1 to 6, got 7"),
         ({"duration": 1.0}, "duration must be at least 4 s"),
         ({"amplitude_deg": 30.0}, r"amplitude_deg in \(0, 20\]"),
-        ({"joint": 2, "amplitude_deg": 20.0}, None),
+        ({"joint": 2, "amplitude_deg": 20.0, "duration": 4.0}, None),
     ],
 )
 def test_what_cannot_be_moved_is_refused(config: dict, message: str | None):
