@@ -5,6 +5,8 @@ from pathlib import Path
 from typing import Annotated, Any
 
 import numpy as np
+import pyarrow as pa
+import pyarrow.parquet as pq
 import typer
 from rich import box
 from rich.console import Console
@@ -21,16 +23,23 @@ def log_command(
     csv: Annotated[
         Path | None, typer.Option(metavar="FOLDER", help="A table for each topic, as CSV.")
     ] = None,
+    parquet: Annotated[
+        Path | None, typer.Option(metavar="FOLDER", help="A table for each topic, as Parquet.")
+    ] = None,
     npz: Annotated[Path | None, typer.Option(metavar="FILE.npz", help="All topics as numpy arrays.")] = None,
 ) -> None:
     """Summarise the record of a run, also one that was cut off, and export it."""
     with refusing(ValueError, OSError), ExitStack() as stack:
         contents = read_record(file)
         folder = stack.enter_context(staged_folder(csv)) if csv else None
+        tables = stack.enter_context(staged_folder(parquet)) if parquet else None
         arrays = stack.enter_context(staged_file(npz, ".npz")) if npz else None
-        if folder:
-            for name, topic in contents.topics.items():
-                write_csv(folder / f"{name.strip('/').replace('/', '-')}.csv", topic)
+        for name, topic in contents.topics.items():
+            stem = name.strip("/").replace("/", "-")
+            if folder:
+                write_csv(folder / f"{stem}.csv", topic)
+            if tables:
+                write_parquet(tables / f"{stem}.parquet", topic)
         if arrays:
             columns: dict[str, Any] = as_arrays(contents)
             np.savez_compressed(arrays, **columns)
@@ -45,7 +54,7 @@ def log_command(
         f"{escape(str(file))}: law {escape(str(said.get('law', 'unknown')))}, {escape(how)}", soft_wrap=True
     )
     console.print(summary_table(contents))
-    print_files(console, csv, npz)
+    print_files(console, csv, parquet, npz)
 
 
 def summary_table(contents: Contents) -> Table:
@@ -81,14 +90,29 @@ def as_arrays(contents: Contents) -> dict[str, np.ndarray]:
 
 def write_csv(path: Path, topic: Topic) -> None:
     """A topic as a table; a column of several numbers becomes several columns."""
-    names, columns = ["time"], [topic.time.astype(object)]
+    columns = _table(topic)
+    rows = zip(*(values.astype(object) for values in columns.values()), strict=True)
+    lines = [",".join(columns), *(",".join(_cell(value) for value in row) for row in rows)]
+    path.write_text("\n".join(lines) + "\n", encoding="utf-8")
+
+
+def write_parquet(path: Path, topic: Topic) -> None:
+    """The same table with its numbers in full."""
+    columns = {
+        name: values.astype(str) if values.dtype == object else values
+        for name, values in _table(topic).items()
+    }
+    pq.write_table(pa.table(columns), path, compression="zstd")
+
+
+def _table(topic: Topic) -> dict[str, np.ndarray]:
+    """Columns of one number each, shape (n,)."""
+    columns = {"time": topic.time}
     for column, values in topic.columns.items():
         width = values.shape[1]
-        names += [column] if width == 1 else [f"{column}_{n}" for n in range(1, width + 1)]
-        columns += list(values.astype(object).T)
-    lines = [",".join(names)]
-    lines += [",".join(_cell(value) for value in row) for row in zip(*columns, strict=True)]
-    path.write_text("\n".join(lines) + "\n", encoding="utf-8")
+        names = [column] if width == 1 else [f"{column}_{n}" for n in range(1, width + 1)]
+        columns |= dict(zip(names, values.T, strict=True))
+    return columns
 
 
 def _cell(value: object) -> str:

@@ -3,6 +3,7 @@
 from dataclasses import replace
 
 import numpy as np
+import pyarrow.parquet as pq
 import pytest
 from typer.testing import CliRunner
 
@@ -21,8 +22,9 @@ def log():
 def test_a_record_is_summarised_and_exported(log, tmp_path):
     path = tmp_path / "run.mcap"
     write_log(path, "", log)
-    arguments = ["log", str(path), "--csv", str(tmp_path / "csv"), "--npz", str(tmp_path / "run.npz")]
-    result = CliRunner().invoke(app, arguments)
+    files = {"--csv": "csv", "--parquet": "parquet", "--npz": "run.npz"}
+    exports = [word for option, name in files.items() for word in (option, str(tmp_path / name))]
+    result = CliRunner().invoke(app, ["log", str(path), *exports])
     assert result.exit_code == 0, result.output
     assert f"law {log.law}, ran its path to the end" in result.output
     assert "50.0 Hz" in result.output
@@ -30,6 +32,10 @@ def test_a_record_is_summarised_and_exported(log, tmp_path):
         np.testing.assert_array_equal(arrays["command.position"], log.position_command)
     table = np.genfromtxt(tmp_path / "csv" / "command.csv", delimiter=",", names=True)
     np.testing.assert_allclose(table["position_3"], log.position_command[:, 2], rtol=1e-11, atol=1e-12)
+    parquet = pq.read_table(tmp_path / "parquet" / "command.parquet")
+    np.testing.assert_array_equal(parquet["position_3"], log.position_command[:, 2])
+    texts = pq.read_table(tmp_path / "parquet" / "guard_event.parquet")
+    assert texts["detail"].to_pylist() == ['no message, "for" 50 ms']
     events = (tmp_path / "csv" / "guard_event.csv").read_text().splitlines()
     assert events[1] == '2,interrupted,"no message, ""for"" 50 ms"'
 
