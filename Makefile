@@ -19,7 +19,7 @@ export PYRIGHT_PYTHON_IGNORE_WARNINGS := 1
 
 PIP := $(BIN)/python -m pip --quiet --disable-pip-version-check
 
-.PHONY: demo test lint lint-rules lint-format lint-types lint-floors bench clean
+.PHONY: demo test docs lint lint-rules lint-format lint-types lint-floors bench clean
 
 demo: .venv/installed
 	$(BIN)/truetip compare --out $(OUT)
@@ -29,6 +29,11 @@ demo: .venv/installed
 test: .venv/installed-dev
 	$(BIN)/python -m pytest $(if $(filter-out 1,$(CORES)),-n $(CORES) --dist worksteal) \
 	    $(if $(filter 1,$(SLOW)),-m "slow or not slow") $(ARGS)
+
+# The manual in site/; a link that leads nowhere or a page that cannot be made ends it.
+docs: .venv/installed-dev
+	NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --quiet --strict
+	@echo "The manual: site/index.html"
 
 # make --keep-going lint shows the findings of all four.
 lint: lint-rules lint-format lint-types lint-floors
@@ -50,7 +55,7 @@ bench: .venv/installed-dev
 	$(BIN)/python -m experiments.bench
 
 clean:
-	rm -rf .venv build dist *.egg-info out bench.json
+	rm -rf .venv build dist *.egg-info out site bench.json
 	rm -rf .hypothesis .import_linter_cache .pytest_cache .ruff_cache
 	find robots systems diagrams experiments tests -name __pycache__ -type d -prune -exec rm -rf {} +
 

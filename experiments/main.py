@@ -12,14 +12,12 @@ from rich.markup import escape
 
 from diagrams.record.log import RunLog
 from diagrams.runs.simulation import Experiment
-from diagrams.scenario.scenario import Scenario, load_scenario, shipped_scenarios
 from experiments.calibration.calibrate_command import calibrate_command
 from experiments.calibration.design_command import design_command
 from experiments.cameras.command import cameras_app
 from experiments.cli.cluster import executor
 from experiments.cli.console import (
     count,
-    print_list,
     print_note,
     progress_bar,
     refusing,
@@ -65,12 +63,12 @@ from experiments.replay.live import LiveView, advance_live
 from experiments.report.report import verdict
 from experiments.robots.command import robots_app
 from experiments.robustness.command import robustness_command
+from experiments.scenarios.command import scenarios_command
 from experiments.station.cell_command import cell_command
 from experiments.station.guided_command import Guided, ask_before_moving, guide, on_station
 from experiments.station.latency_command import latency_command
 from experiments.study.command import study_command
 from experiments.zeros.command import zeros_command
-from robots.configuration.described import described
 from systems.servo import LAWS
 
 app = typer.Typer(
@@ -304,20 +302,7 @@ app.command("chain")(chain_command)
 app.command("tool")(tool_command)
 app.command("align")(align_command)
 app.add_typer(robots_app, name="robots")
-
-
-@app.command("scenarios")
-def scenarios_command(
-    shows_fields: Annotated[
-        bool, typer.Option("--fields", help="All fields of a scenario: default, range and unit, choices.")
-    ] = False,
-) -> None:
-    """List the scenarios that come with truetip, or what can stand in one."""
-    if shows_fields:
-        for row in described(Scenario()):
-            print(f"{row.path:<58} {row.default or '-':<24} {row.allowed}")
-        return
-    print_list((name, load_scenario(name).description) for name in shipped_scenarios())
+app.command("scenarios")(scenarios_command)
 
 
 def _settings(

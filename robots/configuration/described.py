@@ -1,4 +1,4 @@
-"""The fields of a configuration as rows of a table: place, default, and what is allowed."""
+"""The fields of a configuration as rows of a table: place, default, what is allowed, what it means."""
 
 from collections.abc import Iterator
 from dataclasses import Field, dataclass, fields, is_dataclass
@@ -7,6 +7,7 @@ from typing import Any, Union, get_args, get_origin, get_type_hints
 
 import numpy as np
 
+from robots.configuration.meaning import meanings
 from robots.configuration.quantity import declaration
 from robots.configuration.union import short_name, union_members
 
@@ -20,24 +21,47 @@ class Described:
     path: str
     default: str
     allowed: str  # range and unit, names to choose from, or the kind of value
+    meaning: str = ""  # the comment beside it
 
 
 def described(example: Any, path: str = "") -> Iterator[Described]:
-    """All fields of a dataclass tree, whose values are the defaults; members of a union have their tags."""
-    hints = get_type_hints(type(example))
+    """All fields of a dataclass tree, whose values are the defaults; members of a union have their tags.
+
+    What stands in a list, or is left out unless it is wanted, follows with the defaults of its kind: as
+    ``joints[]`` and ``links[].beam``.
+    """
+    hints, said = get_type_hints(type(example)), meanings(type(example))
     for entry in fields(example):
         below, value = f"{path}.{entry.name}".lstrip("."), getattr(example, entry.name)
-        members = union_members(hints[entry.name])
-        if members and value is not None:
+        inner, is_list = _inner(hints[entry.name])
+        members = _groups(inner)
+        meaning = said.get(entry.name, "")
+        if len(members) > 1:
             names = ", ".join(short_name(member) for member in members)
-            yield Described(below, short_name(type(value)), names)
-            for member in members:
-                tag = f"{below}(!{member.__name__.removesuffix('Config')})"
-                yield from described(value if isinstance(value, member) else member(), tag)
-        elif is_dataclass(value):
-            yield from described(value, below)
-        else:
-            yield Described(below, _text(value), _allowed(entry, hints[entry.name]))
+            default = "" if is_list or value is None else short_name(type(value))
+            yield Described(below, default, f"list of {names}" if is_list else names, meaning)
+        elif members and (is_list or value is None):
+            yield Described(below, "", "list of groups" if is_list else "group, or left out", meaning)
+        elif not members:
+            yield Described(below, _text(value), _allowed(entry, hints[entry.name]), meaning)
+        for member in members:
+            inside = value if isinstance(value, member) else member()
+            tag = f"(!{member.__name__.removesuffix('Config')})" if len(members) > 1 else ""
+            yield from described(inside, f"{below}{'[]' if is_list else ''}{tag}")
+
+
+def _groups(kind: Any) -> tuple[type, ...]:
+    """The dataclasses of which a field holds one, none if it holds something else."""
+    return union_members(kind) or ((kind,) if isinstance(kind, type) and is_dataclass(kind) else ())
+
+
+def _inner(hint: Any) -> tuple[Any, bool]:
+    """What stands in a field, or in each entry of its list; and whether it is a list."""
+    if get_origin(hint) is list:
+        return get_args(hint)[0], True
+    if get_origin(hint) in (Union, UnionType) and not union_members(hint):
+        return next(each for each in get_args(hint) if each is not NoneType), False
+    return hint, False
 
 
 def _text(value: Any) -> str:

@@ -1,0 +1,1 @@
+"""Pages of the manual that the program writes itself: commands, fields of files, chapters of the README."""

@@ -1,0 +1,1 @@
+"""The scenarios that come with truetip, and what can stand in one."""
