@@ -74,6 +74,7 @@ class ArmGeometry:
         nominal[tool] = np.deg2rad(robot.tool.zyx_deg)
         along = robot.axes[:, :, None] * robot.axes[:, None, :]
         across = np.cross(robot.axes[:, None, :], _EYE).swapaxes(1, 2)  # the cross product with the axis
+        self._chosen = chosen
         self._drawing = Drawing(
             # In the order in which they act; that of the parameters where several act at once.
             entries=np.array([(i, body, does, axis, c) for body, does, i, axis, c in sorted(entries)]),
@@ -96,7 +97,9 @@ class ArmGeometry:
         along, sine, cosine = np.zeros((3, NUM_JOINTS, 3, 4))
         turn, way = np.zeros((2, number, 3))
         p = np.array(p, dtype=float)
-        constants = Constants(p, along, sine, cosine, np.zeros((3, 4)), turn, way, self._drawing.frame)
+        constants = Constants(
+            p, p[self._chosen], along, sine, cosine, np.zeros((3, 4)), turn, way, self._drawing.frame
+        )
         kernels.geometry.fill_constants(self._drawing, constants)
         return constants
 

@@ -10,13 +10,12 @@ from scipy.linalg import expm
 
 from robots.dynamics.plant import add_robot
 from systems.controller_model import ControllerModel
+from systems.estimation import kernels
 from systems.estimation.memory import Layout
 
 _FILTERED = 5  # torque that is needed beside the feedforward; rotor, viscous, Coulomb; the load of a kilogram
 SIZE = 38
 DEAD_TIME, MASS = 0, 37
-_OWN = np.arange(6)
-_ACCELERATION_UNIT = 1e-2
 _STEEPEST = 0.05  # rad/s, what learning may add to the speed of a joint
 
 
@@ -135,34 +134,22 @@ class DriveModel:
         if not memory.started[0]:
             memory.z[..., 0] = w / self._ki
         else:
-            last = memory.w.copy()
-            last[0] = w[0] if self._takes_torque else last[0]
-            inputs = np.stack([last, w - last], -1)
-            memory.z[:] = np.einsum("jab,kjb->kja", self._step, np.concatenate([memory.z, inputs], -1))
+            last = memory.w
+            if self._takes_torque:
+                last[0] = w[0]
+            kernels.drives.filtered(self._step, memory.z, last, w)
         memory.w[:] = w
         memory.w[0] = needed
 
     def features(self, v: np.ndarray, a: np.ndarray, columns: np.ndarray) -> np.ndarray:
         """Rows of the regression, shape (6, 38), from motion and the filtered torques (24,)."""
-        filtered = columns.reshape(_FILTERED - 1, 6)
         Phi = np.zeros((6, SIZE))
-        Phi[:, DEAD_TIME] = v
-        Phi[_OWN, 1 + _OWN] = v
-        Phi[_OWN, 7 + _OWN] = _ACCELERATION_UNIT * a
-        for k in range(3):
-            Phi[_OWN, 13 + 3 * _OWN + k] = filtered[k]
-        Phi[_OWN, 31 + _OWN] = 1.0
-        Phi[:, MASS] = filtered[3]
+        kernels.drives.features(v, a, columns, Phi)
         return Phi
 
     def learn(self, memory: SimpleNamespace, Phi: np.ndarray, y: np.ndarray) -> None:
         """One step of recursive least squares: the motors were y behind a plan without correction, (6,)."""
-        PH = memory.P @ Phi.T
-        S = Phi @ PH + self._config.following_sigma**2 * np.eye(6)
-        gain = np.linalg.solve(S, PH.T).T
-        memory.beta += gain @ (y - Phi @ memory.beta)
-        P = memory.P - gain @ PH.T
-        memory.P[:] = 0.5 * (P + P.T)
+        kernels.drives.learn(memory.P, memory.beta, Phi, y, self._config.following_sigma**2)
 
     def widen(self, memory: SimpleNamespace) -> None:
         """Load or dead time have changed: constants, mass and dead time are open again."""

@@ -2,7 +2,7 @@
 
 from collections.abc import Callable
 from types import SimpleNamespace
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -39,6 +39,32 @@ class Event(NamedTuple):
     kind: str  # "tool displaced", "load changed", "dead time changed" or "clock drifts"
     size: float  # m, kg, s or s/s
     error: float  # m, of the tip where it is known
+
+
+class EventLog:
+    """The last events with their times, for whoever asks what happened."""
+
+    _LENGTH = 8
+    _KINDS = TOOL_DISPLACED, LOAD_CHANGED, DEAD_TIME_CHANGED, CLOCK_DRIFTS
+
+    def __init__(self) -> None:
+        """Lays out the memory."""
+        self.layout = Layout(rows=(self._LENGTH, 4), count=(1,))
+
+    def note(self, memory: SimpleNamespace, time: float, event: Event) -> None:
+        """Adds an event at a time in s; the oldest one is forgotten."""
+        count = int(memory.count[0])
+        memory.rows[count % self._LENGTH] = time, self._KINDS.index(event.kind), event.size, event.error
+        memory.count[0] = count + 1
+
+    def read(self, memory: SimpleNamespace) -> list[dict[str, Any]]:
+        """The last events, oldest first: ``time_s``, ``kind``, ``size`` and ``tip_error_m``."""
+        count = int(memory.count[0])
+        rows = [memory.rows[k % self._LENGTH].tolist() for k in range(max(0, count - self._LENGTH), count)]
+        return [
+            {"time_s": time, "kind": self._KINDS[int(kind)], "size": size, "tip_error_m": error}
+            for time, kind, size, error in rows
+        ]
 
 
 class Innovations:

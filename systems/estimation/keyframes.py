@@ -4,7 +4,7 @@ from types import SimpleNamespace
 
 import numpy as np
 
-from robots.pose import pose_error
+from systems.estimation import kernels
 from systems.estimation.arm_geometry import Constants
 from systems.estimation.gear_errors import NUM_SHAPES
 from systems.estimation.memory import Layout
@@ -155,10 +155,8 @@ class Keyframes:
         model = self._model
         found = self.predict(constants, xi, rows)
         memory.rows[places, _GEARS] = found.gears
-        seen = np.zeros((n, 4, 4))
-        seen[:, :3] = rows[:, _POSE].reshape(n, 3, 4)
-        seen[:, 3, 3] = 1.0
-        y = pose_error(seen, found.X_WE) + found.H @ xi
+        seen = np.ascontiguousarray(rows[:, _POSE]).reshape(n, 3, 4)
+        y = kernels.poses.pose_errors(seen, found.X_WE) + found.H @ xi
         H = found.H.reshape(-1, model.size)
         weighted = (rows[:, _WEIGHT, None] * self._weights).ravel()[:, None] * H
         return H.T @ weighted, weighted.T @ y.ravel()

@@ -4,6 +4,8 @@ from types import SimpleNamespace
 
 import numpy as np
 
+from systems.estimation import kernels
+
 
 class Layout:
     """Names and shapes of arrays that lie behind each other in a vector; a nested layout is one of them."""
@@ -30,6 +32,30 @@ class Layout:
             part = vector[place]
             attributes[name] = shape.view(part) if isinstance(shape, Layout) else part.reshape(shape)
         return windows
+
+
+class Views:
+    """The views of few vectors, kept: what lies in the Context is at the same places tick after tick.
+
+    A view has no state of its own. It is as good as new as long as the vector begins where it did.
+    """
+
+    _MOST = 8
+
+    def __init__(self, layout: Layout) -> None:
+        """Has none yet."""
+        self._layout = layout
+        self._views: dict[int, SimpleNamespace] = {}
+
+    def __call__(self, vector: np.ndarray) -> SimpleNamespace:
+        """`Layout.view`."""
+        place = vector.__array_interface__["data"][0]
+        found = self._views.get(place)
+        if found is None:
+            if len(self._views) == self._MOST:
+                self._views.clear()
+            found = self._views[place] = self._layout.view(vector)
+        return found
 
 
 class History:
@@ -65,24 +91,13 @@ class History:
         count = int(memory.count[0])
         if not count:
             return None
-        held, first = min(count, self.length), count % self.length if count > self.length else 0
-        times = memory.times
-        newest = (count - 1) % self.length
-        if time >= times[newest]:
-            return newest, newest, 0.0
-        ordered = np.concatenate((times[first:held], times[:first])) if first else times[:held]
-        after = int(ordered.searchsorted(time, side="right"))
-        if after == 0:
-            return first, first, 0.0
-        before, behind = (first + after - 1) % self.length, (first + after) % self.length
-        return before, behind, float((time - times[before]) / (times[behind] - times[before]))
+        return kernels.history.around(count, memory.times, time)
 
     def at(self, memory: SimpleNamespace, time: float) -> np.ndarray | None:
         """The row at a time, linear between rows and constant outside; None if there is none."""
         place = self.around(memory, time)
         if place is None:
             return None
-        before, behind, share = place
-        if share == 0.0:
-            return memory.rows[before].copy()
-        return (1.0 - share) * memory.rows[before] + share * memory.rows[behind]
+        row = np.empty(memory.rows.shape[1])
+        kernels.history.between(memory.rows, *place, row)
+        return row

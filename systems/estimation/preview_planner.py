@@ -6,7 +6,10 @@ from typing import NamedTuple
 import numpy as np
 
 from robots.pose import pose_error
+from systems.estimation import kernels
 from systems.estimation.arm_geometry import Arm, Constants
+from systems.estimation.arm_loads import NUM_SETS
+from systems.estimation.kernels.arrays import PathInstant
 from systems.estimation.memory import Layout
 from systems.estimation.tip_model import TipModel
 
@@ -65,12 +68,7 @@ class PreviewPlanner:
 
     def constants(self, memory: SimpleNamespace, x: np.ndarray) -> Constants:
         """The geometry near x; a function of the memory alone, kept to save time."""
-        model = self._model
-        if np.abs((x - memory.x_geometry)[model.G]).max() > _GEOMETRY_STEP:
-            memory.x_geometry[:] = x
-        p = memory.x_geometry[model.G]
-        if self._constants is None or not np.array_equal(self._constants.p[model.chosen], p):
-            self._constants = model.constants(memory.x_geometry)
+        self._constants = self._model.constants_near(x, memory.x_geometry, _GEOMETRY_STEP, self._constants)
         return self._constants
 
     def start(
@@ -104,24 +102,22 @@ class PreviewPlanner:
         self, memory: SimpleNamespace, arm: Arm, x: np.ndarray, q: np.ndarray, loads: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray]:
         """By how much motors have to be ahead of links at q, rad, (6,); and the gears' hysteresis, (12,)."""
-        model, columns = self._model, arm.columns[0]
-        deflection = model.deflections(x, loads)[0]
+        columns = arm.columns[0]
+        deflection = self._model.deflections(x, loads)[0]
         tilt = columns[:, 6:18] @ deflection[6:]
         yields = -np.linalg.solve(columns[:, :6], tilt) - deflection[:6]
+        return self._with_gear_errors(memory, x, q, yields, loads[0])
+
+    def _with_gear_errors(
+        self, memory: SimpleNamespace, x: np.ndarray, q: np.ndarray, yields: np.ndarray, loads: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """By how much motors have to be ahead, and hysteresis, from what springs make of it."""
+        model = self._model
         if not model.has_gear_errors:
             return yields, np.zeros(12)
-        states = model.gear_errors.step(memory.hysteresis, model.total_load(x, loads)[0, :6])
-        shapes = model.gear_shapes(x, q + yields, loads[0], states)
+        states = model.gear_errors.step(memory.hysteresis, model.total_load(x, loads)[:6])
+        shapes = model.gear_shapes(x, q + yields, loads, states)
         return yields - model.gear_error(x, shapes), states
-
-    def _newton(
-        self, constants: Constants, x: np.ndarray, q: np.ndarray, X_WE: np.ndarray, left: np.ndarray
-    ) -> tuple[np.ndarray, Arm, np.ndarray, float]:
-        """One step towards a pose: joints, the arm before it, its inverse Jacobian, and the size in rad."""
-        X, arm = self._model.forward(constants, x, q[None])
-        inverse = np.linalg.inv(arm.columns[0, :, :6])
-        move = inverse @ (pose_error(X_WE, X[0]) - left)
-        return q + move, arm, inverse, float(np.abs(move).max())
 
     def step(
         self,
@@ -144,36 +140,38 @@ class PreviewPlanner:
         model = self._model
         constants = self.constants(memory, x)
         left, fading = _blend(since_start)
-        q = memory.q + step * (1.5 * memory.rates[0] - 0.5 * memory.rates[1] + memory.wander)
-        error_left = left * memory.start_error
-        q, arm, inverse, step_size = self._newton(constants, x, q, wanted.X_WE, error_left)
-        if step_size > _NEWTON_STEP:
-            q, arm, inverse, _ = self._newton(constants, x, q, wanted.X_WE, error_left)
-        columns = arm.columns[0]
-        drift = fading * memory.start_error + columns[:, 18:] @ rate[model.G]
-        v, wander = inverse @ wanted.V_WE, -inverse @ drift
-        a = (1.5 * v - 2.0 * memory.rates[0] + 0.5 * memory.rates[1]) / step
-        memory.q[:], memory.wander[:] = q, wander
+        motion = np.empty((4, 6))
+        motion[0] = memory.q + step * (1.5 * memory.rates[0] - 0.5 * memory.rates[1] + memory.wander)
+        aside = np.array(wanted.aside)
+        instant = PathInstant(
+            wanted.X_WE,
+            wanted.V_WE,
+            left * memory.start_error,
+            fading * memory.start_error,
+            rate[model.G],
+            aside,
+            float(step),
+            _NEWTON_STEP,
+        )
+        columns, loads, yields = np.empty((6, len(constants.frame))), np.empty((NUM_SETS, 18)), np.empty(6)
+        arm = constants, model.loads.masses, model.unknowns(x)
+        kernels.plan.follow(*arm, instant, memory.rates, motion, columns, loads, yields)
+        memory.q[:], memory.wander[:] = motion[0], motion[3]
         memory.rates[1] = memory.rates[0]
-        memory.rates[0] = v
-        aside, aside_rate, aside_bend = wanted.aside
-        if aside_rate.any() or aside.any():
-            q, v, a = q + aside, v + aside_rate, a + aside_bend
-            arm = model.forward(constants, x, q[None])[1]
-            columns = arm.columns[0]
-        loads = model.loads.at(arm.frames, q[None], v[None], a[None])
-        yields, states = self._yields(memory, arm, x, q, loads)
+        memory.rates[0] = motion[1]
+        q, v, a = motion[:3] + aside
+        yields, states = self._with_gear_errors(memory, x, q, yields, loads)
         yields += left * memory.start_yield
         history = memory.yields
         history[1:] = history[:-1].copy()
         history[0] = yields
         y_rate = (11.0 * history[0] - 18.0 * history[1] + 9.0 * history[2] - 2.0 * history[3]) / (6.0 * step)
         y_bend = (2.0 * history[0] - 5.0 * history[1] + 4.0 * history[2] - history[3]) / step**2
-        velocity = v + wander
+        velocity = v + motion[3]
         theta = q + yields - self._gear_lag * y_rate
         twist = columns[:, :6] @ velocity
-        motion = np.concatenate((v, a))
-        return MotorPlan(theta, velocity + y_rate, a + y_bend, loads[0], motion, twist, columns, states)
+        moving = np.concatenate((v, a))
+        return MotorPlan(theta, velocity + y_rate, a + y_bend, loads, moving, twist, columns, states)
 
 
 def _blend(since_start: float) -> tuple[float, float]:

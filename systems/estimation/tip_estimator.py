@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 from scipy.linalg import get_lapack_funcs
 
-from robots.pose import pose_error
+from systems.estimation import kernels
 from systems.estimation.arm_geometry import Constants
 from systems.estimation.events import CLOCK_DRIFTS, LOAD_CHANGED, Event, Innovations
 from systems.estimation.gear_errors import NUM_SHAPES
@@ -123,12 +123,9 @@ class TipEstimator:
 
     def constants(self, memory: SimpleNamespace) -> Constants:
         """The geometry near the estimate; a function of the memory alone, kept to save time."""
-        model, x = self.model, self.x(memory)
-        if np.abs((x - memory.x_geometry)[model.G]).max() > self._config.geometry_step:
-            memory.x_geometry[:] = x
-        p = memory.x_geometry[model.G]
-        if self._constants is None or not np.array_equal(self._constants.p[model.chosen], p):
-            self._constants = model.constants(memory.x_geometry)
+        self._constants = self.model.constants_near(
+            self.x(memory), memory.x_geometry, self._config.geometry_step, self._constants
+        )
         return self._constants
 
     def predict(self, memory: SimpleNamespace, pair: Pair) -> Prediction:
@@ -160,7 +157,7 @@ class TipEstimator:
             memory.first_time[0] = pair.time
         memory.last_time[0] = pair.time
         found, shapes = self._predict(memory, pair)
-        r, H = pose_error(pair.X_WE, found.X_WE[0]), found.H[0]
+        r, H = kernels.poses.pose_errors(pair.X_WE[None], found.X_WE)[0], found.H[0]
         weight = 1.0 / (1.0 + (pair.unrest / config.calm) ** 2)
         event, innovations = None, memory.innovations
         if memory.count[0] <= config.test_after:

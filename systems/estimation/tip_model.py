@@ -127,6 +127,24 @@ class TipModel:
         """The geometry at a value of the unknowns."""
         return self.geometry.constants(self.geometric_errors(x))
 
+    def constants_near(
+        self, x: np.ndarray, x_geometry: np.ndarray, step: float, last: Constants | None
+    ) -> Constants:
+        """The geometry within a step (m or rad) of x, within which poses are linear in the parameters.
+
+        Args:
+            x: the unknowns.
+            x_geometry: the value that it was for last; is renewed if x is too far from it.
+            step: the largest distance of a parameter.
+            last: what the answer was last, which saves time if it is still right.
+        """
+        change = kernels.tip.largest_change
+        if change(x, x_geometry, self.K.start) > step:
+            x_geometry[:] = x
+        if last is None or change(last.chosen, x_geometry, self.K.start) != 0.0:
+            return self.constants(x_geometry)
+        return last
+
     def forward(self, constants: Constants, x: np.ndarray, q: np.ndarray) -> tuple[np.ndarray, Arm]:
         """The tip of an arm that does not yield, near the value that the constants are for.
 
@@ -190,7 +208,7 @@ class TipModel:
         n = len(theta)
         out = np.empty((n, 4, 4)), np.empty((n, 6, self.size)), np.empty((n, 6))
         seen = self._seen(n, twist, shapes, time)
-        kernels.tip.predict(constants, self._unknowns(constants, x), theta, loads, seen, *out)
+        kernels.tip.predict(constants, self.unknowns(x), theta, loads, seen, *out)
         return Prediction(*out)
 
     def predict_anew(
@@ -210,23 +228,24 @@ class TipModel:
             configuration: encoder positions and about by how much the gears yield, in rad, (n, 6) each.
             motion: velocities and accelerations of the joints, (n, 6) each.
         """
-        theta, gears = (np.array(part) for part in configuration)
+        theta, gears = np.ascontiguousarray(configuration[0]), np.array(configuration[1])
         n = len(theta)
         out, loads = (np.empty((n, 4, 4)), np.empty((n, 6, self.size))), self.loads.masses
-        unknowns, seen = self._unknowns(constants, x), self._seen(n, twist, shapes, time)
+        unknowns, seen = self.unknowns(x), self._seen(n, twist, shapes, time)
         moving = np.concatenate(motion, axis=1)
         kernels.tip.predict_anew(constants, unknowns, loads, theta, gears, moving, seen, *out)
         return Prediction(*out, gears)
 
-    def _unknowns(self, constants: Constants, x: np.ndarray) -> Unknowns:
-        return Unknowns(x, constants.p[self.chosen], self.sigma, self.compliance)
+    def unknowns(self, x: np.ndarray) -> Unknowns:
+        """A value of the unknowns as compiled functions take it."""
+        return Unknowns(x, self.sigma, self.compliance)
 
     def _seen(self, n: int, twist: np.ndarray, shapes: np.ndarray | None, time: np.ndarray | float) -> Seen:
         if shapes is None:
             shapes = np.empty((n, 0, 6))
         times = np.empty(n)
         times[:] = time
-        return Seen(np.array(twist), times, np.ascontiguousarray(shapes))
+        return Seen(np.ascontiguousarray(twist), times, np.ascontiguousarray(shapes))
 
     def warm_up(self) -> None:
         """Has everything compiled, or read from where it was kept, before it is wanted in a tick."""

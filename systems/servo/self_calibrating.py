@@ -9,11 +9,12 @@ from pydrake.systems.framework import Context, DiscreteValues, LeafSystem
 
 from robots.description.model import NUM_JOINTS, RobotModel
 from systems.controller_model import ControllerModel
+from systems.estimation import kernels
 from systems.estimation.dead_time import CommandDelay
 from systems.estimation.drive_model import DEAD_TIME, DriveModel
-from systems.estimation.events import CLOCK_DRIFTS, DEAD_TIME_CHANGED, LOAD_CHANGED, TOOL_DISPLACED, Event
+from systems.estimation.events import DEAD_TIME_CHANGED, Event, EventLog
 from systems.estimation.findings import calibrated_robot, findings
-from systems.estimation.memory import History, Layout
+from systems.estimation.memory import History, Layout, Views
 from systems.estimation.parameter_lead import ParameterLead
 from systems.estimation.preview_planner import PreviewPlanner, Wanted
 from systems.estimation.probe import Probe
@@ -35,7 +36,6 @@ _ASTRAY = 3e-3  # rad, by which motors may miss their plan before its loads are 
 _UNREST = 0.5  # m/s^2, while the robot is led onto its plan, or the plan is not where motors are
 _STARTING = 1.5  # s
 _LOOK_EVERY = 5  # ticks, between two searches for the dead time
-_KINDS = (TOOL_DISPLACED, LOAD_CHANGED, DEAD_TIME_CHANGED, CLOCK_DRIFTS)
 _CAREFUL = 0.25  # of the planned speed, while the dead time or the load is not what it was
 _BEFORE_PATH = 0.6  # s, at which it is held until the dead time is found; a slowed path needs time to stop
 _GIVE_UP = 1.6  # s after the start: what is believed of the dead time has to do
@@ -98,13 +98,13 @@ class SelfCalibrating(LeafSystem):
         self._model, self._config, self._guard = model, config, guard
         self.period = model.period
         self.tip_model = TipModel(model, config.estimator.spread)
-        self.tip_model.warm_up()
         self.estimator = TipEstimator(self.tip_model, config.estimator)
         self._lead = ParameterLead(self.tip_model.size, config.lead_frequency, config.lead_acceleration)
         self._planner = PreviewPlanner(self.tip_model, model.period)
         self._drives = DriveModel(model, config.drives)
         self._probe = Probe(model.robot, config.probe)
         self._delay = CommandDelay(model.period, config.dead_time)
+        self._events = EventLog()
         reach = _REACH + max(model.command_delay, config.dead_time.longest) + model.camera_delay
         length = int(np.ceil(reach / model.period))
         self._plan, self._encoders = History(_PLAN.size, length), History(2 * NUM_JOINTS, length)
@@ -125,10 +125,10 @@ class SelfCalibrating(LeafSystem):
             compared=(1,),  # how many planned instants encoders have been compared at
             upset_at=(1,),
             paused_until=(1,),
-            events=(8, 4),
-            num_events=(1,),
+            events=self._events.layout,
             amplitude=(6,),
         )
+        self._views = Views(self._layout)
         self._reference = self.DeclareAbstractInputPort("reference", Value[object]())
         self._joints = self.DeclareAbstractInputPort("joint_sample", Value(JointSample()))
         self._camera = self.DeclareAbstractInputPort("pose_sample", Value(PoseSample()))
@@ -141,6 +141,7 @@ class SelfCalibrating(LeafSystem):
             self.DeclareDiscreteState([1.0]),
             self.DeclareDiscreteState([model.command_delay]),
         ]
+        self._rehearse()
         self._memory = self.DeclareDiscreteState(self._first_memory())
         names = "position_command", "velocity_command", "torque_feedforward", "correction", "measurement"
         for name, state in zip((*names, "speed_share", "look_ahead"), self._outputs, strict=True):
@@ -157,6 +158,25 @@ class SelfCalibrating(LeafSystem):
         self._delay.start(memory.delay, self._model.command_delay)
         return vector
 
+    def _rehearse(self) -> None:
+        """Runs the parts on scratch memory: what a first call compiles shall not be compiled in a tick."""
+        memory, model = self._layout.view(self._first_memory()), self.tip_model
+        model.warm_up()
+        q, still = np.linspace(0.1, 0.6, NUM_JOINTS), np.zeros(NUM_JOINTS)
+        X_WE = model.forward(model.constants(model.mean), model.mean, q[None])[0][0]
+        self._planner.start(memory.planner, model.mean, q, X_WE)
+        wanted, parameters = Wanted(X_WE, still, (still, still, still)), (model.mean, np.zeros(model.size))
+        for _ in range(2):
+            plan = self._planner.step(memory.planner, parameters, wanted, 0.0, self.period)
+            motion = plan.theta, plan.velocity, plan.acceleration
+            command = self._drives.command(memory.drives, motion, plan.loads, self._model.payload)
+        Phi = self._drives.features(plan.velocity, plan.acceleration, command.columns)
+        self._drives.learn(memory.drives, Phi, still)
+        for time in (0.0, 1.0):
+            self._encoders.append(memory.encoders, time, np.concatenate((q, still)))
+        self._encoders.at(memory.encoders, 0.5)
+        self._encoders_at(memory, 0.5)
+
     def memory(self, context: Context) -> SimpleNamespace:
         """All that the law remembers, as arrays that must not be written to."""
         return self._layout.view(context.get_discrete_state(self._memory).value())
@@ -168,7 +188,7 @@ class SelfCalibrating(LeafSystem):
         return {
             "dead_time_s": float(memory.delay.delay[0]) + late,
             **findings(self.estimator, memory.estimator),
-            "events": self._events(memory),
+            "events": self._events.read(memory.events),
         }
 
     def predicted_tip(self, context: Context) -> tuple[float, np.ndarray, np.ndarray] | None:
@@ -199,7 +219,7 @@ class SelfCalibrating(LeafSystem):
         reference: PathAhead = self._reference.Eval(context)
         joints: JointSample = self._joints.Eval(context)
         sample: PoseSample = self._camera.Eval(context)
-        memory = self._layout.view(discrete_state.get_mutable_value(int(self._memory)))
+        memory = self._views(discrete_state.get_mutable_value(int(self._memory)))
         measurement = discrete_state.get_mutable_value(int(self._outputs[4]))
         self._encoders.append(
             memory.encoders, joints.time, np.concatenate((joints.position, joints.velocity))
@@ -213,7 +233,7 @@ class SelfCalibrating(LeafSystem):
             if pair is not None:
                 event = self.estimator.add(memory.estimator, pair)
                 if event is not None:
-                    self._note(memory, time, event)
+                    self._events.note(memory.events, time, event)
                 measurement[0] = time
         self.estimator.work(memory.estimator)
         if not joints.running:
@@ -224,10 +244,10 @@ class SelfCalibrating(LeafSystem):
             commands = self._command(memory, reference, time, joints.position)
         for state, command in zip(self._outputs, commands, strict=False):
             discrete_state.set_value(int(state), command)
-            ahead = float(memory.planned[0]) - time
-            share = self._speed_share(memory, reference, time)
-            for state, value in zip(self._outputs[5:], (share, ahead), strict=True):
-                discrete_state.set_value(int(state), [value])
+        ahead = float(memory.planned[0]) - time
+        share = self._speed_share(memory, reference, time)
+        for state, value in zip(self._outputs[5:], (share, ahead), strict=True):
+            discrete_state.set_value(int(state), [value])
         learnt = memory.lead.x - self.tip_model.mean
         discrete_state.set_value(int(self._outputs[3]), memory.columns @ learnt)
 
@@ -239,20 +259,6 @@ class SelfCalibrating(LeafSystem):
             return 0.0 if is_near else 1.0
         is_upset = time < memory.paused_until[0] or not self._delay.is_settled(memory.delay, instant)
         return _CAREFUL if is_upset else 1.0
-
-    def _note(self, memory: SimpleNamespace, time: float, event: Event) -> None:
-        """Keeps an event for whoever asks what happened; the last eight."""
-        count = int(memory.num_events[0])
-        memory.events[count % len(memory.events)] = time, _KINDS.index(event.kind), event.size, event.error
-        memory.num_events[0] = count + 1
-
-    def _events(self, memory: SimpleNamespace) -> list[dict[str, Any]]:
-        count, length = int(memory.num_events[0]), len(memory.events)
-        rows = [memory.events[k % length].tolist() for k in range(max(0, count - length), count)]
-        return [
-            {"time_s": time, "kind": _KINDS[int(kind)], "size": size, "tip_error_m": error}
-            for time, kind, size, error in rows
-        ]
 
     def _command(
         self, memory: SimpleNamespace, reference: PathAhead, time: float, position: np.ndarray
@@ -330,19 +336,9 @@ class SelfCalibrating(LeafSystem):
         place = self._encoders.around(memory.encoders, time)
         if place is None:
             return None
-        before, behind, s = place
-        rows, times = memory.encoders.rows, memory.encoders.times
-        if before == behind:
-            return rows[before, :6].copy()
-        h = times[behind] - times[before]
-        p0, v0, p1, v1 = rows[before, :6], rows[before, 6:], rows[behind, :6], rows[behind, 6:]
-        r = 1.0 - s
-        return (
-            (1.0 + 2.0 * s) * r * r * p0
-            + s * r * r * h * v0
-            + s * s * (3.0 - 2.0 * s) * p1
-            - s * s * r * h * v1
-        )
+        position = np.empty(NUM_JOINTS)
+        kernels.history.cubic(memory.encoders.times, memory.encoders.rows, *place, position)
+        return position
 
     def _watch_delay(self, memory: SimpleNamespace, time: float) -> None:
         """Searches for the dead time until it is known, and again while the motors do what no drive does."""
@@ -356,7 +352,7 @@ class SelfCalibrating(LeafSystem):
             was_known = bool(memory.delay.known[0])
             change = self._delay.look(memory.delay)
             if was_known and change:
-                self._note(memory, time, Event(DEAD_TIME_CHANGED, change, 0.0))
+                self._events.note(memory.events, time, Event(DEAD_TIME_CHANGED, change, 0.0))
                 memory.upset_at[0] = time
         if since_start > _GIVE_UP:
             memory.delay.known[0] = 1.0

@@ -24,6 +24,7 @@ class Constants(NamedTuple):
     """What a value of the parameters makes of the robot."""
 
     p: np.ndarray  # (48,)
+    chosen: np.ndarray  # (g,), those of them that have a column
     along: np.ndarray  # (6, 3, 4), the pose of a link in the one before is along + sin sine + cos cosine
     sine: np.ndarray
     cosine: np.ndarray
@@ -45,14 +46,13 @@ class Masses(NamedTuple):
 
 
 class Unknowns(NamedTuple):
-    """A value of the unknowns, and where they are in units of what.
+    """A value of the unknowns x, with what does not change.
 
-    In the vector x are g geometric errors, 18 factors of compliance, mass and first moment of the payload,
+    In x are g geometric errors, 18 factors of compliance, mass and first moment of the payload,
     offset and drift of the clock, and errors of gears if there are any.
     """
 
     x: np.ndarray  # (size,)
-    p: np.ndarray  # (g,), the geometry that the constants are for
     sigma: np.ndarray  # (size,), units of the columns
     compliance: np.ndarray  # (18,) rad per N m
 
@@ -63,3 +63,16 @@ class Seen(NamedTuple):
     twist: np.ndarray  # (n, 6), of the tip
     time: np.ndarray  # (n,) s, since the camera's clock was compared first
     shapes: np.ndarray  # (n, 7, 6) of the gears' errors, or (n, 0, 6)
+
+
+class PathInstant(NamedTuple):
+    """What is wanted at one instant."""
+
+    X_WE: np.ndarray  # (4, 4), on the path
+    V_WE: np.ndarray  # (6,)
+    error: np.ndarray  # (6,), from the tip to there that is to be left
+    error_rate: np.ndarray  # (6,), by which it changes per s
+    parameter_rate: np.ndarray  # (g,), of the chosen parameters
+    aside: np.ndarray  # (3, 6), a motion of the joints beside the path: rad and derivatives
+    step: float  # s since the instant before
+    newton_step: float  # rad, a step of Newton's method that is small enough to be the last

@@ -8,9 +8,18 @@ from systems.estimation.kernels.poses import compiled, move
 
 
 @compiled
-def _yields(unknowns, loads, unit, yields):
+def largest_change(x, y, first):
+    """The largest difference of the first entries of two vectors."""
+    largest = 0.0
+    for k in range(first):
+        largest = max(largest, abs(x[k] - y[k]))
+    return largest
+
+
+@compiled
+def deflect(unknowns, g, loads, unit, yields):
     """Deflections in rad for a factor of one, and with the factors of now, (18,) each."""
-    x, g = unknowns.x, len(unknowns.p)
+    x = unknowns.x
     for j in range(18):
         total = loads[0, j]
         for k in range(4):
@@ -20,26 +29,27 @@ def _yields(unknowns, loads, unit, yields):
 
 
 @compiled
-def _error_of_gear(unknowns, shapes, j):
-    total, first = 0.0, len(unknowns.p) + 24
+def _error_of_gear(unknowns, g, shapes, j):
+    total, first = 0.0, g + 24
     for k in range(len(shapes)):
         total += shapes[k, j] * unknowns.x[first + 6 * k + j]
     return total
 
 
 @compiled
-def _geometric_step(unknowns, columns, step):
-    g = len(unknowns.p)
+def move_by_geometry(c, x, columns, X_WE, step):
+    """Moves the tip from the geometry of the constants to that of the unknowns; ``step`` is room for six."""
     for i in range(6):
         step[i] = 0.0
-        for k in range(g):
-            step[i] += columns[i, 18 + k] * (unknowns.x[k] - unknowns.p[k])
+        for k in range(len(c.chosen)):
+            step[i] += columns[i, 18 + k] * (x[k] - c.chosen[k])
+    move(X_WE, step)
 
 
 @compiled
-def _complete(unknowns, loads, unit, yields, seen, n, columns, X_WE, H):
+def _complete(unknowns, g, loads, unit, yields, seen, n, columns, X_WE, H):
     """Adds the tilting bearings and the clock to a pose, and makes the columns."""
-    x, sigma, g = unknowns.x, unknowns.sigma, len(unknowns.p)
+    x, sigma = unknowns.x, unknowns.sigma
     clock, time, step = x[g + 22], seen.time[n], np.empty(6)
     for i in range(6):
         twist = seen.twist[n, i]
@@ -77,17 +87,17 @@ def predict(c, unknowns, theta, loads, seen, X_WE, H, gears):
         seen: `Seen`.
         X_WE: (n, 4, 4), H: (n, 6, size), gears: deflections in rad (n, 6), are written.
     """
+    g = len(c.chosen)
     unit, yields, q, step = np.empty(18), np.empty(18), np.empty(6), np.empty(6)
     frames, columns = np.empty((7, 4, 4)), np.empty((6, len(c.frame)))
     for n in range(len(theta)):
-        _yields(unknowns, loads[n], unit, yields)
+        deflect(unknowns, g, loads[n], unit, yields)
         for j in range(6):
             gears[n, j] = yields[j]
-            q[j] = theta[n, j] + yields[j] + _error_of_gear(unknowns, seen.shapes[n], j)
+            q[j] = theta[n, j] + yields[j] + _error_of_gear(unknowns, g, seen.shapes[n], j)
         place(c, q, X_WE[n], frames, columns)
-        _geometric_step(unknowns, columns, step)
-        move(X_WE[n], step)
-        _complete(unknowns, loads[n], unit, yields, seen, n, columns, X_WE[n], H[n])
+        move_by_geometry(c, unknowns.x, columns, X_WE[n], step)
+        _complete(unknowns, g, loads[n], unit, yields, seen, n, columns, X_WE[n], H[n])
 
 
 @compiled
@@ -100,16 +110,16 @@ def predict_anew(c, unknowns, masses, theta, gears, motion, seen, X_WE, H):
         gears: about by how much the gears yield in rad, (n, 6); is renewed.
         motion: velocities and accelerations of the joints, (n, 12).
     """
+    g = len(c.chosen)
     unit, yields, q, step = np.empty(18), np.empty(18), np.empty(6), np.empty(6)
     frames, columns, loads = np.empty((7, 4, 4)), np.empty((6, len(c.frame))), np.empty((5, 18))
     for n in range(len(theta)):
         for j in range(6):
-            q[j] = theta[n, j] + gears[n, j] + _error_of_gear(unknowns, seen.shapes[n], j)
+            q[j] = theta[n, j] + gears[n, j] + _error_of_gear(unknowns, g, seen.shapes[n], j)
         place(c, q, X_WE[n], frames, columns)
-        _geometric_step(unknowns, columns, step)
-        move(X_WE[n], step)
+        move_by_geometry(c, unknowns.x, columns, X_WE[n], step)
         load(masses, frames, q, motion[n, :6], motion[n, 6:], loads)
-        _yields(unknowns, loads, unit, yields)
+        deflect(unknowns, g, loads, unit, yields)
         for i in range(6):
             step[i] = 0.0
             for j in range(6):
@@ -117,4 +127,4 @@ def predict_anew(c, unknowns, masses, theta, gears, motion, seen, X_WE, H):
         for j in range(6):
             gears[n, j] = yields[j]
         move(X_WE[n], step)
-        _complete(unknowns, loads, unit, yields, seen, n, columns, X_WE[n], H[n])
+        _complete(unknowns, g, loads, unit, yields, seen, n, columns, X_WE[n], H[n])

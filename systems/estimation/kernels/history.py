@@ -1,0 +1,49 @@
+"""Rows of numbers found by time in a ring."""
+
+from systems.estimation.kernels.poses import compiled
+
+
+@compiled
+def around(count, times, time):
+    """`History.around` of the first ``count`` rows, of which a ring keeps the last."""
+    length = len(times)
+    held, first = min(count, length), count % length if count > length else 0
+    newest = (count - 1) % length
+    if time >= times[newest]:
+        return newest, newest, 0.0
+    low, high = 0, held  # the first row that is later than the time is between them
+    while low < high:
+        middle = (low + high) // 2
+        if times[(first + middle) % length] <= time:
+            low = middle + 1
+        else:
+            high = middle
+    if low == 0:
+        return first, first, 0.0
+    before, behind = (first + low - 1) % length, (first + low) % length
+    return before, behind, (time - times[before]) / (times[behind] - times[before])
+
+
+@compiled
+def between(rows, before, behind, share, out):
+    """The row between two; the first one if the share is zero."""
+    for k in range(len(out)):
+        out[k] = rows[before, k]
+        if share != 0.0:
+            out[k] = (1.0 - share) * rows[before, k] + share * rows[behind, k]
+
+
+@compiled
+def cubic(times, rows, before, behind, s, out):
+    """Positions between two rows of positions and velocities, by the cubic through both."""
+    number = len(out)
+    h, r = times[behind] - times[before], 1.0 - s
+    for k in range(number):
+        out[k] = rows[before, k]
+        if before != behind:
+            out[k] = (
+                (1.0 + 2.0 * s) * r * r * rows[before, k]
+                + s * r * r * h * rows[before, number + k]
+                + s * s * (3.0 - 2.0 * s) * rows[behind, k]
+                - s * s * r * h * rows[behind, number + k]
+            )

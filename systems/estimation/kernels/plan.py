@@ -1,0 +1,102 @@
+"""Motions of the joints on a path: Newton's method on the estimated arm, and what its loads bend."""
+
+import numpy as np
+
+from systems.estimation.kernels.geometry import place
+from systems.estimation.kernels.loads import load
+from systems.estimation.kernels.poses import compiled, error
+from systems.estimation.kernels.tip import deflect, move_by_geometry
+
+
+@compiled
+def invert(columns, inverse):
+    """The inverse of the first six columns, by Gauss and Jordan with the largest pivots."""
+    n = 6
+    work = np.empty((n, n))
+    for i in range(n):
+        for j in range(n):
+            work[i, j] = columns[i, j]
+            inverse[i, j] = 1.0 if i == j else 0.0
+    for k in range(n):
+        pivot = k
+        for i in range(k + 1, n):
+            if abs(work[i, k]) > abs(work[pivot, k]):
+                pivot = i
+        for j in range(n):
+            work[k, j], work[pivot, j] = work[pivot, j], work[k, j]
+            inverse[k, j], inverse[pivot, j] = inverse[pivot, j], inverse[k, j]
+        scale = 1.0 / work[k, k]
+        for j in range(n):
+            work[k, j] *= scale
+            inverse[k, j] *= scale
+        for i in range(n):
+            factor = work[i, k]
+            if i != k and factor != 0.0:
+                for j in range(n):
+                    work[i, j] -= factor * work[k, j]
+                    inverse[i, j] -= factor * inverse[k, j]
+
+
+@compiled
+def _newton(c, x, q, wanted, frames, columns, inverse):
+    """One step towards a pose, in place; the arm is the one before it. Returns its size in rad."""
+    X, r, largest = np.empty((4, 4)), np.empty(6), 0.0
+    place(c, q, X, frames, columns)
+    move_by_geometry(c, x, columns, X, r)
+    error(wanted.X_WE, X, r)
+    invert(columns, inverse)
+    for i in range(6):
+        move = 0.0
+        for j in range(6):
+            move += inverse[i, j] * (r[j] - wanted.error[j])
+        q[i] += move
+        largest = max(largest, abs(move))
+    return largest
+
+
+@compiled
+def follow(c, masses, unknowns, wanted, rates, motion, columns, loads, yields):
+    """The joints behind the gears where a stiff arm is on the path, and what motion and load bend there.
+
+    Args:
+        c, masses, unknowns: the arm.
+        wanted: `PathInstant`.
+        rates: of the last two instants, newest first, (2, 6).
+        motion: (4, 6): joints in rad, at first about where they are on the path; then, written, their
+            velocity and acceleration, and how fast they move because parameters do. All without the motion
+            beside the path.
+        columns: (6, C), loads: (5, 18), yields: (6,) in rad, by which springs make motors be ahead of links,
+            are written.
+    """
+    frames, inverse, X = np.empty((7, 4, 4)), np.empty((6, 6)), np.empty((4, 4))
+    if _newton(c, unknowns.x, motion[0], wanted, frames, columns, inverse) > wanted.newton_step:
+        _newton(c, unknowns.x, motion[0], wanted, frames, columns, inverse)
+    drift = np.empty(6)
+    for i in range(6):
+        drift[i] = wanted.error_rate[i]
+        for k in range(len(c.chosen)):
+            drift[i] += columns[i, 18 + k] * wanted.parameter_rate[k]
+    is_aside, moving = False, np.empty((3, 6))
+    for i in range(6):
+        v = wander = 0.0
+        for j in range(6):
+            v += inverse[i, j] * wanted.V_WE[j]
+            wander -= inverse[i, j] * drift[j]
+        motion[1, i], motion[3, i] = v, wander
+        motion[2, i] = (1.5 * v - 2.0 * rates[0, i] + 0.5 * rates[1, i]) / wanted.step
+        is_aside = is_aside or wanted.aside[0, i] != 0.0 or wanted.aside[1, i] != 0.0
+        for k in range(3):
+            moving[k, i] = motion[k, i] + wanted.aside[k, i]
+    if is_aside:
+        place(c, moving[0], X, frames, columns)
+        invert(columns, inverse)
+    load(masses, frames, moving[0], moving[1], moving[2], loads)
+    unit, deflection = np.empty(18), np.empty(18)
+    deflect(unknowns, len(c.chosen), loads, unit, deflection)
+    for i in range(6):
+        yields[i] = -deflection[i]
+        for k in range(6):
+            tilt = 0.0
+            for j in range(6, 18):
+                tilt += columns[k, j] * deflection[j]
+            yields[i] -= inverse[i, k] * tilt
