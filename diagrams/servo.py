@@ -3,13 +3,21 @@
 from typing import Any
 
 import numpy as np
-from pydrake.systems.framework import Context, Diagram, DiagramBuilder, OutputPort, System
+from pydrake.systems.framework import (
+    Context,
+    Diagram,
+    DiagramBuilder,
+    InputPortIndex,
+    OutputPort,
+    System,
+)
 from pydrake.systems.primitives import Adder, ConstantVectorSource
 
 from diagrams.record.coverage import Prediction
 from diagrams.scenario.controller_model import controller_model
 from diagrams.scenario.scenario import Scenario, ScenarioError
 from diagrams.tick_clock import TickClock
+from diagrams.watching import Watch
 from robots.description.model import NUM_JOINTS, RobotModel
 from systems.controller_model import ControllerModel
 from systems.feedforward import FEEDFORWARDS
@@ -31,6 +39,10 @@ class Servo(Diagram):
         out ``position_command``  vector 6 in rad
         out ``velocity_command``  vector 6 in rad/s
         out ``torque_feedforward``  vector 6 in N m, only with a feedforward or a law that knows torques
+    and if it watches for people:
+        in  ``image_sample``      ImageSample
+        out ``person_sample``, ``speed_share``, ``stop``, ``separation``  as of `PeopleWatcher` and
+                                  `SeparationMonitor`
     and to look at:
         out ``X_WE_desired``      RigidTransform
         out ``path_time``         vector 2: the time on the path in s and its rate
@@ -46,13 +58,20 @@ class Servo(Diagram):
         tick_clock: of the law's updates, if the servo has made the law.
     """
 
-    def __init__(self, robot: RobotModel, scenario: Scenario, law: str | type[System] | System) -> None:
+    def __init__(
+        self,
+        robot: RobotModel,
+        scenario: Scenario,
+        law: str | type[System] | System,
+        watch: Watch | None = None,
+    ) -> None:
         """Builds the controller of one law.
 
         Args:
             robot: as the controller knows it, unless `servo.model` says otherwise.
             scenario: what to do, and what the controller believes of the station.
             law: a shipped law by name, ``FILE.py:CLASS``, a class, or any system with the ports of a law.
+            watch: what slows the path for people.
 
         Raises:
             ValueError: if the law is unknown or has not the ports, or a part refuses its configuration.
@@ -72,6 +91,7 @@ class Servo(Diagram):
             _refuse_slow_camera(scenario)
         builder = DiagramBuilder()
         slowed_by = ["law"] if self.law.HasOutputPort("speed_share") else []
+        slowed_by += ["separation"] if watch else []
         self.reference = builder.AddNamedSystem(
             "reference", Reference(scenario.reference, self.model.period, slowed_by)
         )
@@ -99,12 +119,14 @@ class Servo(Diagram):
                 builder.Connect(self.reference.GetOutputPort(source), self.law.GetInputPort(name))
         if self.reference.is_slowed:
             for name, port in (("speed_share", "speed_share_law"), ("look_ahead", "look_ahead")):
-                if self.law.HasOutputPort(name):
+                if self.law.HasOutputPort(name) and self.reference.HasInputPort(port):
                     builder.Connect(self.law.GetOutputPort(name), self.reference.GetInputPort(port))
         if self.law.HasInputPort("deviation"):
             builder.Connect(guard.GetOutputPort("deviation"), self.law.GetInputPort("deviation"))
         joints = builder.ExportInput(guard.GetInputPort("joint_sample"), "joint_sample")
         builder.ConnectInput(joints, self.law.GetInputPort("joint_sample"))
+        if watch:
+            self._add_watch(builder, watch, guard, joints)
         commands = self._connect_camera(builder)
         for name in ("position_command", "velocity_command", "torque_feedforward"):
             if self.law.HasOutputPort(name):
@@ -130,6 +152,26 @@ class Servo(Diagram):
         builder.ExportOutput(commands["correction"], "correction")
         builder.BuildInto(self)
         self.set_name("servo")
+
+    def _add_watch(
+        self, builder: DiagramBuilder, watch: Watch, guard: CommandGuard, joints: InputPortIndex
+    ) -> None:
+        """People in whole images, and the share of the speed that they allow."""
+        watcher = builder.AddNamedSystem("people_watcher", watch.watcher)
+        monitor = builder.AddNamedSystem("separation_monitor", watch.monitor)
+        builder.ExportInput(watcher.GetInputPort("image_sample"), "image_sample")
+        for system in (watcher, monitor):
+            builder.ConnectInput(joints, system.GetInputPort("joint_sample"))
+        for source, port in (
+            (watcher.GetOutputPort("person_sample"), monitor.GetInputPort("person_sample")),
+            (guard.GetOutputPort("velocity_command"), monitor.GetInputPort("velocity_command")),
+            (self.reference.GetOutputPort("path_time"), monitor.GetInputPort("path_time")),
+            (monitor.GetOutputPort("speed_share"), self.reference.GetInputPort("speed_share_separation")),
+        ):
+            builder.Connect(source, port)
+        for name in ("speed_share", "stop", "separation"):
+            builder.ExportOutput(monitor.GetOutputPort(name), name)
+        builder.ExportOutput(watcher.GetOutputPort("person_sample"), "person_sample")
 
     def path_time(self, root_context: Context) -> float:
         """The time on the path in s at the time of a context; the same unless the path is slowed."""

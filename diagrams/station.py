@@ -31,6 +31,7 @@ from systems.cell.events.true_geometry import TrueGeometry
 from systems.cell.inertial_sensors import InertialLoggerConfig
 from systems.cell.joint_sensor import JointSensor
 from systems.cell.marker_camera import MarkerCamera
+from systems.cell.overview.overview_camera import OverviewCamera
 from systems.cell.pose_camera import BLOCK, PoseCamera
 from systems.cell.tip_pose import TipPose
 
@@ -60,6 +61,8 @@ class SimulatedStation(Diagram):
         out ``pose_sample``       PoseSample
     and if its drives take it:
         in  ``torque_feedforward``  vector 6 in N m, joint side
+    and if it has whole images of its cameras:
+        out ``image_sample``      ImageSample
     and for each logger of inertial sensors on it:
         out ``inertial_sample_1``   vector, see `systems.cell.inertial_sensors`
 
@@ -82,6 +85,7 @@ class SimulatedStation(Diagram):
         drive: str,
         takes_torque: bool = False,
         inertial: list[InertialLoggerConfig] | None = None,
+        overview: OverviewCamera | None = None,
     ) -> None:
         """Builds the cell.
 
@@ -93,6 +97,7 @@ class SimulatedStation(Diagram):
                 plans, where ``"velocity"`` follows speeds alone, there is no other difference.
             takes_torque: whether the drives take a torque feedforward; behind such a controller they do not.
             inertial: loggers with gyros and accelerometers on the robot.
+            overview: takes whole images of the cell.
 
         Raises:
             ValueError: if a part refuses its configuration.
@@ -122,6 +127,7 @@ class SimulatedStation(Diagram):
         self._connect_commands(builder)
         self._add_joint_sensor(builder, _RUNAWAY * float(robot.speed.max()))
         self._noise = self._add_camera(builder, _camera(robot, config), config)
+        self._image_noise = self._add_overview(builder, overview) if overview else None
         self._inertial_noise = add_inertial_sensors(builder, self.plant, inertial or [])
         builder.ExportOutput(self.plant.get_state_output_port(), "truth.state")
         builder.ExportOutput(self._driven.motor_state, "truth.motor_state")
@@ -192,6 +198,17 @@ class SimulatedStation(Diagram):
         builder.ExportOutput(camera.GetOutputPort("exposure"), "truth.exposure")
         return noise
 
+    def _add_overview(self, builder: DiagramBuilder, overview: OverviewCamera) -> RandomSource:
+        """The camera of whole images, and the source of its noise, which is returned."""
+        builder.AddNamedSystem("overview", overview)
+        port = overview.GetInputPort("noise")
+        noise = RandomSource(RandomDistribution.kGaussian, port.size(), self._config.overview.period)
+        builder.AddNamedSystem("image_noise", noise)
+        builder.Connect(noise.get_output_port(), port)
+        builder.Connect(self._driven.motor_state, overview.GetInputPort("motor_state"))
+        builder.ExportOutput(overview.GetOutputPort("image_sample"), "image_sample")
+        return noise
+
     def set_at_rest(self, root_context: Context, theta: np.ndarray, seed: int) -> None:
         """Puts the motors at theta (rad, shape (6,)), everything at rest, and seeds the camera's noise."""
         self._driven.set_at_rest(root_context, theta)
@@ -203,6 +220,9 @@ class SimulatedStation(Diagram):
             self._noise.GetMyMutableContextFromRoot(root_context), RandomGenerator(seed)
         )
         seed_noise(self._inertial_noise, root_context, seed)
+        if self._image_noise:
+            context = self._image_noise.GetMyMutableContextFromRoot(root_context)
+            self._image_noise.SetRandomContext(context, RandomGenerator(seed))
 
     def changes(self) -> list[Change]:
         """What a run has to do to the context of the plant at times of events; the rest happens by itself."""

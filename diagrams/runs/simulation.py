@@ -16,6 +16,7 @@ from diagrams.record.played import measured_along, path_marks, played
 from diagrams.scenario.scenario import Scenario, ScenarioError
 from diagrams.servo import Servo, calibrated, law_name, learnt, predicted_tip
 from diagrams.station import SimulatedStation
+from diagrams.watching import Watch, make_watch
 from robots.description.model import RobotModel, load_robot
 from robots.dynamics.newton_inverse import inverse_kinematics
 from systems.cell.events.station_events import check_events
@@ -23,6 +24,7 @@ from systems.controller_model import ControllerModel
 from systems.guard.guard import KINDS
 from systems.reference.paths import CartesianPath, make_path
 
+_OF_WATCH = ("speed_share", "stop", "separation")
 _CHUNK = 0.2  # s of simulated time between two reports of progress
 _LONGEST_HOLD = 30.0  # s, after which a run is over whose path is held
 
@@ -65,12 +67,14 @@ class Experiment:
         robot: RobotModel | None = None,
         seed: int | None = None,
         plant: RobotModel | None = None,
+        watch: Watch | None = None,
     ) -> None:
         """Builds the diagram and puts everything at rest at the start. Raises what `run` raises.
 
         Args:
             scenario, robot, seed, plant: as of `run`.
             law: a shipped law by name, ``FILE.py:CLASS``, a class, or any system with the ports of a law.
+            watch: what watches for people; None for what the scenario says.
         """
         self.scenario, self.law = scenario, law_name(law)
         end = make_path(scenario.reference).duration
@@ -79,21 +83,33 @@ class Experiment:
         drawn = plant or nominal_robot(scenario, robot)
         robot = robot or drawn
         builder = DiagramBuilder()
-        servo = Servo(robot, scenario, law)
+        if watch is None and scenario.station.overview.enabled:
+            watch = make_watch(scenario, robot, drawn)
+        self.watch = watch
+        servo = Servo(robot, scenario, law, self.watch)
         self.station = builder.AddNamedSystem(
-            "station", SimulatedStation(drawn, scenario.station, servo.drive, takes_torque=servo.has_torque)
+            "station",
+            SimulatedStation(
+                drawn,
+                scenario.station,
+                servo.drive,
+                takes_torque=servo.has_torque,
+                overview=self.watch.camera if self.watch else None,
+            ),
         )
         self.servo = builder.AddNamedSystem("servo", servo)
         for name in ("position_command", "velocity_command", "torque_feedforward"):
             if self.station.HasInputPort(name):
                 builder.Connect(self.servo.GetOutputPort(name), self.station.GetInputPort(name))
-        for name in ("joint_sample", "pose_sample"):
+        for name in ("joint_sample", "pose_sample", *(("image_sample",) if self.watch else ())):
             builder.Connect(self.station.GetOutputPort(name), self.servo.GetInputPort(name))
         shown = ("position_command", "velocity_command", "correction", "guard_status")
         ports = {name: self.servo.GetOutputPort(name) for name in shown}
         ports |= {name: self.station.GetOutputPort(name) for name in self.station.LOGGED}
         if self.servo.reference.is_slowed:
             ports["path_time"] = self.servo.GetOutputPort("path_time")
+        if self.watch:
+            ports |= {name: self.servo.GetOutputPort(name) for name in _OF_WATCH}
         # In one log: what stands in a diagram costs time at every step of the integrator.
         self._log = PackedLog(builder, ports, scenario.station.period)
         self.diagram = builder.Build()
@@ -151,6 +167,11 @@ class Experiment:
                 self._predictions.append(prediction)
             if progress:
                 progress(min(1.0, self.servo.path_time(self.context) / self.path.duration))
+
+    def watched(self) -> tuple[np.ndarray, dict[str, np.ndarray]]:
+        """What the separation monitor said, and the joints: times (n,) in s, and values (n, size) by port."""
+        times, data = self._log.read(self.context)
+        return times, {name: data[name] for name in (*_OF_WATCH, "path_time", "truth.motor_state")}
 
     def log(self) -> RunLog:
         """The record of what has happened so far."""

@@ -18,14 +18,17 @@ from systems.cell.drive import DriveConfig
 from systems.cell.encoders import EncoderConfig
 from systems.cell.events.station_events import StationEvent
 from systems.cell.network_faults import FaultConfig
+from systems.cell.overview.overview_camera import OverviewConfig
 from systems.cell.pose_camera import PoseCameraConfig
 from systems.controller_model import ControllerModelConfig
 from systems.feedforward import FEEDFORWARDS, FeedforwardConfig
 from systems.guard.guard import GuardConfig
+from systems.guard.separation.protective_distance import SeparationConfig
 from systems.link.makers import LINK_NAMES, RobotLinkConfig, default_link
 from systems.reference.paths import ReferenceConfig
 from systems.servo import LAWS
 from systems.servo.gains import LawGains
+from systems.vision.people.people_detector import DetectorConfig
 
 __all__ = ["Scenario", "ScenarioError", "load_scenario", "scenario_text", "shipped_scenarios"]
 
@@ -61,6 +64,7 @@ class StationConfig:
     link: RobotLinkConfig = field(default_factory=default_link)
     faults: FaultConfig = field(default_factory=FaultConfig)
     events: list[StationEvent] = field(default_factory=list)  # of runs along a path
+    overview: OverviewConfig = field(default_factory=OverviewConfig)  # whole images, in which people are seen
 
 
 @dataclass
@@ -71,6 +75,8 @@ class ServoConfig:
     laws: LawGains = field(default_factory=LawGains)
     feedforward: FeedforwardConfig = field(default_factory=FeedforwardConfig)
     guard: GuardConfig = field(default_factory=GuardConfig)
+    people: DetectorConfig = field(default_factory=DetectorConfig)
+    separation: SeparationConfig = field(default_factory=SeparationConfig)
 
 
 @dataclass

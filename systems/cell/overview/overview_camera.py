@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from typing import Protocol
 
 import numpy as np
 from pydrake.common import RandomDistribution
@@ -10,9 +11,8 @@ from pydrake.systems.framework import Context, LeafSystem, State
 
 from robots.configuration.quantity import numbers, quantity
 from robots.description.model import NUM_JOINTS
-from robots.kinematics.arm_capsules import ArmCapsules
-from systems.cell.overview.person import WalkingPerson
-from systems.cell.overview.rendering import CellPictures
+from robots.kinematics.arm_capsules import ArmCapsules, Capsules
+from systems.cell.overview.person import PersonConfig, WalkingPerson
 from systems.samples import ImageSample
 
 _FULL_SCALE = 255
@@ -37,8 +37,12 @@ class LightConfig:
 
 @dataclass
 class OverviewConfig:
-    """Whole images of the cameras of a cell; read from a scenario file."""
+    """Whole images of the cameras of a cell, and who walks through it; read from a scenario file."""
 
+    enabled: bool = False  # whether the station has them and the robot is slowed for people
+    cell: str = "probst"  # the cameras, a shipped cell or a file
+    surroundings: str = "probst"  # what stands still about the robot, likewise
+    people: list[PersonConfig] = field(default_factory=list)
     width: int = quantity(640, 64, 8192, "px")  # of a whole image
     period: float = quantity(0.05, 1e-3, 10.0, "s")  # between two sets of images
     delay: float = quantity(0.03, 0.0, 1.0, "s")  # from exposure to arrival
@@ -62,11 +66,19 @@ def recorded(images: np.ndarray, time: float, light: LightConfig, key: np.ndarra
     return np.clip(np.rint(value, out=value), 0, _FULL_SCALE, out=value).astype(np.uint8)
 
 
+class Pictures(Protocol):
+    """What draws a set of images, `CellPictures` for example."""
+
+    def take(self, robot: Capsules, people: Sequence[Capsules | None]) -> np.ndarray:
+        """Images (n, h, w, 3) of uint8 of a robot and people where they are."""
+        ...
+
+
 class OverviewCamera(LeafSystem):
     """Takes whole images of a simulated cell.
 
     Ports:
-        in  ``position``      vector 6 in rad, the joints of the true robot
+        in  ``motor_state``   vector 12, positions (rad) and velocities (rad/s) of the true robot's motors
         in  ``noise``         vector 2, standard normal
         out ``image_sample``  ImageSample, the newest that has arrived; without images before the first
     """
@@ -74,7 +86,7 @@ class OverviewCamera(LeafSystem):
     def __init__(
         self,
         config: OverviewConfig,
-        pictures: CellPictures,
+        pictures: Pictures,
         arm: ArmCapsules,
         people: Sequence[WalkingPerson] = (),
     ) -> None:
@@ -88,7 +100,7 @@ class OverviewCamera(LeafSystem):
         """
         super().__init__()
         self._config, self._pictures, self._arm, self._people = config, pictures, arm, list(people)
-        self._position = self.DeclareVectorInputPort("position", NUM_JOINTS)
+        self._motors = self.DeclareVectorInputPort("motor_state", 2 * NUM_JOINTS)
         self._noise = self.DeclareVectorInputPort("noise", 2, RandomDistribution.kGaussian)
         self._in_flight = self.DeclareAbstractState(Value[object](()))
         self.DeclareAbstractOutputPort(
@@ -104,7 +116,7 @@ class OverviewCamera(LeafSystem):
         pairs = zip(self._config.losses[::2], self._config.losses[1::2], strict=True)
         if any(begin <= time < end for begin, end in pairs):
             return
-        robot = self._arm.at(self._position.Eval(context))
+        robot = self._arm.at(self._motors.Eval(context)[:NUM_JOINTS])
         drawn = self._pictures.take(robot, [person.at(time) for person in self._people])
         images = recorded(drawn, time, self._config.light, self._noise.Eval(context))
         kept = int(np.ceil(self._config.delay / self._config.period)) + 1

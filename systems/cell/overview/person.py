@@ -55,6 +55,11 @@ class WalkingPerson:
         self._is_still = len(self._points) == 1
         self.end = np.inf if self._is_still else time
 
+    @property
+    def figure(self) -> Capsules:
+        """The figure where it stands at first, for its sizes."""
+        return figure(self._points[0], 0.0, self._floor)
+
     def at(self, time: float) -> Capsules | None:
         """The figure at a time in s; None if the person is not in the cell."""
         if not self._config.start <= time < self.end:

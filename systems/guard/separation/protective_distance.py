@@ -17,7 +17,6 @@ class SeparationConfig:
     """How far from people the robot stays; read from a scenario file."""
 
     human_speed: float = quantity(1.6, 0.0, 10.0, "m/s")  # v_h of ISO 13855 for walking; more if seen faster
-    stop_time: float = quantity(0.25, 0.0, 10.0, "s", is_open=True)  # T_s from full motion, that of the guard
     intrusion: float = quantity(0.12, 0.0, 2.0, "m")  # C, of limbs thinner than is seen; assumed
     person_error: float = quantity(0.1, 0.0, 2.0, "m")  # Z_d, `truetip watch --study` prints the largest
     robot_error: float = quantity(0.01, 0.0, 1.0, "m")  # Z_r, of the tip and of the joints at an exposure
@@ -37,7 +36,7 @@ class ReactionTime:
     transport: float  # from exposure to arrival
     computation: float  # until people are known
     decision: float  # between two decisions
-    command: float  # from a decision to the drives
+    command: float  # from a decision until the drives begin to brake
 
     @property
     def total(self) -> float:
@@ -51,7 +50,7 @@ class ProtectiveDistance:
 
     human: float  # S_h = v_h (T_r + T_s)
     reaction: float  # S_r = v_r T_r
-    stopping: float  # S_s = v_r T_s / 2, at a constant deceleration
+    stopping: float  # S_s = v_r T_s / 2, for the deceleration is as a step that is alike on both sides
     intrusion: float  # C
     person_error: float  # Z_d
     robot_error: float  # Z_r
@@ -81,9 +80,9 @@ def protective_distance(
     )
 
 
-def stopping_time(config: SeparationConfig, velocity: np.ndarray, acceleration: np.ndarray) -> float:
-    """T_s in s: that of the guard, or longer where joints cannot brake so hard; (6,) rad/s, rad/s^2."""
-    return max(config.stop_time, float((np.abs(velocity) / acceleration).max()))
+def stopping_time(planned: float, velocity: np.ndarray, acceleration: np.ndarray) -> float:
+    """T_s in s: as planned, or longer where joints cannot brake so hard; (6,) in rad/s and rad/s^2."""
+    return max(planned, float((np.abs(velocity) / acceleration).max()))
 
 
 def largest_share(distance: float, terms: ProtectiveDistance) -> float:

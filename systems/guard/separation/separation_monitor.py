@@ -1,5 +1,7 @@
 """The system that decides how fast the robot may go while people are near. An aid, not a safety function."""
 
+from collections.abc import Callable
+
 import numpy as np
 from pydrake.common.value import Value
 from pydrake.systems.framework import BasicVector, Context, DiscreteValues, LeafSystem
@@ -22,8 +24,9 @@ _FREE, _SLOW, _STOP = 0.0, 1.0, 2.0
 _SHARE, _STOPPED, _TRUSTED, _STATUS, _FULL = 0, 1, 2, slice(3, 7), slice(7, 13)
 _WIDTH = 13
 _STEP = 1e-4  # s, over which speeds of the arm are told from differences
-_LEAST_SHARE = 0.2  # below which the full speed of the path is not told from the commands
+_LEAST_RATE = 0.2  # below which the full speed of the path is not told from the commands
 _FORGET = 0.02  # of the largest full speed per decision
+_GRADES = 20  # of the share that is put out
 _FAR = 1e3  # m, where nobody is
 
 
@@ -33,7 +36,8 @@ class SeparationMonitor(LeafSystem):
     Ports:
         in  ``person_sample``     PersonSample
         in  ``joint_sample``      JointSample
-        in  ``velocity_command``  vector 6 in rad/s, as it is with the share that is put out
+        in  ``velocity_command``  vector 6 in rad/s
+        in  ``path_time``         vector 2: the time on the path in s and its rate
         in  ``acknowledge``       vector 1, optional: above 0.5 somebody lets the robot go on after a stop
         out ``speed_share``       vector 1: how fast the path may be run, 1 as planned, 0 at rest
         out ``stop``              vector 1: 1 from a stop until it is over, else 0
@@ -49,6 +53,8 @@ class SeparationMonitor(LeafSystem):
         arm: ArmCapsules,
         config: SeparationConfig,
         reaction: ReactionTime,
+        stop_time: float,
+        path_speed: float = 0.0,
     ) -> None:
         """Makes the system.
 
@@ -57,9 +63,12 @@ class SeparationMonitor(LeafSystem):
             arm: its capsules with what it carries.
             config: distances and times.
             reaction: T_r of the chain that this system is in.
+            stop_time: s in which a path comes to rest that is run at full speed.
+            path_speed: the largest of the tool on its path in m/s; the arm is not taken for slower.
 
         Raises:
-            ValueError: if it would stop before it slows, or a fresh image would count as late.
+            ValueError: if it would stop before it slows, a fresh image would count as late, or the time to
+                rest is not positive.
         """
         super().__init__()
         if not config.slow_after < config.stop_after:
@@ -73,26 +82,31 @@ class SeparationMonitor(LeafSystem):
                 f"separation: slow_after={config.slow_after:g} s must be above the {usual:g} s that images "
                 "are old at most when all is well"
             )
+        if not stop_time > 0.0:
+            raise ValueError(f"separation: the time to rest must be positive, got {stop_time} s")
         self._arm, self._config, self._reaction = arm, config, reaction
+        self._stop_time, self._path_speed = stop_time, path_speed
         self._acceleration = robot.acceleration
         self._people = self.DeclareAbstractInputPort("person_sample", Value[object](PersonSample()))
         self._joints = self.DeclareAbstractInputPort("joint_sample", Value(JointSample()))
         self._velocity = self.DeclareVectorInputPort("velocity_command", NUM_JOINTS)
+        self._path_time = self.DeclareVectorInputPort("path_time", 2)
         self._acknowledge = self.DeclareVectorInputPort("acknowledge", 1)
         start = np.zeros(_WIDTH)
         start[[_SHARE, _TRUSTED]] = 0.0, -np.inf
         self._state = self.DeclareDiscreteState(start)
-        for name, size, part in (
-            ("speed_share", 1, slice(_SHARE, _SHARE + 1)),
-            ("stop", 1, slice(_STOPPED, _STOPPED + 1)),
-            ("separation", len(STATUS), _STATUS),
-        ):
+        parts = {"speed_share": slice(_SHARE, _SHARE + 1), "stop": slice(_STOPPED, _STOPPED + 1)}
+        for name, part in {**parts, "separation": _STATUS}.items():
+            size = part.stop - part.start
             self.DeclareVectorOutputPort(name, size, self._shown(part), {self.xd_ticket()})
         self.DeclarePeriodicDiscreteUpdateEvent(config.period, 0.0, self._decide)
 
-    def _shown(self, part: slice):
+    def _shown(self, part: slice) -> Callable[[Context, BasicVector], None]:
         def calc(context: Context, output: BasicVector) -> None:
-            output.set_value(context.get_discrete_state(self._state).value()[part])
+            value = context.get_discrete_state(self._state).value()[part]
+            # Rounded down: a share that changes with every decision would be many changes of the path time.
+            is_share = part.start == _SHARE
+            output.set_value(np.floor(_GRADES * value + 1e-9) / _GRADES if is_share else value)
 
         return calc
 
@@ -100,8 +114,8 @@ class SeparationMonitor(LeafSystem):
         """The protective distance at joint speeds (6,) in rad/s and positions (6,) in rad."""
         now, later = self._arm.at(q), self._arm.at(q + _STEP * velocity)
         ends = np.concatenate([later.start - now.start, later.end - now.end])
-        speed = float(np.linalg.norm(ends, axis=1).max()) / _STEP
-        stop = stopping_time(self._config, velocity, self._acceleration)
+        speed = max(float(np.linalg.norm(ends, axis=1).max()) / _STEP, self._path_speed)
+        stop = stopping_time(self._stop_time, velocity, self._acceleration)
         fastest = max(self._config.human_speed, human_speed)
         return protective_distance(self._config, self._reaction, speed, stop, fastest)
 
@@ -112,7 +126,8 @@ class SeparationMonitor(LeafSystem):
         if sample.trusted:
             state[_TRUSTED] = max(state[_TRUSTED], sample.time)
         age = time - state[_TRUSTED]
-        full = self._full_speed(state, np.asarray(self._velocity.Eval(context)))
+        rate = float(self._path_time.Eval(context)[1])
+        full = self._full_speed(state, np.nan_to_num(self._velocity.Eval(context)), rate)
         arm = self._arm.at(joints.position)
         distance = min(
             (float(arm.distances(each.points).min()) - each.reach for each in sample.people), default=_FAR
@@ -128,17 +143,18 @@ class SeparationMonitor(LeafSystem):
                 state[_STOPPED] = 0.0
         elif time > config.stop_after or distance < _FAR:  # nobody was there before the first images
             state[_STOPPED] = float(distance < needed or age >= config.stop_after)
-        share = 0.0 if state[_STOPPED] else min(allowed, state[_SHARE] + config.rise * config.period)
-        state[_SHARE], state[_FULL] = share, full
+        share = min(allowed, state[_SHARE] + config.rise * config.period)
+        state[_SHARE] = 0.0 if state[_STOPPED] else share
+        state[_FULL] = full
         zone = _STOP if state[_STOPPED] else (_SLOW if allowed < 1.0 else _FREE)
         state[_STATUS] = distance, terms.total, zone, min(age, _FAR)
         discrete_state.set_value(self._state, state)
 
-    def _full_speed(self, state: np.ndarray, velocity: np.ndarray) -> np.ndarray:
-        """The joint speeds that the path has at full speed, as commands at a share of it tell, rad/s (6,)."""
-        if state[_SHARE] < _LEAST_SHARE:
+    def _full_speed(self, state: np.ndarray, velocity: np.ndarray, rate: float) -> np.ndarray:
+        """The joint speeds that the path has at full speed, as commands at another one tell, rad/s (6,)."""
+        if rate < _LEAST_RATE:
             return state[_FULL]
-        return np.maximum(np.abs(velocity) / state[_SHARE], (1.0 - _FORGET) * state[_FULL])
+        return np.maximum(np.abs(velocity) / rate, (1.0 - _FORGET) * state[_FULL])
 
     def _by_age(self, age: float) -> float:
         """The share that images of an age in s allow."""

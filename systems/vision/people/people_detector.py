@@ -16,6 +16,7 @@ from systems.vision.people.background import (
     compare,
     remembered,
 )
+from systems.vision.people.person_tracks import TrackConfig
 from systems.vision.people.silhouettes import silhouettes
 from systems.vision.people.surroundings import Surroundings
 from systems.vision.people.visual_hull import Body, HullConfig, VisualHull
@@ -25,8 +26,10 @@ from systems.vision.people.visual_hull import Body, HullConfig, VisualHull
 class DetectorConfig:
     """How people are looked for; read from a scenario file."""
 
+    computation: float = quantity(0.05, 1e-3, 1.0, "s")  # from the arrival of images to the result
     background: BackgroundConfig = field(default_factory=BackgroundConfig)
     hull: HullConfig = field(default_factory=HullConfig)
+    tracks: TrackConfig = field(default_factory=TrackConfig)
     robot_margin: float = quantity(0.04, 0.0, 0.5, "m")  # about the robot, in which pixels are unknown
     least_trusted: int = quantity(4, 2, 100)  # cameras; with fewer, nobody can be told to be absent
     tool_length: float = quantity(0.35, 0.0, 5.0, "m")  # of what the flange carries; a marker body, assumed

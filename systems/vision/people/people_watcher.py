@@ -5,14 +5,16 @@ from typing import Any
 
 import numpy as np
 from pydrake.common.value import Value
-from pydrake.systems.framework import Context, LeafSystem, State
+from pydrake.systems.framework import Context, DiscreteValues, LeafSystem, State
 
+from robots.description.model import NUM_JOINTS
 from systems.samples import ImageSample, JointSample, PersonSample
 from systems.vision.people.background import Memory
 from systems.vision.people.people_detector import PeopleDetector
 from systems.vision.people.person_tracks import Track, TrackConfig, followed
 
-_KEPT = 64  # joint samples, for the one at an exposure
+_KEPT = 64  # joint samples, the newest first, for the one at an exposure
+_WIDTH = 1 + NUM_JOINTS  # time and positions
 
 
 @dataclass(frozen=True)
@@ -20,7 +22,6 @@ class _Mind:
     """What the watcher remembers."""
 
     memory: Memory
-    joints: tuple[JointSample, ...] = ()  # the newest last
     tracks: tuple[Track, ...] = ()
     next_number: int = 1
     sample: PersonSample = field(default_factory=PersonSample)
@@ -73,6 +74,7 @@ class PeopleWatcher(LeafSystem):
         self._tracks, self._joint_period = tracks or TrackConfig(), joint_period
         self._images = self.DeclareAbstractInputPort("image_sample", Value[object](ImageSample()))
         self._joints = self.DeclareAbstractInputPort("joint_sample", Value(JointSample()))
+        self._kept = self.DeclareDiscreteState(np.tile([-np.inf, *np.zeros(NUM_JOINTS)], _KEPT))
         self._state = self.DeclareAbstractState(Value[object](_Mind(memory)))
         self.DeclareAbstractOutputPort(
             "person_sample",
@@ -80,33 +82,28 @@ class PeopleWatcher(LeafSystem):
             lambda context, output: output.set_value(self._mind(context).sample),
             {self.abstract_state_ticket(self._state)},
         )
-        self.DeclarePeriodicUnrestrictedUpdateEvent(joint_period, 0.0, self._keep_joints)
+        self.DeclarePeriodicDiscreteUpdateEvent(joint_period, 0.0, self._keep_joints)
         self.DeclarePeriodicUnrestrictedUpdateEvent(period, latency, self._work)
 
     def _mind(self, context: Context) -> _Mind:
         return context.get_abstract_state(int(self._state)).get_value()
 
-    def _keep_joints(self, context: Context, state: State) -> None:
-        mind, sample = self._mind(context), self._joints.Eval(context)
-        if not mind.joints or sample.time > mind.joints[-1].time:
-            state.get_mutable_abstract_state(int(self._state)).set_value(
-                _Mind(
-                    mind.memory, (*mind.joints, sample)[-_KEPT:], mind.tracks, mind.next_number, mind.sample
-                )
-            )
+    def _keep_joints(self, context: Context, discrete_state: DiscreteValues) -> None:
+        kept, sample = discrete_state.get_mutable_value(self._kept), self._joints.Eval(context)
+        if sample.time > kept[0]:
+            kept[_WIDTH:] = kept[:-_WIDTH].copy()
+            kept[:_WIDTH] = sample.time, *sample.position
 
     def _work(self, context: Context, state: State) -> None:
         mind, images = self._mind(context), self._images.Eval(context)
-        if not images.time > mind.sample.time or not mind.joints:
+        joints = context.get_discrete_state(self._kept).value().reshape(-1, _WIDTH)
+        nearest = joints[np.argmin(np.abs(joints[:, 0] - images.time))]
+        is_known = abs(nearest[0] - images.time) <= 1.5 * self._joint_period
+        if not (images.time > mind.sample.time and is_known):
             return
-        nearest = min(mind.joints, key=lambda each: abs(each.time - images.time))
-        if abs(nearest.time - images.time) > 1.5 * self._joint_period:
-            return
-        seen, memory = self._detector.detect(mind.memory, images.images, nearest.position)
+        seen, memory = self._detector.detect(mind.memory, images.images, nearest[1:])
         tracks, people, number = followed(
             mind.tracks, mind.next_number, images.time, seen.bodies, self._edge, self._tracks
         )
         sample = PersonSample(images.time, seen.trusted, people)
-        state.get_mutable_abstract_state(int(self._state)).set_value(
-            _Mind(memory, mind.joints, tracks, number, sample)
-        )
+        state.get_mutable_abstract_state(int(self._state)).set_value(_Mind(memory, tracks, number, sample))

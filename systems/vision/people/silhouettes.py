@@ -8,6 +8,7 @@ from systems.vision.camera_model import Cameras
 from systems.vision.sphere_images import sphere_images
 
 _CORNERS = 16  # of the polygon that stands for the outline of a ball
+_FAR = 1e5  # px, what is close to a lens may reach that far out of its image
 _FINE = 4  # bits behind the point of a pixel
 
 
@@ -40,7 +41,7 @@ def silhouettes(
     for mask, shapes in zip(masks, outlines, strict=True):
         for points in shapes:
             if np.isfinite(points).all():
-                hull = cv2.convexHull(points.astype(np.float32))
+                hull = cv2.convexHull(np.clip(points, -_FAR, _FAR).astype(np.float32))
                 corners = np.rint(hull * (1 << _FINE)).astype(np.int32)
                 cv2.fillConvexPoly(mask, corners, (1.0,), cv2.LINE_8, _FINE)
     return masks

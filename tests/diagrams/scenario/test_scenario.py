@@ -37,6 +37,7 @@ def test_the_shipped_scenarios_load_by_name_and_say_what_they_are():
         "misaligned",
         "nominal",
         "probst-6-7",
+        "watched",
     ]
     for name in shipped_scenarios():
         assert len(load_scenario(name).description) > 40

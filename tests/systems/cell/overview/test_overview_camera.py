@@ -28,7 +28,7 @@ def test_images_show_the_robot_at_their_exposure_and_arrive_after_the_delay():
     for tick in range(100):
         now = 0.005 * tick
         turn = np.deg2rad(100.0 * now)
-        camera.GetInputPort("position").FixValue(context, [turn, 0.5, 0, 0, 0.5, 0])
+        camera.GetInputPort("motor_state").FixValue(context, [turn, 0.5, 0, 0, 0.5, 0, *np.zeros(6)])
         simulator.AdvanceTo(now + 1e-6)
         sample = port.Eval(context)
         if np.isfinite(sample.time) and sample.time not in arrivals:

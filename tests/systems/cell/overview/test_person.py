@@ -13,6 +13,12 @@ def way(*points: tuple[float, float], rest: float = 0.0, **config) -> WalkingPer
     return WalkingPerson(PersonConfig(steps, **config), FLOOR)
 
 
+def trunk_of(person: WalkingPerson, time: float) -> np.ndarray:
+    capsules = person.at(time)
+    assert capsules is not None
+    return capsules.start[1]
+
+
 def test_the_figure_is_as_tall_as_an_adult_and_stands_on_the_floor():
     person = figure(np.array([1.0, 2.0]), 0.7, FLOOR)
     ends = np.concatenate([person.start, person.end])
@@ -35,14 +41,14 @@ def test_limbs_keep_their_lengths_and_hang_together_while_it_walks():
 def test_it_walks_with_its_speed_rests_and_leaves():
     person = way((0.0, 0.0), (3.0, 0.0), rest=1.0, speed=1.5, start=2.0)
     assert person.at(1.9) is None
-    trunk = [person.at(t).start[1] for t in (2.5, 3.0, 4.0, 5.0, 5.5)]
+    trunk = [trunk_of(person, t) for t in (2.5, 3.0, 4.0, 5.0, 5.5)]
     np.testing.assert_allclose([p[0] for p in trunk], [0.0, 0.0, 1.5, 3.0, 3.0], atol=1e-9)
     assert person.end == pytest.approx(6.0)
     assert person.at(6.0) is None
 
 
 def test_at_a_single_point_it_stays():
-    assert way((1.0, 1.0)).at(1e6).start[1, :2] == pytest.approx([1.0, 1.0])
+    assert trunk_of(way((1.0, 1.0)), 1e6)[:2] == pytest.approx([1.0, 1.0])
 
 
 def test_a_way_without_points_is_refused():

@@ -37,5 +37,5 @@ def test_at_the_largest_share_the_distance_is_the_protective_one(share):
 
 def test_a_robot_that_cannot_brake_as_hard_needs_longer():
     velocity = np.array([1.0, 0.0, -3.0, 0.0, 0.0, 0.0])
-    assert stopping_time(CONFIG, velocity, np.full(6, 100.0)) == CONFIG.stop_time
-    assert stopping_time(CONFIG, velocity, np.full(6, 5.0)) == pytest.approx(0.6)
+    assert stopping_time(0.25, velocity, np.full(6, 100.0)) == 0.25
+    assert stopping_time(0.25, velocity, np.full(6, 5.0)) == pytest.approx(0.6)

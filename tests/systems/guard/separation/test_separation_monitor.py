@@ -25,7 +25,7 @@ class Walk:
     """A monitor whose inputs are set step by step: a person on the x axis, a path run with the share."""
 
     def __init__(self, config: SeparationConfig = CONFIG) -> None:
-        self.monitor = SeparationMonitor(ROBOT, ARM, config, REACTION)
+        self.monitor = SeparationMonitor(ROBOT, ARM, config, REACTION, 0.25)
         self.simulator = Simulator(self.monitor)
         self.context = self.simulator.get_mutable_context()
         self.period = config.period
@@ -43,6 +43,7 @@ class Walk:
             ("person_sample", Value[object](PersonSample(exposed, trusted, people))),
             ("joint_sample", Value(JointSample(now))),
             ("velocity_command", share * SPEED),
+            ("path_time", [now, share]),
             ("acknowledge", [float(acknowledge)]),
         ):
             self.monitor.GetInputPort(name).FixValue(self.context, value)
@@ -84,7 +85,8 @@ def test_without_images_it_slows_and_then_stops():
     assert result[2]["age"] == pytest.approx(CONFIG.stop_after, abs=1.5 * CONFIG.period)
     slow = np.array(ages) > CONFIG.slow_after + 1e-9
     np.testing.assert_array_equal(np.array(shares)[~slow], 1.0)
-    assert np.all(np.diff(np.array(shares)[slow]) < 0.0)
+    assert np.all(np.diff(np.array(shares)[slow]) <= 0.0)
+    assert shares[-1] < 0.1
 
 
 def test_images_that_are_not_trusted_are_as_good_as_none():
@@ -118,4 +120,4 @@ def test_before_the_first_images_it_does_not_move():
 )
 def test_times_that_contradict_each_other_are_refused(change, says):
     with pytest.raises(ValueError, match=says):
-        SeparationMonitor(ROBOT, ARM, replace(CONFIG, **change), REACTION)
+        SeparationMonitor(ROBOT, ARM, replace(CONFIG, **change), REACTION, 0.25)

@@ -1,5 +1,6 @@
 """What tests of people share: the cell with small images, and pictures painted without a renderer."""
 
+from collections.abc import Sequence
 from functools import cache
 
 import numpy as np
@@ -7,6 +8,7 @@ import numpy as np
 from robots.description.model import load_robot
 from robots.kinematics.arm_capsules import Capsules
 from systems.cell.overview.person import figure
+from systems.vision.camera_model import Cameras
 from systems.vision.camera_rig import load_cell
 from systems.vision.people.people_detector import DetectorConfig, PeopleDetector, reduced
 from systems.vision.people.silhouettes import silhouettes
@@ -26,17 +28,30 @@ def detector() -> PeopleDetector:
     return PeopleDetector(ROBOT, CAMERAS, SIZE, SURROUNDINGS, CONFIG)
 
 
+class Painted:
+    """Pictures of a mottled cell with the robot and people painted in front of everything."""
+
+    def __init__(self, cameras: Cameras = CAMERAS, size: tuple[int, int] = SIZE) -> None:
+        self._cameras, self._size = cameras, size
+        width, height = size
+        mottled = np.random.default_rng(7).uniform(60, 140, (len(cameras), height, width, 3))
+        self._empty = mottled.astype(np.uint8)
+
+    def take(self, robot: Capsules, people: Sequence[Capsules | None]) -> np.ndarray:
+        images = self._empty.copy()
+        images[silhouettes(self._cameras, robot, self._size) > 0] = (20, 120, 230)
+        for person in people:
+            if person is not None:
+                images[silhouettes(self._cameras, person, self._size) > 0] = (170, 60, 30)
+        return images
+
+
 def painted(
     capsules: Capsules | None, q: np.ndarray, rng: np.random.Generator, gain: float = 1.0
 ) -> np.ndarray:
-    """Images of a mottled cell with the robot and a person in front of everything, with noise of 3/255."""
-    width, height = SIZE
-    mottled = np.random.default_rng(7).uniform(60, 140, (len(CAMERAS), height, width, 3))
-    images = mottled.astype(np.float32)
-    images[silhouettes(CAMERAS, detector().arm.at(q), SIZE) > 0] = (20, 120, 230)
-    if capsules is not None:
-        images[silhouettes(CAMERAS, capsules, SIZE) > 0] = (170, 60, 30)
-    images = gain * images + 3.0 * rng.standard_normal(images.shape, dtype=np.float32)
+    """Painted images at joint positions q, with noise of 3/255."""
+    images = gain * Painted().take(detector().arm.at(q), [capsules]).astype(np.float32)
+    images += 3.0 * rng.standard_normal(images.shape, dtype=np.float32)
     return np.clip(np.rint(images), 0, 255).astype(np.uint8)
 
 
