@@ -30,6 +30,7 @@ from experiments.cli.options import (
     AnyScenarioOption,
     CameraOption,
     FeedforwardOption,
+    FoxgloveOption,
     JobsOption,
     LapsOption,
     McapOption,
@@ -65,7 +66,13 @@ from experiments.robots.command import robots_app
 from experiments.robustness.command import robustness_command
 from experiments.scenarios.command import scenarios_command
 from experiments.station.cell_command import cell_command
-from experiments.station.guided_command import Guided, ask_before_moving, guide, on_station
+from experiments.station.guided_command import (
+    Guided,
+    ask_before_moving,
+    foxglove_server,
+    guide,
+    on_station,
+)
 from experiments.station.latency_command import latency_command
 from experiments.study.command import study_command
 from experiments.zeros.command import zeros_command
@@ -150,6 +157,7 @@ def compare_command(
     scheduler: SchedulerOption = None,
     write: WriteOption = None,
     mcap: McapOption = False,
+    foxglove: FoxgloveOption = None,
 ) -> None:
     """Run several laws on one scenario, by default the open loop and three others, and compare them."""
     human = human_console(json_file)
@@ -169,13 +177,14 @@ def compare_command(
         is_guided = prepared.scenario.station.kind != "simulated"
         if is_guided:
             ask_before_moving(human, prepared, with_cell or yes)
+        viewer = foxglove_server(human, prepared, foxglove)
     guided: Guided | None = None
     with json_output(json_file) as output, refusing(OSError), ExitStack() as stack:
         stage = stack.enter_context(staged_folder(out))
         keep_robot = robot_writer(stack, write, chosen)
         stack.enter_context(output.staged())
         if is_guided:
-            guided = guide(human, (stage, out), prepared, chosen, cycles, with_cell)
+            guided = guide(human, (stage, out), prepared, chosen, cycles, with_cell, viewer)
             logs = guided.logs
         else:
             runs = cycles * len(chosen)
@@ -211,6 +220,7 @@ def run_command(
     ] = None,
     write: WriteOption = None,
     mcap: McapOption = False,
+    foxglove: FoxgloveOption = None,
 ) -> None:
     """Run one law."""
     console = Console()
@@ -229,13 +239,14 @@ def run_command(
             if meshcat or realtime is not None:
                 raise ValueError("--meshcat and --realtime belong to a simulated station")
             ask_before_moving(console, prepared, with_cell or yes)
+        viewer = foxglove_server(console, prepared, foxglove)
     guided: Guided | None = None
     view: LiveView | None = None
     with refusing(OSError), ExitStack() as stack:
         stage = stack.enter_context(staged_folder(out))
         keep_robot = robot_writer(stack, write, [law])
         if is_guided:
-            guided = guide(console, (stage, out), prepared, [law], 1, with_cell)
+            guided = guide(console, (stage, out), prepared, [law], 1, with_cell, viewer)
             logs = guided.logs
         else:
             experiment = Experiment(prepared.scenario, law, prepared.robot)

@@ -5,7 +5,7 @@ import json
 import time
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 from mcap.writer import CompressionType, Writer
@@ -28,21 +28,31 @@ _FLUSH = 1.0  # s, the longest time until what is logged is on the disk
 SCENARIO, RUN = "scenario.yaml", "run"  # names of the attachment and of the metadata
 
 
+class Viewer(Protocol):
+    """Who is told of the messages too, as `diagrams.record.foxglove_server.FoxgloveServer` is."""
+
+    def write(self, topic: str, at: float, message: Mapping[str, Any]) -> None:
+        """Takes a message of a topic of `SCHEMAS` at a time of the path in s."""
+        ...
+
+
 class RunRecord:
     """Writes messages to a file as they come; a full disk ends the writing and not the run."""
 
-    def __init__(self, path: str | Path, scenario: str) -> None:
+    def __init__(self, path: str | Path, scenario: str, viewer: Viewer | None = None) -> None:
         """Opens the file.
 
         Args:
             path: of the file, which is replaced.
             scenario: its text, for the attachment.
+            viewer: is told of every message too.
 
         Raises:
             OSError: if the file cannot be written.
         """
         self.path = Path(path)
         self.problem = ""  # why nothing is written any more, in words
+        self._viewer = viewer
         self._file = self.path.open("wb")
         self._writer = Writer(self._file, compression=CompressionType.LZ4)
         self._writer.start(profile="", library="truetip")
@@ -53,6 +63,8 @@ class RunRecord:
 
     def write(self, topic: str, at: float, message: Mapping[str, Any]) -> None:
         """Logs a message of a topic of `SCHEMAS` at a time of the path in s."""
+        if self._viewer is not None:
+            self._viewer.write(topic, at, message)
         if self.problem:
             return
         try:

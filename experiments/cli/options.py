@@ -114,6 +114,14 @@ def json_option(text: str) -> Any:
 
 
 JsonOption = Annotated[str | None, json_option("The numbers; - prints them, and nothing else.")]
+FoxgloveOption = Annotated[
+    str | None,
+    typer.Option(
+        "--foxglove",
+        metavar="[HOST:]PORT",
+        help="Show a run on a station live in Foxglove, on this machine unless a host is named.",
+    ),
+]
 McapOption = Annotated[
     bool,
     typer.Option("--mcap", help="Write every simulated run as LAW-CYCLE.mcap too; on hardware always."),

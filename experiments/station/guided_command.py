@@ -10,6 +10,7 @@ import numpy as np
 import typer
 from rich.console import Console
 
+from diagrams.record.foxglove_server import FoxgloveServer
 from diagrams.record.log import RunLog
 from diagrams.record.run_record import RunRecord
 from diagrams.runs.real_time import RealTimeRecord
@@ -24,6 +25,7 @@ from experiments.report.style import law_file_name
 from experiments.station.guided import compare_on_station
 from systems.link.makers import LINK_NAMES
 from systems.link.udp_channel import ChannelError, is_loopback
+from systems.reference.paths import make_path
 
 _CELLS = {"rsi": "cell-kuka"}  # the shipped scenario of a link, where it is not ``cell``
 
@@ -83,6 +85,7 @@ def guide(
     laws: Sequence[str],
     cycles: int,
     with_cell: bool,
+    viewer: FoxgloveServer | None = None,
 ) -> Guided:
     """Runs laws on a station, writes ``link.json`` and the whole logs, and says what happened on the wire.
 
@@ -96,6 +99,7 @@ def guide(
         laws: which laws.
         cycles: runs of each law.
         with_cell: whether to start a virtual cell.
+        viewer: sees what is recorded at once.
 
     Raises:
         SimulationError: if the station is not there or no run has come as far as its path.
@@ -109,7 +113,7 @@ def guide(
         # Where it stays: what is only moved there in the end is lost with the process.
         out.mkdir(parents=True, exist_ok=True)
         path = out / f"{law_file_name(law)}-{number}.mcap"
-        streams.append(RunRecord(path, scenario_text(prepared.scenario)))
+        streams.append(RunRecord(path, scenario_text(prepared.scenario), viewer))
         return streams[-1]
 
     label = f"{count(cycles * len(laws), 'run')} on {where}"
@@ -142,6 +146,27 @@ def guide(
         Guided({}, endings, end.code).conclude()
         raise SimulationError(f"{'; '.join(endings)}; see {out / 'link.json'}")
     return Guided(known, endings, end.code or (BROKEN_OFF if endings else 0))
+
+
+def foxglove_server(console: Console, prepared: Prepared, address: str | None) -> FoxgloveServer | None:
+    """A server that shows the runs of a station, if somebody wants one, with the wanted path in it.
+
+    Raises:
+        ValueError: if the station is simulated, or the address cannot be read.
+        OSError: if the port is taken.
+    """
+    if address is None:
+        return None
+    if prepared.scenario.station.kind == "simulated":
+        raise ValueError(
+            "--foxglove shows runs on a station as they go on; a simulated run is recorded by --mcap, which "
+            "Foxglove opens"
+        )
+    server = FoxgloveServer(address, prepared.robot)
+    path = make_path(prepared.scenario.reference)
+    server.show_path(path.sample(np.linspace(path.path_start, path.dwell_start, 500))[0][:, :3, 3])
+    console.print(f"Foxglove: open {server.address}")
+    return server
 
 
 def _has_begun(record: RealTimeRecord) -> bool:
