@@ -68,8 +68,8 @@ class LeastSquaresCorrection:
 
     Axes 1 and 3 have a damping of their own, by how far the wrist is from axis 1 and by how far the elbow is
     bent. Robots move their wrist past axis 1 and stretch their arm, and what these levers ask for when they
-    are short would turn about within a few ticks. Damping begins where the wrist is still far from axis 1: what
-    fades out within some hundredths of a second shakes the arm more than what it corrects.
+    are short would turn about within a few ticks. Damping begins where the wrist is still far from axis 1: a
+    correction that fades out within some hundredths of a second shakes the arm more than it helps.
     """
 
     def __init__(self, robot: RobotModel, arm: DeformedArm) -> None:
