@@ -1,9 +1,13 @@
 """How late this machine itself was: a run that ends early may have ended for want of a processor."""
 
+import os
 from pathlib import Path
 
 _LATE = 1e-3  # s, above what a wake-up takes
 _SCHEDULED = Path("/proc/self/schedstat")  # ns on a processor, ns of waiting for one; Linux
+_STAT = Path(
+    "/proc/stat"
+)  # its first line: ticks of all processors by use, the eighth stolen by other guests
 
 
 class HostLateness:
@@ -14,7 +18,7 @@ class HostLateness:
         self.messages = self.late = 0
         self.worst = self.worst_at = 0.0  # s
         self._since_message = 0.0  # s, the worst since the last message
-        self._waited = _waited()
+        self._waited, self._stolen = _waited(), _stolen()
 
     def note(self, late: float, at: float, is_message: bool = False) -> None:
         """Counts a message, or a delay.
@@ -37,12 +41,25 @@ class HostLateness:
         """How long this process has waited for a processor since the start, in s; 0 where nobody counts."""
         return _waited() - self._waited
 
+    @property
+    def stolen(self) -> float:
+        """How long processors of this machine were another one's since the start, in s, summed over them."""
+        return _stolen() - self._stolen
+
     def sentence(self, began: float) -> str:
         """In words, with times since ``began`` in s."""
         return (
             f"this machine was late by {1e3 * self.worst:.0f} ms at {max(0.0, self.worst_at - began):.1f} s "
-            f"({self.late} of {self.messages} messages late, {self.waited:.1f} s of waiting for a processor)"
+            f"({self.late} of {self.messages} messages late, {self.waited:.1f} s of waiting for a "
+            f"processor, {self.stolen:.1f} s stolen by other machines)"
         )
+
+
+def _stolen() -> float:
+    try:
+        return float(_STAT.read_text().split("\n", 1)[0].split()[8]) / os.sysconf("SC_CLK_TCK")
+    except (OSError, ValueError, IndexError):
+        return 0.0
 
 
 def _waited() -> float:

@@ -35,6 +35,7 @@ from experiments.cli.options import (
     LapsOption,
     McapOption,
     OutOption,
+    RealTimeOption,
     RobotOption,
     ScenarioOption,
     SchedulerOption,
@@ -72,6 +73,7 @@ from experiments.station.guided_command import (
     foxglove_server,
     guide,
     on_station,
+    refuse_real_time,
 )
 from experiments.station.latency_command import latency_command
 from experiments.study.command import study_command
@@ -158,6 +160,7 @@ def compare_command(
     write: WriteOption = None,
     mcap: McapOption = False,
     foxglove: FoxgloveOption = None,
+    realtime: RealTimeOption = None,
 ) -> None:
     """Run several laws on one scenario, by default the open loop and three others, and compare them."""
     human = human_console(json_file)
@@ -178,13 +181,14 @@ def compare_command(
         if is_guided:
             ask_before_moving(human, prepared, with_cell or yes)
         viewer = foxglove_server(human, prepared, foxglove)
+        refuse_real_time(prepared, realtime)
     guided: Guided | None = None
     with json_output(json_file) as output, refusing(OSError), ExitStack() as stack:
         stage = stack.enter_context(staged_folder(out))
         keep_robot = robot_writer(stack, write, chosen)
         stack.enter_context(output.staged())
         if is_guided:
-            guided = guide(human, (stage, out), prepared, chosen, cycles, with_cell, viewer)
+            guided = guide(human, (stage, out), prepared, chosen, cycles, with_cell, viewer, realtime)
             logs = guided.logs
         else:
             runs = cycles * len(chosen)
@@ -214,18 +218,19 @@ def run_command(
     yes: YesOption = False,
     out: OutOption = Path("out"),
     meshcat: Annotated[bool, typer.Option("--meshcat", help="Show it live in a browser.")] = False,
-    realtime: Annotated[
+    pace: Annotated[
         float | None,
-        typer.Option(metavar="RATE", help="Largest real-time factor: 1 is real time."),
+        typer.Option(metavar="RATE", help="Largest real-time factor of a simulation: 1 is real time."),
     ] = None,
     write: WriteOption = None,
     mcap: McapOption = False,
     foxglove: FoxgloveOption = None,
+    realtime: RealTimeOption = None,
 ) -> None:
     """Run one law."""
     console = Console()
     with refusing(ValueError, OSError):
-        positive("--realtime", realtime)
+        positive("--pace", pace)
         changes = _settings(settings, law, feedforward, camera, laps)
         name, changes = on_station(scenario, changes, station, with_cell)
         prepared = prepare(name, changes, robot)
@@ -236,25 +241,26 @@ def run_command(
         print_note(console, prepared.note)
         is_guided = prepared.scenario.station.kind != "simulated"
         if is_guided:
-            if meshcat or realtime is not None:
-                raise ValueError("--meshcat and --realtime belong to a simulated station")
+            if meshcat or pace is not None:
+                raise ValueError("--meshcat and --pace belong to a simulated station")
             ask_before_moving(console, prepared, with_cell or yes)
         viewer = foxglove_server(console, prepared, foxglove)
+        refuse_real_time(prepared, realtime)
     guided: Guided | None = None
     view: LiveView | None = None
     with refusing(OSError), ExitStack() as stack:
         stage = stack.enter_context(staged_folder(out))
         keep_robot = robot_writer(stack, write, [law])
         if is_guided:
-            guided = guide(console, (stage, out), prepared, [law], 1, with_cell, viewer)
+            guided = guide(console, (stage, out), prepared, [law], 1, with_cell, viewer, realtime)
             logs = guided.logs
         else:
             experiment = Experiment(prepared.scenario, law, prepared.robot)
             view = LiveView(experiment, prepared.nominal_robot) if meshcat else None
             if view:
                 console.print(f"Watch it at {view.address}")
-            if realtime is not None:
-                experiment.simulator.set_target_realtime_rate(realtime)
+            if pace is not None:
+                experiment.simulator.set_target_realtime_rate(pace)
                 experiment.simulator.ResetStatistics()  # the pace counts from here
             with simulating(law, prepared.scenario.seed), progress_bar(law) as progress:
                 if view:

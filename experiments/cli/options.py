@@ -114,6 +114,14 @@ def json_option(text: str) -> Any:
 
 
 JsonOption = Annotated[str | None, json_option("The numbers; - prints them, and nothing else.")]
+RealTimeOption = Annotated[
+    int | None,
+    typer.Option(
+        "--realtime",
+        metavar="PRIORITY",
+        help="On a station: run before all other processes (SCHED_FIFO, 1 to 99), memory locked.",
+    ),
+]
 FoxgloveOption = Annotated[
     str | None,
     typer.Option(

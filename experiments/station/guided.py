@@ -112,6 +112,7 @@ def _link_json(record: RealTimeRecord) -> dict[str, Any]:
             "late": record.host.late,
             "worst_ms": 1e3 * record.host.worst,
             "waited_s": record.host.waited,
+            "stolen_s": record.host.stolen,
         },
         "controller": record.counters,
         "camera": record.camera,

@@ -10,6 +10,7 @@ import numpy as np
 import typer
 from rich.console import Console
 
+from diagrams.real_time_priority import real_time_priority
 from diagrams.record.foxglove_server import FoxgloveServer
 from diagrams.record.log import RunLog
 from diagrams.record.run_record import RunRecord
@@ -86,6 +87,7 @@ def guide(
     cycles: int,
     with_cell: bool,
     viewer: FoxgloveServer | None = None,
+    priority: int | None = None,
 ) -> Guided:
     """Runs laws on a station, writes ``link.json`` and the whole logs, and says what happened on the wire.
 
@@ -100,6 +102,7 @@ def guide(
         cycles: runs of each law.
         with_cell: whether to start a virtual cell.
         viewer: sees what is recorded at once.
+        priority: of the real-time scheduler, None to do without.
 
     Raises:
         SimulationError: if the station is not there or no run has come as far as its path.
@@ -117,11 +120,16 @@ def guide(
         return streams[-1]
 
     label = f"{count(cycles * len(laws), 'run')} on {where}"
-    with refusing(ChannelError), asking() as end, progress_bar(label) as progress:
+    with (
+        refusing(ChannelError),
+        asking() as end,
+        progress_bar(label) as progress,
+        real_time_priority(priority),
+    ):
         comparison = compare_on_station(
             prepared.scenario, prepared.robot, laws, cycles, with_cell, progress, end.is_asked, recording
         )
-    link = comparison.link_json()
+    link = {**comparison.link_json(), "realtime_priority": priority}
     write_json(stage / "link.json", link)
     records = [
         (law, n, record) for law, all_ in comparison.records.items() for n, record in enumerate(all_, 1)
@@ -146,6 +154,14 @@ def guide(
         Guided({}, endings, end.code).conclude()
         raise SimulationError(f"{'; '.join(endings)}; see {out / 'link.json'}")
     return Guided(known, endings, end.code or (BROKEN_OFF if endings else 0))
+
+
+def refuse_real_time(prepared: Prepared, priority: int | None) -> None:
+    """Refuses a priority where nobody waits for this process, or nobody permits it. Raises ValueError."""
+    if priority is not None and prepared.scenario.station.kind == "simulated":
+        raise ValueError("--realtime is for runs on a station; --pace 1 simulates in real time")
+    with real_time_priority(priority):
+        pass
 
 
 def foxglove_server(console: Console, prepared: Prepared, address: str | None) -> FoxgloveServer | None:

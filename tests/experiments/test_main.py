@@ -43,7 +43,7 @@ REFUSED = {
     "empty law": (["run", "--law="], "law must be one of open_loop, numerical_ik"),
     "no cycle": (["compare", "--cycles=0"], "--cycles must be at least 1, got 0"),
     "no process": (["compare", "--jobs=0"], "--jobs must be at least 1, got 0"),
-    "no pace": (["run", "--realtime=0"], "--realtime must be positive, got 0"),
+    "no pace": (["run", "--pace=0"], "--pace must be positive, got 0"),
     "folder is a file": (["compare", "--out=broken.yaml"], "broken.yaml"),
     "folder in a file": (["run", "--out=broken.yaml/out"], "cannot write in folder broken.yaml/out"),
     "json is a folder": (["compare", "--json=."], "it is a folder"),
@@ -152,7 +152,7 @@ def test_an_interrupted_comparison_leaves_nothing(tmp_path, monkeypatch):
 
 
 def test_the_pace_of_a_run_can_be_set(tmp_path):
-    assert truetip("run", "--law=open_loop", "--realtime=1.5", *SHORT).exit_code == 0
+    assert truetip("run", "--law=open_loop", "--pace=1.5", *SHORT).exit_code == 0
     timing = json.loads((tmp_path / "out/timing.json").read_text())["runs"]["open_loop"]
     # Slower on a busy machine, but never faster than it was told.
     assert timing["real_time_factor"] < 1.5 * 1.05

@@ -17,6 +17,6 @@ def test_the_least_is_allowed_and_one_less_refused():
 @pytest.mark.parametrize("number", [0.0, -2.5, math.inf, math.nan])
 def test_only_positive_and_finite_numbers_are_positive(number: float):
     for allowed in (1e-300, None):
-        positive("--realtime", allowed)
-    with pytest.raises(ValueError, match=rf"^--realtime must be positive, got {number:g}$"):
-        positive("--realtime", number)
+        positive("--pace", allowed)
+    with pytest.raises(ValueError, match=rf"^--pace must be positive, got {number:g}$"):
+        positive("--pace", number)
