@@ -77,6 +77,7 @@ from experiments.station.guided_command import (
 )
 from experiments.station.latency_command import latency_command
 from experiments.study.command import study_command
+from experiments.watch.command import watch_command
 from experiments.zeros.command import zeros_command
 from systems.servo import LAWS
 
@@ -319,6 +320,7 @@ app.command("chain")(chain_command)
 app.command("tool")(tool_command)
 app.command("align")(align_command)
 app.add_typer(robots_app, name="robots")
+app.command("watch")(watch_command)
 app.command("scenarios")(scenarios_command)
 
 

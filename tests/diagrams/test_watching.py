@@ -10,8 +10,9 @@ from diagrams.scenario.scenario import load_scenario
 from diagrams.watching import Watch, make_watch
 from robots.description.model import load_robot
 from robots.pose import pose_error
+from systems.cell.overview.person import gap
 from systems.guard.separation.separation_monitor import STATUS
-from tests.systems.vision.people.rigs import Painted, gap
+from tests.systems.vision.people.rigs import Painted
 
 COARSE = ["station.overview.width=320", "servo.people.hull.edge=0.1"]
 ROBOT = load_robot("irb1200")

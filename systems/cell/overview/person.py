@@ -13,6 +13,7 @@ from robots.kinematics.arm_capsules import Capsules
 
 _SKIN, _SHIRT, _TROUSERS, _SHOES = (0.85, 0.65, 0.52), (0.2, 0.35, 0.6), (0.15, 0.15, 0.2), (0.1, 0.08, 0.08)
 COLORS = (_SKIN, _SHIRT, _SHIRT, *(_TROUSERS, _TROUSERS, _SHOES, _SHIRT, _SKIN) * 2)  # of each capsule
+_ALONG = np.linspace(0.0, 1.0, 50)[:, None]  # the axis of a limb
 _STRIDE = 1.4  # m, two steps
 _SWING, _KNEE, _ELBOW = 0.42, 0.7, 0.35  # rad, largest angles of hip and shoulder, knee and elbow
 _HIP, _KNEE_LENGTH, _SHANK = 0.92, 0.43, 0.42  # m, height and lengths
@@ -114,6 +115,14 @@ def figure(place: np.ndarray, yaw: float, floor: float, phase: float = 0.0, swin
     c, s = np.cos(yaw), np.sin(yaw)
     R, p = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]]), np.append(place, floor - lowest)
     return Capsules(start @ R.T + p, end @ R.T + p, radius)
+
+
+def gap(person: Capsules, arm: Capsules) -> float:
+    """The distance in m of a person from the arm, from points along the axes of the limbs."""
+    return min(
+        float(arm.distances(start + _ALONG * (end - start)).min() - radius)
+        for start, end, radius in zip(person.start, person.end, person.radius, strict=True)
+    )
 
 
 def _down(angle: float) -> np.ndarray:

@@ -72,13 +72,13 @@ class PeopleDetector:
         config: DetectorConfig,
     ) -> None:
         """``cameras`` are those of the images, which have ``size`` (width, height) in px."""
-        self._config, self._cameras, self._size = config, cameras, size
+        self._config, self.cameras, self._size = config, cameras, size
         self.arm = watched_arm(robot, config)
         self._hull = VisualHull(cameras, size, surroundings, config.hull)
 
     def masks(self, q: np.ndarray) -> np.ndarray:
         """Where the robot is seen at joint positions (6,) in rad, with its margin, (n, height, width)."""
-        return silhouettes(self._cameras, self.arm.at(q), self._size, self._config.robot_margin)
+        return silhouettes(self.cameras, self.arm.at(q), self._size, self._config.robot_margin)
 
     def learn(self, images: list[np.ndarray], joints: list[np.ndarray]) -> Memory:
         """What the empty cell looks like, from sets of images and where the robot was."""
@@ -99,7 +99,7 @@ class PeopleDetector:
             ValueError: if the images have another number or size.
         """
         width, height = self._size
-        expected = (len(self._cameras), height, width, 3)
+        expected = (len(self.cameras), height, width, 3)
         if images.shape != expected:
             raise ValueError(
                 f"images must be {expected[0]} of {width} x {height} px in three colours, got {images.shape}"

@@ -57,12 +57,3 @@ def painted(
 
 def person_at(x: float, y: float) -> Capsules:
     return figure(np.array([x, y]), 0.3, SURROUNDINGS.floor)
-
-
-def gap(person: Capsules, arm: Capsules) -> float:
-    """The distance in m between a person and the arm, from points along the axes of its limbs."""
-    along = np.linspace(0.0, 1.0, 50)[:, None]
-    return min(
-        float(arm.distances(start + along * (end - start)).min() - radius)
-        for start, end, radius in zip(person.start, person.end, person.radius, strict=True)
-    )

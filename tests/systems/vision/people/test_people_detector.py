@@ -3,8 +3,9 @@
 import numpy as np
 import pytest
 
+from systems.cell.overview.person import gap
 from systems.vision.people.background import Memory
-from tests.systems.vision.people.rigs import ARMS, CAMERAS, SIZE, detector, gap, painted, person_at
+from tests.systems.vision.people.rigs import ARMS, CAMERAS, SIZE, detector, painted, person_at
 
 RNG = np.random.default_rng(5)
 MEMORY = detector().learn([painted(None, q, RNG) for q in ARMS], ARMS)

@@ -1,0 +1,217 @@
+"""Pages of `truetip watch`: timeline, plan of the cell with zones, pictures with hull and boxes, errors."""
+
+from base64 import b64encode
+from pathlib import Path
+
+import cv2
+import numpy as np
+import plotly.graph_objects as go
+
+from experiments.report.plot_page import Section, html_table, write_plot_page
+from experiments.watch.run import WatchRun, parts
+from experiments.watch.study import WatchStudy
+from systems.vision.camera_model import Cameras
+from systems.vision.people.surroundings import Surroundings
+
+AID = "An aid, not a safety function: it must not replace fences, light curtains or a rated controller."
+_SHOWN = 4  # cameras
+_HULL, _BOX = (60, 60, 230), (0, 200, 255)  # blue, green, red
+
+
+def write_run_page(
+    path: str | Path, title: str, run: WatchRun, cameras: Cameras, ground: Surroundings
+) -> None:
+    """Writes the page of a run.
+
+    Args:
+        path: where to.
+        title: of the page.
+        run: what happened.
+        cameras: of the pictures.
+        ground: what stands in the cell.
+    """
+    sections = [
+        Section("Distance and speed", "Distances in m; the speed is that of the path.", _timeline(run), 520),
+        Section(
+            "Plan of the cell",
+            "The way of the nearest person, and the zones about the base.",
+            _plan(run, ground),
+            620,
+        ),
+        Section("Protective distance", "Terms of ISO/TS 15066 at full speed.", _terms(run)),
+    ]
+    if run.snapshot is not None:
+        note = f"At {run.snapshot.time:.2f} s: dots are the middles of the cubes of the hull."
+        sections.insert(2, Section("Where somebody was nearest", note, _pictures(run, cameras)))
+    write_plot_page(path, title, f"{run_verdict(run)} {AID}", sections)
+
+
+def write_study_page(path: str | Path, title: str, study: WatchStudy) -> None:
+    """Writes the page of a study."""
+    places = [each for each in study.places if np.isfinite(each.measured)]
+    errors = go.Figure(
+        go.Scatter(
+            x=[each.true for each in places],
+            y=[each.measured - each.true for each in places],
+            mode="markers",
+            hovertemplate="%{x:.2f} m: %{y:+.3f} m<extra></extra>",
+        )
+    )
+    errors.add_hline(y=0.1, line={"dash": "dot", "width": 1})
+    errors.update_layout(xaxis={"title": "true distance in m"}, yaxis={"title": "measured less true in m"})
+    plan = _ground(study.surroundings)
+    plan.add_trace(
+        go.Scatter(
+            x=[each.place[0] for each in study.places],
+            y=[each.place[1] for each in study.places],
+            mode="markers",
+            marker={
+                "color": [
+                    each.measured - each.true if np.isfinite(each.measured) else 1.0 for each in study.places
+                ],
+                "colorscale": "RdBu_r",
+                "cmid": 0.0,
+                "colorbar": {"title": "m"},
+                "size": 12,
+            },
+        )
+    )
+    sections = [
+        Section("Error of the distance", "Above the line it would be more than 0.1 m too far.", errors),
+        Section("Places", "Coloured by the error.", plan, 620),
+    ]
+    write_plot_page(path, title, f"{study_verdict(study)} {AID}", sections)
+
+
+def run_verdict(run: WatchRun) -> str:
+    """A run in a sentence or two."""
+    numbers = run.as_dict()
+    nearest = numbers["smallest_distance_m"]
+    seen = "nobody was seen" if nearest is None else f"the nearest was seen {nearest:.2f} m from the robot"
+    return (
+        f"In {numbers['duration_s']:.1f} s {seen}; {numbers['stops']} stops, "
+        f"slowed for {numbers['slowed_s']:.1f} s, "
+        f"stopped for {numbers['stopped_s']:.1f} s."
+    )
+
+
+def study_verdict(study: WatchStudy) -> str:
+    """A study in a sentence or two."""
+    numbers = study.as_dict()
+    found = f"{numbers['found']} of {numbers['places']} people found"
+    if numbers["found"]:
+        found += (
+            f", distances at most {numbers['largest_overestimate_m']:+.3f} m too far, "
+            f"{numbers['median_abs_error_m']:.3f} m off in the median"
+        )
+    empty = (
+        f" {numbers['empty_minutes']:g} minutes of the empty cell with the robot in motion and 5 % more and "
+        f"less light, {numbers['empty_sets']} sets: {numbers['false_stops']} stops."
+        if numbers["empty_sets"]
+        else ""
+    )
+    return f"{found}; {numbers['ms_per_set']:.0f} ms for a set of images.{empty}"
+
+
+def _timeline(run: WatchRun) -> go.Figure:
+    line = run.timeline
+    figure = go.Figure()
+    for name, values in (
+        ("distance, measured", line.distance),
+        ("distance, true", line.true),
+        ("protective distance", line.protective),
+    ):
+        if np.isfinite(values).any():
+            figure.add_trace(go.Scatter(x=line.time, y=values, name=name, mode="lines"))
+    figure.add_trace(
+        go.Scatter(x=line.time, y=line.rate, name="speed", yaxis="y2", mode="lines", line={"dash": "dot"})
+    )
+    figure.add_trace(
+        go.Scatter(x=line.time, y=line.stopped.astype(int), name="stop", yaxis="y2", mode="lines",
+                   fill="tozeroy", line={"width": 0}, opacity=0.3)
+    )  # fmt: skip
+    return figure.update_layout(
+        xaxis={"title": "time in s"},
+        yaxis={"title": "m", "rangemode": "tozero"},
+        yaxis2={"title": "share of the speed", "overlaying": "y", "side": "right", "range": [0, 1.05]},
+        legend={"orientation": "h", "y": 1.1},
+    )
+
+
+def _ground(ground: Surroundings) -> go.Figure:
+    """Furniture from above."""
+    figure = go.Figure()
+    for each in ground.furniture:
+        corners = each.corners[[0, 2, 6, 4, 0]]
+        figure.add_trace(
+            go.Scatter(
+                x=corners[:, 0],
+                y=corners[:, 1],
+                fill="toself",
+                mode="lines",
+                name=each.name,
+                line={"width": 1},
+            )
+        )
+    figure.update_layout(
+        showlegend=False, xaxis={"title": "x in m"}, yaxis={"title": "y in m", "scaleanchor": "x"}
+    )
+    return figure
+
+
+def _plan(run: WatchRun, ground: Surroundings) -> go.Figure:
+    figure, angle = _ground(ground), np.linspace(0.0, 2.0 * np.pi, 90)
+    at_rest = run.terms["total"] - run.terms["reaction"] - run.terms["stopping"]
+    for name, radius in (("stop", at_rest), ("slow", run.terms["total"])):
+        figure.add_trace(
+            go.Scatter(x=radius * np.cos(angle), y=radius * np.sin(angle), mode="lines", name=name,
+                       line={"dash": "dash"})
+        )  # fmt: skip
+    line = run.timeline
+    figure.add_trace(
+        go.Scatter(x=line.place[:, 0], y=line.place[:, 1], mode="markers", name="person",
+                   marker={"color": line.rate, "colorscale": "RdYlGn", "cmin": 0, "cmax": 1, "size": 6,
+                           "colorbar": {"title": "speed"}})
+    )  # fmt: skip
+    return figure
+
+
+def _terms(run: WatchRun) -> str:
+    rows = [[name.replace("_", " "), f"{value:.3f}"] for name, value in run.terms.items()]
+    rows += [[f"reaction time: {name}", f"{value:.3f} s"] for name, value in parts(run.cell.reaction).items()]
+    rows += [["note", note] for note in run.notes]
+    return html_table(("term", "m"), rows)
+
+
+def _pictures(run: WatchRun, cameras: Cameras) -> str:
+    """Pictures of the cameras that see most of the hull, as HTML."""
+    snapshot = run.snapshot
+    assert snapshot is not None
+    height, width = snapshot.images.shape[1:3]
+    drawn = []
+    for i, image in enumerate(snapshot.images):
+        picture, inside = image.copy(), 0
+        for body in snapshot.bodies:
+            pixels = cameras.subset([i]).project(body.points)[0]
+            seen = (
+                np.isfinite(pixels).all(axis=1)
+                & (pixels >= 0).all(axis=1)
+                & (pixels < (width, height)).all(axis=1)
+            )
+            if not seen.any():
+                continue
+            inside += int(seen.sum())
+            low, high = (
+                np.rint(pixels[seen].min(axis=0)).astype(int),
+                np.rint(pixels[seen].max(axis=0)).astype(int),
+            )
+            for u, v in np.rint(pixels[seen]).astype(int):
+                cv2.circle(picture, (int(u), int(v)), 1, _HULL, -1)
+            cv2.rectangle(picture, (int(low[0]), int(low[1])), (int(high[0]), int(high[1])), _BOX, 2)
+        drawn.append((inside, picture))
+    drawn.sort(key=lambda each: -each[0])
+    found = []
+    for _, picture in drawn[:_SHOWN]:
+        code = b64encode(cv2.imencode(".jpg", picture)[1].tobytes()).decode()
+        found.append(f'<img src="data:image/jpeg;base64,{code}" style="width:48%;margin:0.5%" alt="camera">')
+    return "".join(found)

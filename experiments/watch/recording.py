@@ -1,0 +1,134 @@
+"""Recorded images of a cell: a folder with a folder of pictures or a video of each camera, and the joints.
+
+``joints.csv`` has the columns ``time_s`` and ``q1_rad`` to ``q6_rad`` and a line for each set of images. A
+camera is a folder of its name with pictures in the order of their names, or a video NAME.mp4, .avi or .mkv. A
+camera that ends before the joints do is blind from then on.
+"""
+
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+
+import cv2
+import numpy as np
+
+from robots.description.model import NUM_JOINTS
+from robots.text_table import TextTableError, finite_number, parse_fields, read_text
+
+COLUMNS = ("time_s", *(f"q{number}_rad" for number in range(1, NUM_JOINTS + 1)))
+JOINTS = "joints.csv"
+_VIDEOS, _PICTURES = (".mp4", ".avi", ".mkv"), {".png", ".jpg", ".jpeg", ".bmp", ".tif", ".tiff"}
+
+
+class Recording:
+    """Images and joints that were recorded together."""
+
+    def __init__(self, folder: str | Path, cameras: Sequence[str], size: tuple[int, int]) -> None:
+        """Opens a folder.
+
+        Args:
+            folder: that holds the recording.
+            cameras: names of the cameras of the cell, in its order.
+            size: width and height of an image in px.
+
+        Raises:
+            ValueError: if something is missing or cannot be read; one line that says what and where.
+        """
+        folder = Path(folder)
+        if not folder.is_dir():
+            raise ValueError(
+                f"--images {folder}: must be a folder with {JOINTS} and a folder of pictures or a video of "
+                "each camera"
+            )
+        table = _joints(folder / JOINTS)
+        self.times, self.joints = table[:, 0], table[:, 1:]
+        self._cameras, self._size = list(cameras), size
+        self._sources = [_source(folder, name) for name in cameras]
+        self.ended: dict[str, int] = {}  # cameras whose images ended before the joints, with their number
+
+    def __len__(self) -> int:
+        return len(self.times)
+
+    def sets(self) -> Iterator[np.ndarray]:
+        """The sets of images one after the other, (n, height, width, 3) of uint8 each.
+
+        Raises:
+            ValueError: if an image has another size or cannot be read.
+        """
+        width, height = self._size
+        streams = [_frames(source) for source in self._sources]
+        for number in range(len(self)):
+            images = np.zeros((len(streams), height, width, 3), np.uint8)
+            for i, (name, stream) in enumerate(zip(self._cameras, streams, strict=True)):
+                found = None if name in self.ended else next(stream, None)
+                if found is None:
+                    self.ended.setdefault(name, number)
+                    continue
+                where, image = found
+                if image is None:
+                    raise ValueError(f"{where}: no picture that can be read")
+                if image.shape != images[i].shape:
+                    seen = f"{image.shape[1]} x {image.shape[0]}"
+                    raise ValueError(f"{where}: images must be {width} x {height} px, got {seen} px")
+                images[i] = image
+            yield images
+
+
+def _source(folder: Path, name: str) -> Path | list[Path]:
+    """The pictures of a camera in their order, or its video."""
+    for ending in _VIDEOS:
+        if (folder / f"{name}{ending}").is_file():
+            return folder / f"{name}{ending}"
+    inside = folder / name
+    pictures = sorted(each for each in inside.glob("*") if each.suffix.lower() in _PICTURES)
+    if not pictures:
+        raise ValueError(
+            f"--images {folder}: no pictures of camera {name}, neither in {inside} nor as {name}{_VIDEOS[0]}"
+        )
+    return pictures
+
+
+def _frames(source: Path | list[Path]) -> Iterator[tuple[str, np.ndarray | None]]:
+    """Where each image comes from, and the image; None if it cannot be read."""
+    if isinstance(source, list):
+        for path in source:
+            yield str(path), cv2.imread(str(path), cv2.IMREAD_COLOR)
+        return
+    video = cv2.VideoCapture(str(source))
+    if not video.isOpened():
+        raise ValueError(f"{source}: no video that can be read")
+    try:
+        number = 0
+        while True:
+            is_there, image = video.read()
+            if not is_there:
+                return
+            number += 1
+            yield f"{source}, image {number}", image
+    finally:
+        video.release()
+
+
+def _joints(path: Path) -> np.ndarray:
+    """Times and joint positions, (n, 7)."""
+    table = parse_fields(read_text(path), str(path), has_head=True)
+    head, rows = table.rows[0], []
+    missing = [name for name in COLUMNS if name not in head]
+    if missing:
+        raise TextTableError(f"{table.where(0)}: no column {missing[0]}; needed are {', '.join(COLUMNS)}")
+    for number, fields in enumerate(table.rows[1:], 1):
+        if len(fields) != len(head):
+            raise TextTableError(f"{table.where(number)}: {len(head)} fields are needed, got {len(fields)}")
+        row = dict(zip(head, fields, strict=True))
+        values = [finite_number(row[name]) for name in COLUMNS]
+        for name, value in zip(COLUMNS, values, strict=True):
+            if value is None:
+                raise TextTableError(
+                    f"{table.where(number)}: {name} is not a finite number, got '{row[name]}'"
+                )
+        rows.append(values)
+    if len(rows) < 2:
+        raise TextTableError(f"{path}: at least two sets are needed, got {len(rows)}")
+    times = np.array(rows, dtype=float)
+    if not np.all(np.diff(times[:, 0]) > 0.0):
+        raise TextTableError(f"{path}: time_s must increase from line to line")
+    return times

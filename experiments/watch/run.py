@@ -1,0 +1,211 @@
+"""One run with people in the cell, simulated or from recorded images: distances, speed and stops."""
+
+from collections.abc import Callable
+from dataclasses import dataclass, fields
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from diagrams.runs.simulation import Experiment
+from diagrams.scenario.scenario import Scenario
+from diagrams.watching import WatchedCell, fastest, watched_cell
+from experiments.watch.recording import Recording
+from robots.description.model import NUM_JOINTS, RobotModel
+from systems.cell.overview.overview_camera import recorded
+from systems.cell.overview.person import gap
+from systems.guard.separation.protective_distance import ReactionTime, protective_distance
+from systems.guard.separation.separation_monitor import STATUS
+from systems.reference.paths import make_path
+from systems.vision.camera_rig import load_cell
+from systems.vision.people.visual_hull import Body
+
+_EVERY = 0.02  # s, between two times of a timeline
+_NOBODY = 100.0  # m, a distance beyond it is that of nobody
+
+Progress = Callable[[float], None]
+
+
+@dataclass(frozen=True)
+class Timeline:
+    """What was decided, at n times; NaN where a number is not known or nobody is there."""
+
+    time: np.ndarray  # s
+    distance: np.ndarray  # m, measured
+    true: np.ndarray  # m, in a simulation
+    protective: np.ndarray  # m, at full speed
+    rate: np.ndarray  # of the path time, 1 at full speed
+    stopped: np.ndarray  # bool
+    place: np.ndarray  # x, y of the nearest person in m, (n, 2)
+
+
+@dataclass(frozen=True)
+class Snapshot:
+    """The images in which somebody was nearest."""
+
+    time: float  # s
+    images: np.ndarray  # (n, h, w, 3) of uint8
+    bodies: list[Body]
+
+
+@dataclass(frozen=True)
+class WatchRun:
+    """A run and what is needed to show it."""
+
+    timeline: Timeline
+    cell: WatchedCell
+    snapshot: Snapshot | None
+    terms: dict[str, float]  # of the protective distance at full speed in m
+    notes: list[str]
+
+    @property
+    def stops(self) -> int:
+        """How often the robot was stopped, the start apart."""
+        stopped = self.timeline.stopped.astype(int)
+        return int(np.count_nonzero(np.diff(stopped) > 0))
+
+    def as_dict(self) -> dict[str, Any]:
+        """The numbers, in the units of their names."""
+        line = self.timeline
+        known = np.isfinite(line.distance) & np.isfinite(line.true)
+        error = (line.distance - line.true)[known]
+        step = float(np.median(np.diff(line.time)))
+        return {
+            "duration_s": round(float(line.time[-1]), 3),
+            "smallest_distance_m": _number(line.distance),
+            "smallest_true_distance_m": _number(line.true),
+            "largest_lag_m": round(float(error.max()), 4) if len(error) else None,
+            "stops": self.stops,
+            "slowed_s": round(step * float(np.count_nonzero((line.rate < 0.999) & ~line.stopped)), 2),
+            "stopped_s": round(step * float(np.count_nonzero(line.stopped)), 2),
+            "reaction_s": {**parts(self.cell.reaction), "total": round(self.cell.reaction.total, 4)},
+            "protective_distance_m": self.terms,
+            "notes": self.notes,
+        }
+
+
+def parts(reaction: ReactionTime) -> dict[str, float]:
+    """The parts of a reaction time in s by their names."""
+    return {each.name: round(getattr(reaction, each.name), 4) for each in fields(reaction)}
+
+
+def watch_simulated(scenario: Scenario, robot: RobotModel, law: str, progress: Progress) -> WatchRun:
+    """Runs a law in the watched cell. Raises ValueError if the scenario has no whole images."""
+    experiment = Experiment(scenario, law, robot)
+    watch = experiment.watch
+    if watch is None:
+        raise ValueError("watch: the scenario has no whole images; set station.overview.enabled=true")
+    experiment.advance(progress=progress)
+    times, data = experiment.watched()
+    step = max(1, round(_EVERY / scenario.station.period))
+    some = slice(None, None, step)
+    times, status = times[some], data["separation"][some]
+    joints = data["truth.motor_state"][some, :NUM_JOINTS]
+    arm, true, place = watch.cell.detector.arm, [], []
+    for time, q in zip(times, joints, strict=True):
+        figures = [each for each in (person.at(time) for person in watch.cell.people) if each is not None]
+        gaps = [gap(each, arm.at(q)) for each in figures]
+        true.append(min(gaps, default=np.nan))
+        place.append(figures[int(np.argmin(gaps))].start[1, :2] if gaps else (np.nan, np.nan))
+    distance = status[:, STATUS.index("distance")]
+    line = Timeline(
+        times,
+        np.where(distance < _NOBODY, distance, np.nan),
+        np.array(true),
+        status[:, STATUS.index("protective_distance")],
+        data["path_time"][some, 1],
+        data["stop"][some, 0] > 0.5,
+        np.array(place),
+    )
+    return WatchRun(
+        line, watch.cell, _snapshot(scenario, watch.cell, line, joints), _terms(scenario, watch.cell), []
+    )
+
+
+def watch_recorded(
+    scenario: Scenario, robot: RobotModel, folder: str | Path, empty: int, progress: Progress
+) -> WatchRun:
+    """Finds people in recorded images and says what the monitor would have decided at full speed.
+
+    Args:
+        scenario: with cell and detector.
+        robot: that stands in the cell.
+        folder: of the recording.
+        empty: how many of the first sets show the empty cell.
+        progress: is called with the share that is done.
+
+    Raises:
+        ValueError: if the recording cannot be read or is too short.
+    """
+    cell = watched_cell(scenario, robot)
+    names = [camera.name for camera in load_cell(scenario.station.overview.cell).cameras]
+    recording = Recording(folder, names, cell.size)
+    if not 0 < empty < len(recording):
+        raise ValueError(
+            f"--empty must be between 1 and {len(recording) - 1}, one less than the sets, got {empty}"
+        )
+    sets, detector = recording.sets(), cell.detector
+    memory = detector.learn([next(sets) for _ in range(empty)], list(recording.joints[:empty]))
+    terms = _terms(scenario, cell)
+    reach = 0.5 * np.sqrt(3.0) * scenario.servo.people.hull.edge
+    distances, places, trusted, best = [], [], [], None
+    for number, images in enumerate(sets, empty):
+        q = recording.joints[number]
+        found, memory = detector.detect(memory, images, q)
+        arm = detector.arm.at(q)
+        gaps = [float(arm.distances(body.points).min()) - reach for body in found.bodies]
+        distances.append(min(gaps, default=np.nan))
+        places.append(
+            found.bodies[int(np.argmin(gaps))].points.mean(axis=0)[:2] if gaps else (np.nan, np.nan)
+        )
+        trusted.append(found.trusted)
+        if gaps and (best is None or min(gaps) <= np.nanmin(distances)):
+            best = Snapshot(float(recording.times[number]), images, found.bodies)
+        progress((number + 1 - empty) / (len(recording) - empty))
+    distance, needed = np.array(distances), terms["total"]
+    nothing = np.full(len(distance), np.nan)
+    stopped = (np.nan_to_num(distance, nan=np.inf) < needed) | ~np.array(trusted)
+    line = Timeline(
+        recording.times[empty:],
+        distance,
+        nothing,
+        np.full(len(distance), needed),
+        np.where(stopped, 0.0, 1.0),
+        stopped,
+        np.array(places),
+    )
+    notes = [f"camera {name} ended after {number} sets" for name, number in recording.ended.items()]
+    notes += [f"{np.count_nonzero(~np.array(trusted))} sets are not trusted"] if not all(trusted) else []
+    return WatchRun(line, cell, best, terms, notes)
+
+
+def _number(values: np.ndarray) -> float | None:
+    return round(float(np.nanmin(values)), 4) if np.isfinite(values).any() else None
+
+
+def _terms(scenario: Scenario, cell: WatchedCell) -> dict[str, float]:
+    """The terms of the protective distance with the path at full speed in m."""
+    config, speed = scenario.servo.separation, fastest(make_path(scenario.reference))
+    found = protective_distance(config, cell.reaction, speed, scenario.reference.slowing, config.human_speed)
+    return {each.name: round(getattr(found, each.name), 4) for each in fields(found)} | {
+        "total": round(found.total, 4)
+    }
+
+
+def _snapshot(scenario: Scenario, cell: WatchedCell, line: Timeline, joints: np.ndarray) -> Snapshot | None:
+    """The images at the time at which somebody was nearest, once more, and what is seen in them."""
+    if not np.isfinite(line.true).any():
+        return None
+    at = int(np.nanargmin(line.true))
+    time, q = float(line.time[at]), joints[at]
+    arm = cell.detector.arm.at(q)
+    light = scenario.station.overview.light
+    nobody: list = [None] * len(cell.people)
+    figures = [person.at(time) for person in cell.people]
+    empty, images = (
+        recorded(cell.pictures.take(arm, people), time, light, np.array([time, -2.0]))
+        for people in (nobody, figures)
+    )
+    # Of this arm alone: what is behind it stays unknown.
+    memory = cell.detector.learn([empty], [q])
+    return Snapshot(time, images, cell.detector.detect(memory, images, q)[0].bodies)

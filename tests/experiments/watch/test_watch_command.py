@@ -1,0 +1,102 @@
+"""``truetip watch`` on recorded images: who is seen in them, cameras that end, and what is refused."""
+
+import json
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pytest
+
+from experiments.watch.recording import COLUMNS, Recording
+from systems.cell.overview.person import gap
+from tests.experiments.commands import files, refusal, truetip
+from tests.systems.vision.people.rigs import ARMS, CELL, detector, painted, person_at
+
+SMALL = ["--set=station.overview.width=320", "--set=servo.people.hull.edge=0.1"]
+NAMES = [camera.name for camera in CELL.cameras]
+PERSON = person_at(1.3, 0.5)
+EMPTY, SETS = 3, 6
+
+
+@pytest.fixture(scope="module")
+def recording(tmp_path_factory) -> Path:
+    """Three sets of the empty cell, then three with a person; the second camera ends early."""
+    folder, rng = tmp_path_factory.mktemp("recording"), np.random.default_rng(1)
+    rows = [",".join(COLUMNS)]
+    sets = [painted(PERSON if n >= EMPTY else None, ARMS[n % EMPTY], rng) for n in range(SETS)]
+    for number, images in enumerate(sets):
+        rows.append(",".join([f"{0.1 * number:.2f}", *(f"{q:.4f}" for q in ARMS[number % EMPTY])]))
+        for name, image in zip(NAMES, images, strict=True):
+            if name != NAMES[1] or number < SETS - 1:
+                (folder / name).mkdir(exist_ok=True)
+                cv2.imwrite(str(folder / name / f"{number:03}.png"), image)
+    (folder / "joints.csv").write_text("\n".join(rows))
+    return folder
+
+
+def watch(folder: Path, out: Path, *more: str):
+    return truetip("watch", "--images", folder, "--empty", EMPTY, *SMALL, "--out", out / "watch.html", *more)
+
+
+def test_a_person_in_a_recording_stops_the_robot_and_the_page_shows_where(recording: Path, tmp_path: Path):
+    result = watch(recording, tmp_path, "--json", str(tmp_path / "watch.json"))
+    assert result.exit_code == 0, result.output
+    numbers = json.loads((tmp_path / "watch.json").read_text())
+    true = min(gap(PERSON, detector().arm.at(q)) for q in ARMS)
+    assert true - 0.4 < numbers["smallest_distance_m"] < true + 0.1
+    assert numbers["stopped_s"] > 0.0
+    assert numbers["notes"] == [f"camera {NAMES[1]} ended after {SETS - 1} sets"]
+    page = (tmp_path / "watch.html").read_text()
+    assert "not a safety function" in page
+    assert page.count("data:image/jpeg") == 4
+    assert "not a safety function" in " ".join(result.stdout.split())
+
+
+def test_videos_are_read_image_by_image_and_end_when_they_end(tmp_path: Path):
+    codec = cv2.VideoWriter.fourcc(*"MJPG")
+    video = cv2.VideoWriter(str(tmp_path / "left.avi"), codec, 20.0, (64, 48))
+    for grey in (40, 80, 120):
+        video.write(np.full((48, 64, 3), grey, np.uint8))
+    video.release()
+    rows = [",".join(map(str, [0.05 * number, *np.zeros(6)])) for number in range(4)]
+    (tmp_path / "joints.csv").write_text("\n".join([",".join(COLUMNS), *rows]))
+    recording = Recording(tmp_path, ["left"], (64, 48))
+    means = [images.mean() for images in recording.sets()]
+    np.testing.assert_allclose(means, [40, 80, 120, 0], atol=2.0)
+    assert recording.ended == {"left": 3}
+
+
+def test_what_is_wrong_with_a_recording_is_said_in_one_line(recording: Path, tmp_path: Path):
+    broken, out = tmp_path / "broken", tmp_path / "out"
+    out.mkdir()
+    broken.mkdir()
+    assert "joints.csv: no such file or directory" in refusal(watch(broken, out))
+    joints = (recording / "joints.csv").read_text().splitlines()
+    (broken / "joints.csv").write_text("\n".join(joints))
+    assert f"no pictures of camera {NAMES[0]}" in refusal(watch(broken, out))
+    for name in NAMES:
+        (broken / name).mkdir()
+        cv2.imwrite(str(broken / name / "1.png"), np.zeros((10, 20, 3), np.uint8))
+    assert "images must be 320 x 207 px, got 20 x 10 px" in refusal(watch(broken, out))
+    (broken / "joints.csv").write_text("\n".join([*joints[:2], joints[2].replace("0.10", "soon", 1)]))
+    assert "line 3: time_s is not a finite number, got 'soon'" in refusal(watch(broken, out))
+    assert files(out) == set()
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (["--study", "--places", "0"], "--places must be at least 1, got 0"),
+        (["--study", "--images", "x"], "--study draws its own images"),
+        (["--images", "none"], "--images none: must be a folder with joints.csv"),
+        (["--minutes", "-1"], "--minutes must not be negative, got -1"),
+        (["--set", "station.kind=egm"], "watch does not drive a real station"),
+        (["--scenario", "nominal"], "the scenario has no whole images; set station.overview.enabled=true"),
+    ],
+)
+def test_wrong_arguments_are_refused_in_one_line(
+    arguments: list[str], message: str, tmp_path: Path, monkeypatch
+):
+    monkeypatch.chdir(tmp_path)
+    assert message in refusal(truetip("watch", *SMALL, *arguments))
+    assert files(tmp_path) == set()
