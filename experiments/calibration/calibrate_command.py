@@ -80,9 +80,13 @@ def calibrate_command(
         bool, typer.Option("--position-only", help="Use positions of the tool only, no orientations.")
     ] = False,
     compliance: Annotated[
-        bool,
-        typer.Option("--compliance", help="Also identify joint compliances; measures with two payloads."),
-    ] = False,
+        bool | None,
+        typer.Option(
+            "--compliance/--no-compliance",
+            help="Also identify joint compliances; measures with two payloads.",
+            show_default="where a simulated robot's structure is elastic",
+        ),
+    ] = None,
     joint_errors: Annotated[
         str,
         typer.Option(
@@ -130,15 +134,17 @@ def calibrate_command(
         criterion,
         noise,
         position_only,
-        compliance,
+        compliance is True,
         fixed or [],
         tuple(filter(None, joint_errors.split(","))),
     )
     note = ""
     with json_output(json_file) as output, refusing(ValueError, OSError), ExitStack() as stack:
-        baked = urdf_sag(urdf, urdf_payload, urdf_pose, compliance)
         wanted.check()
         prepared = prepare(scenario, settings or [], robot, needs_path=not measurements)
+        if compliance is None and not measurements:
+            wanted = replace(wanted, compliance=prepared.scenario.station.elasticity == "structure")
+        baked = urdf_sag(urdf, urdf_payload, urdf_pose, wanted.compliance)
         if measurements and names_targets(measurements):
             wanted.check_instruments(urdf)
             calibrated = (prepared.scenario.robot, prepared.robot)

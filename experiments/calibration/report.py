@@ -193,10 +193,14 @@ def unexplained_sentence(found: Identified) -> str:
         return ""
     position = float(np.sqrt(np.mean(np.sum(found.residuals[found.kept, -3:] ** 2, axis=1))))
     has_springs = len(found.parameters) > len(found.model)
-    cause = "are joints in error (--joint-errors)" if has_springs else "does the robot yield (--compliance)"
+    cause = (
+        "do bearings yield, or joints err (--joint-errors)"
+        if has_springs
+        else "do joints yield (--compliance)"
+    )
     return (
         f" These parameters do not explain the measurements: {1e3 * position:.2g} mm (rms) are left that are "
-        f"not noise; {cause}?"
+        f"not noise alone; {cause}?"
     )
 
 
