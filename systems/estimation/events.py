@@ -17,6 +17,9 @@ _JUMP, _CALM = 9.0, 4.0  # sigmas of the mean: what no parameter describes lasts
 _MODEL_SHARE = 3.0 / _JUMP  # what the estimate is wrong by is within 5 sigmas
 _FIRST = 15  # samples, whose median is what the next ones are compared with
 _MARGIN = np.repeat([3e-3, 1e-3], 3)  # rad and m, what the first linearisations may be wrong by
+_RECENT = 24  # samples, among which a change is looked for that came from one to the next
+_AFTER = 3  # of them at least have to be behind it
+_SUDDEN = 40.0  # by which chi squared is smaller with a step than with a parabola: e to the 20 to one
 _PAUSE = 50  # samples after an event before the next one
 _EXPLAINED = 0.15  # what a cause leaves of the mean error if it is the cause
 
@@ -29,7 +32,9 @@ class Verdict(NamedTuple):
     """What a sample says."""
 
     is_outlier: bool = False
-    has_jumped: bool = False
+    has_jumped: bool = False  # by more than the estimate explains, from one sample to the next
+    has_drifted: bool = False  # by more than that, for long and as slowly as the robot moves
+    is_doubtful: bool = False  # one of both, but it is too early to tell
     is_calm: bool = False
 
 
@@ -73,12 +78,28 @@ class Innovations:
     The noise of a camera is independent from sample to sample: in a mean over a window w it is smaller by
     sqrt(2 w - 1). What the estimate is wrong by is the same in all of them: the mean has the variance
     R / (2 w - 1) + H P H^T.
+
+    A tool is displaced and a load is gripped from one sample to the next. What the model lacks, or what was
+    linearised too far off, shows as slowly as the robot moves. So the last samples are compared with a step
+    and with a parabola.
     """
 
     def __init__(self, variances: np.ndarray) -> None:
         """Takes the variances of one sample, (6,)."""
         self._variances = variances
-        self.layout = Layout(error=(6,), outliers=(1,), pause=(1,), seen=(1,), first=(_FIRST, 6))
+        powers = np.linspace(-1.0, 1.0, _RECENT)[:, None] ** np.arange(3)
+        self._parabolas = np.linalg.qr(powers)[0]
+        self.layout = Layout(
+            error=(6,),
+            spread=(6,),  # what the estimate could be wrong by when these errors were seen, in sigmas
+            outliers=(1,),
+            pause=(1,),
+            seen=(1,),
+            first=(_FIRST, 6),
+            recent=(_RECENT, 6),  # the newest one last
+            held=(1,),  # how many of them there are
+            doubtful=(1,),  # samples in a row
+        )
 
     def is_false_start(
         self, memory: SimpleNamespace, r: np.ndarray, H: np.ndarray, solve: Callable[[], np.ndarray]
@@ -128,20 +149,47 @@ class Innovations:
             memory.outliers[0] += 1.0
             return Verdict(is_outlier=True)
         # Samples that were left out count as soon as there are too many of them in a row to be outliers.
-        share = 1.0 - (1.0 - 1.0 / _WINDOW) ** (1.0 + memory.outliers[0] * is_large)
+        number = 1 + int(memory.outliers[0]) * int(is_large)
+        share = 1.0 - (1.0 - 1.0 / _WINDOW) ** number
         memory.error += share * (r - memory.error)
+        memory.spread += share * ((0.0 if by_model is None else np.sqrt(by_model)) - memory.spread)
         memory.outliers[0] = 0.0
+        memory.recent[:-number] = memory.recent[number:]
+        memory.recent[-number:] = r
+        memory.held[0] += number
         mean = np.abs(memory.error) / known
         size = mean.max() * _AVERAGING
         if size > _CALM:
             if by_model is None:
                 by_model = np.einsum("ij,ji->i", H, solve()) / self._variances
+            by_model = np.maximum(by_model, memory.spread**2)
             size = (mean / np.sqrt(_AVERAGING**-2 + _MODEL_SHARE**2 * by_model)).max()
-        return Verdict(has_jumped=bool(size > _JUMP and memory.pause[0] == 0.0), is_calm=bool(size < _CALM))
+        if size <= _JUMP or memory.pause[0] > 0.0:
+            memory.doubtful[0] = 0.0
+            return Verdict(is_calm=bool(size < _CALM))
+        memory.doubtful[0] += 1.0
+        if self._is_sudden(memory):
+            return Verdict(has_jumped=True)
+        is_long = memory.doubtful[0] > _RECENT // 2
+        return Verdict(has_drifted=bool(is_long), is_doubtful=not is_long)
+
+    def _is_sudden(self, memory: SimpleNamespace) -> bool:
+        """Whether a step explains the last samples better than a parabola does."""
+        if memory.held[0] < _RECENT:
+            return False
+        y = memory.recent / np.sqrt(self._variances)
+        total = float((y * y).sum())
+        smooth = total - float(((self._parabolas.T @ y) ** 2).sum())
+        sums = np.cumsum(y, axis=0)
+        before = np.arange(1, _RECENT)[:, None]
+        explained = sums[:-1] ** 2 / before + (sums[-1] - sums[:-1]) ** 2 / (_RECENT - before)
+        step = total - float(explained.sum(axis=1)[: _RECENT - _AFTER].max())
+        return smooth - step > _SUDDEN
 
     def forget(self, memory: SimpleNamespace) -> None:
         """Begins the mean anew."""
-        memory.error[:], memory.outliers[0] = 0.0, 0.0
+        memory.error[:], memory.spread[:] = 0.0, 0.0
+        memory.outliers[0], memory.held[0], memory.doubtful[0] = 0.0, 0.0, 0.0
 
     def explain(self, memory: SimpleNamespace, H: np.ndarray, model: TipModel) -> Event:
         """Says what the mean error looks like, and begins anew."""

@@ -19,6 +19,7 @@ from systems.estimation.tip_model import Prediction, Spread, TipModel, moved
 (_POSV,) = get_lapack_funcs(("posv",), dtype=np.float64)  # symmetric positive definite equations
 _AGAIN = 500  # samples, in which a second event says that the first was explained wrongly
 _OF_THE_LOAD = 0.1  # of its spread, when a tool was displaced
+_DOUBT = 3.0  # times wider, what is known of everything, where it does not hold
 _TRUST = 0.02  # m or rad, the largest step from where the past was read
 _DRIFT_EVERY = 50  # samples, between two looks whether the clock drifts
 _LEAST_DRIFT, _DRIFT_SIGMAS = (
@@ -77,7 +78,6 @@ class TipEstimator:
             count=(1,),
             event_at=(1,),  # the count at the last event
             was_settled=(1,),  # whether the sum was linear enough when samples agreed with it last
-            is_rereading=(1,),  # whether nothing is learnt until the past has been read anew
             A_open=(n, n),
             b_open=(n,),
             samples=(1,),
@@ -164,19 +164,20 @@ class TipEstimator:
             if self._innovations.is_false_start(innovations, r, H, lambda: self._solve_columns(memory, H)):
                 return None
         else:
-            if memory.is_rereading[0] and not self._is_reread(memory):
-                return None
             verdict = self._innovations.judge(innovations, r, H, lambda: self._solve_columns(memory, H))
             if verdict.is_outlier:
                 return None
             if verdict.is_calm:
                 memory.was_settled[0] = self._keyframes.is_settled(memory.keyframes, memory.xi)
+            if verdict.is_doubtful and memory.was_settled[0]:
+                return None  # a few samples later it is known what they mean
             if verdict.has_jumped and weight > 0.2:
-                if not memory.was_settled[0]:
-                    self._reread(memory)
-                    return None
                 event = self._innovations.explain(innovations, H, self.model)
                 self._widen(memory, event)
+            elif verdict.has_drifted and weight > 0.2:
+                self._innovations.forget(innovations)
+                if memory.was_settled[0]:
+                    self._doubt(memory)
         y = r + H @ memory.xi
         weighted = (weight * self._weights)[:, None] * H
         memory.A_open += H.T @ weighted
@@ -212,22 +213,6 @@ class TipEstimator:
         self._keyframes.free_drift(memory.keyframes)
         return Event(CLOCK_DRIFTS, drift * float(self.model.sigma[D]), 0.0)
 
-    def _reread(self, memory: SimpleNamespace) -> None:
-        """Samples do not agree with a past that was read with other parameters: it is read anew first.
-
-        Only what disagrees with it then has happened to the robot.
-        """
-        if memory.weight[0] > 0.0:
-            self._close(memory)
-        self._innovations.forget(memory.innovations)
-        memory.is_rereading[0] = 1.0
-
-    def _is_reread(self, memory: SimpleNamespace) -> bool:
-        is_done = self._keyframes.is_settled(memory.keyframes, memory.xi)
-        if is_done:
-            memory.is_rereading[0], memory.was_settled[0] = 0.0, 1.0
-        return is_done
-
     def work(self, memory: SimpleNamespace) -> None:
         """What can be done in a tick without a sample, or after its command is out: relinearise."""
         constants = self.constants(memory)
@@ -256,10 +241,7 @@ class TipEstimator:
         mean[6:12] = found.gears[0]
         row = keyframe_row(mean, (moved(found.X_WE, r[None])[0], total))
         self._keyframes.add(memory.keyframes, row, memory.A_open, memory.b_open)
-        for part in (memory.A_open, memory.b_open, memory.samples, memory.weight):
-            part[:] = 0.0
-        for part in (memory.sums, memory.sum_y, memory.sum_H):
-            part[:] = 0.0
+        self._forget_open(memory)
 
     def _solve(self, memory: SimpleNamespace) -> None:
         A, b = memory.keyframes.A + memory.A_open, memory.keyframes.b + memory.b_open
@@ -274,6 +256,13 @@ class TipEstimator:
 
     def _solve_columns(self, memory: SimpleNamespace, H: np.ndarray) -> np.ndarray:
         return np.linalg.solve(memory.keyframes.A + memory.A_open, H.T)
+
+    def _doubt(self, memory: SimpleNamespace) -> None:
+        """What was learnt does not hold where the robot is now, though nothing happened: it weighs less."""
+        self._innovations.forget(memory.innovations)
+        A = (memory.keyframes.A + memory.A_open) / _DOUBT**2
+        self._keyframes.reset(memory.keyframes, A, memory.xi)
+        self._forget_open(memory)
 
     def _widen(self, memory: SimpleNamespace, event: Event) -> None:
         """Something happened: what was known stays, but for the tool and the load.
@@ -292,6 +281,10 @@ class TipEstimator:
         A = np.linalg.inv(P + np.diag(load**2))
         A = 0.5 * (A + A.T)
         self._keyframes.reset(memory.keyframes, A, memory.xi)
+        self._forget_open(memory)
+
+    @staticmethod
+    def _forget_open(memory: SimpleNamespace) -> None:
         for part in (memory.A_open, memory.b_open, memory.samples, memory.weight):
             part[:] = 0.0
         for part in (memory.sums, memory.sum_y, memory.sum_H):

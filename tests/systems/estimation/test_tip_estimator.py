@@ -75,6 +75,16 @@ def test_seconds_at_rest_do_not_freeze_what_was_linearised_far_off(seed: int):
     assert frozen.error() > 1.5 * kept.error()
 
 
+@pytest.mark.parametrize("seed", [0, 5, 10])
+def test_what_comes_as_slowly_as_the_robot_moves_is_no_event(seed: int):
+    """After seconds at rest parameters are far off where it moves to: that is learnt, nothing happened."""
+    session = Session(seed)
+    session.learn(2.0, size=0.0)
+    session.learn(4.0)
+    assert not session.events
+    assert session.error(seen=True) < 50e-6
+
+
 @pytest.mark.parametrize("shift", [0.5e-3, 3e-3])
 def test_a_displaced_tool_is_seen_and_learnt(shift):
     session = Session(3)
