@@ -11,20 +11,11 @@ from experiments.cli.console import print_files, progress_bar, refusing
 from experiments.cli.json_output import human_console, json_output
 from experiments.cli.options import GridOption, JsonOption, PayloadOption, PictureOption, StudiedRobotOption
 from experiments.cli.staging import PAGE, staged_file
-from experiments.report.plot_page import Section, html_table, write_plot_page
-from experiments.zeros.plots import beam_figure, plane_figure, workspace_figure
-from experiments.zeros.study import (
-    BEAM_MODES,
-    EXAMPLES,
-    ZeroStudy,
-    example_json,
-    study_zeros,
-    two_joint_arm_limit,
-    two_joint_arm_zeros,
-    zeros_json,
-)
+from experiments.report.plot_page import Section, write_plot_page
+from experiments.zeros.examples import EXAMPLES, example_named
+from experiments.zeros.plots import plane_figure, workspace_figure
+from experiments.zeros.study import ZeroStudy, study_zeros, zeros_json
 from robots.description.model import load_robot
-from robots.dynamics.modal_beam import BOUNDARIES, ModalBeam
 
 
 def zeros_command(
@@ -49,8 +40,9 @@ def zeros_command(
         output.staged(),
     ):
         if example is not None:
-            numbers = example_json(example)
-            verdict = _write_example(page, example)
+            found = example_named(example)
+            numbers, verdict = found.numbers, found.verdict
+            write_plot_page(page, f"Zeros, example {example}", verdict, found.sections)
         else:
             model = load_robot(robot)
             mass = model.payload.largest_mass if payload is None else payload
@@ -91,31 +83,3 @@ def _write_study(page: Path, study: ZeroStudy, verdict: str) -> None:
         Section("All zeros of the middle position", "Poles of the exact inverse.", plane_figure(middle))
     )
     write_plot_page(page, f"Zeros, {study.robot.name}", verdict, sections)
-
-
-def _write_example(page: Path, example: str) -> str:
-    """Writes the page of an example and returns its verdict."""
-    if example == "beam":
-        head = ("boundary", *(f"{n} modes" for n in BEAM_MODES))
-        rows = [
-            [b, *(f"{ModalBeam(num_modes=n, boundary=b).largest_stable_xi():.3f}" for n in BEAM_MODES)]
-            for b in BOUNDARIES
-        ]
-        one, three = (ModalBeam(num_modes=n).largest_stable_xi() for n in (1, 3))
-        verdict = (
-            f"A driven beam with 0.45 of its mass at the end has a stable inverse for outputs up to "
-            f"{one:.3f} of its length with one mode, {three:.3f} with three."
-        )
-        sections = [Section(f"Output along the beam, {n} modes", "", beam_figure(n), 360) for n in (1, 3)] + [
-            Section("Largest stable output by number of modes", "", html_table(head, rows))
-        ]
-    else:
-        limit, zeros = two_joint_arm_limit(), two_joint_arm_zeros(0.5)
-        rates = ", ".join(f"{value:.2f}" for value in np.real(zeros.values))
-        verdict = (
-            f"The point 0.5 m beyond the centre of mass of the two-joint arm has zeros at {rates} 1/s; "
-            f"the inverse is stable up to {limit:.4f} m."
-        )
-        sections = [Section("Zeros of the two-joint arm, x_l = 0.5 m", "", plane_figure(zeros))]
-    write_plot_page(page, f"Zeros, example {example}", verdict, sections)
-    return verdict

@@ -1,5 +1,7 @@
 """Pictures of zeros: the slowest unstable one over axes 2 and 3, zeros in the plane, outputs along a beam."""
 
+from collections.abc import Mapping
+
 import numpy as np
 import plotly.graph_objects as go
 
@@ -54,3 +56,27 @@ def beam_figure(num_modes: int, boundary: str = "clamped") -> go.Figure:
         xaxis={"title": "place of the output, share of the length"},
         yaxis={"title": "largest real part, in sqrt(E I / (m l<sup>3</sup>))"},
     )
+
+
+def locus_figure(num_modes: int) -> go.Figure:
+    """Where the zeros are in the plane as the output moves along the beam; Reiner (2010), figs. 3.4, 3.5."""
+    beam = ModalBeam(num_modes=num_modes)
+    places = np.linspace(0.02, 1.0, 99)
+    points = [(value, xi) for xi in places for value in beam.zeros(xi).values]
+    values, xi = (np.array(column) for column in zip(*points, strict=True))
+    marker = {"size": 5, "color": xi, "colorscale": "Jet", "colorbar": {"title": "place"}}
+    figure = go.Figure(go.Scatter(x=np.real(values), y=np.imag(values), mode="markers", marker=marker))
+    rate = "sqrt(E I / (m l<sup>3</sup>))"
+    return figure.update_layout(
+        xaxis={"title": f"real part in {rate}", "range": [-200, 200]},
+        yaxis={"title": f"imaginary part in {rate}", "range": [-200, 200]},
+    )
+
+
+def time_figure(times: np.ndarray, curves: Mapping[str, np.ndarray], title: str) -> go.Figure:
+    """Curves over the time in s."""
+    every = slice(None, None, 5)
+    figure = go.Figure(
+        [go.Scatter(x=times[every], y=curve[every], name=name) for name, curve in curves.items()]
+    )
+    return figure.update_layout(xaxis={"title": "time in s"}, yaxis={"title": title})

@@ -1,4 +1,4 @@
-"""Zeros of a robot over its workspace, and of the two textbook examples."""
+"""Zeros of a robot over its workspace, and of the two-joint arm."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -17,10 +17,8 @@ from experiments.feedforward.two_joint_arm import (
     TwoJointArm,
 )
 from robots.description.model import NUM_JOINTS, RobotModel
-from robots.dynamics.modal_beam import BOUNDARIES, ModalBeam
 from robots.dynamics.transmission_zeros import ZeroAnalysis, Zeros, transmission_zeros
 
-EXAMPLES = ("two_joint_arm", "beam")
 _BENT_WRIST = 0.7  # rad of axis 5: at zero the wrist is singular
 BEAM_MODES = (1, 2, 3, 4, 5)
 
@@ -126,32 +124,8 @@ def two_joint_arm_limit() -> float:
     return INERTIA / (MASS * LENGTH * (1.0 - SHARE))
 
 
-def example_json(example: str) -> dict[str, Any]:
-    """The numbers of an example.
-
-    Raises:
-        ValueError: if there is no such example.
-    """
-    if example == "two_joint_arm":
-        zeros = two_joint_arm_zeros(0.5)
-        return {
-            "example": example,
-            **_one(zeros),
-            "x_l_m": 0.5,
-            "largest_stable_x_l_m": two_joint_arm_limit(),
-        }
-    if example == "beam":
-        limits = {
-            boundary: {
-                str(n): ModalBeam(num_modes=n, boundary=boundary).largest_stable_xi() for n in BEAM_MODES
-            }
-            for boundary in BOUNDARIES
-        }
-        return {"example": example, **_one(ModalBeam(num_modes=3).zeros(1.0)), "largest_stable_xi": limits}
-    raise ValueError(f"--example must be one of {', '.join(EXAMPLES)}, got '{example}'")
-
-
-def _one(zeros: Zeros) -> dict[str, Any]:
+def one_json(zeros: Zeros) -> dict[str, Any]:
+    """The numbers of one system."""
     return {
         "zeros": _pairs(zeros),
         "slowest_rhp": zeros.slowest_rhp,

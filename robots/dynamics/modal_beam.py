@@ -96,6 +96,27 @@ class ModalBeam:
         """From the torque of the joint to the displacement at xi, Reiner (2010), section 3.5.1."""
         return self._zeros()(xi)
 
+    def decoupled_zeros(self, xi: float = 1.0, load_coupled: bool = True) -> Zeros:
+        """The same where the model neglects that turning the joint bends the beam; Reiner (2010), 3.7.
+
+        In the linear equations about rest this is C_r of the standard input data (C_t of a beam whose base
+        moves): what the masses of the beam do to its modes. The approximation (3.73) leaves it out, which
+        makes the inverse stable.
+
+        Args:
+            xi: where the output is, 0 to 1.
+            load_coupled: whether the load, a body of its own, still bends the beam.
+
+        Raises:
+            ValueError: if the modes are those of a supported beam, whose frame does not turn with the joint.
+        """
+        if self.boundary != "clamped":
+            raise ValueError("beam: only clamped modes can be decoupled from the joint")
+        M, K, B = self.mass_matrix(), self.stiffness_matrix(), self.input_column()
+        end = self.displacement(1.0)
+        M[1:, 0] = self.load * end[1:] * end[0] if load_coupled else 0.0
+        return transmission_zeros(M, np.zeros_like(M), K, B, self.displacement(xi)[None])
+
     def _zeros(self) -> Callable[[float], Zeros]:
         """`zeros` as a function of xi alone: the matrices do not depend on it."""
         M, K, B = self.mass_matrix(), self.stiffness_matrix(), self.input_column()

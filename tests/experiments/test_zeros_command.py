@@ -36,6 +36,18 @@ def test_the_examples_give_the_published_figures(tmp_path: Path):
     assert arm["largest_stable_x_l_m"] == pytest.approx(0.0625)
     beam = json.loads(run(tmp_path, "--example=beam", "--json", "-").stdout)
     assert beam["largest_stable_xi"]["clamped"]["1"] == pytest.approx(0.89, abs=2e-3)
+    assert beam["largest_stable_xi"]["clamped"]["3"] == pytest.approx(0.309, abs=2e-3)
+    assert beam["slowest_rhp"] > 0.0
+    assert beam["decoupled"]["slowest_rhp"] is None
+    observer = json.loads(run(tmp_path, "--example=observer", "--json", "-").stdout)
+    assert observer["highest_bandwidth_hz"] == pytest.approx(48.63, abs=0.01)
+    assert observer["relative_error"]["30"] == pytest.approx(0.48, abs=0.03)
+    assert observer["relative_error"]["50"] is None
+    virtual = json.loads(run(tmp_path, "--example=virtual_output", "--json", "-").stdout)
+    assert all(re < 0.0 for re, _ in virtual["zeros"])
+    assert (
+        virtual["largest_deviation_mm"]["corrected"] < 0.02 < 20.0 < virtual["largest_deviation_mm"]["alone"]
+    )
 
 
 def test_the_page_opens(tmp_path: Path):
@@ -61,7 +73,10 @@ def test_the_two_joint_arm_is_minimum_phase_up_to_the_limit_of_the_source():
 
 REFUSED = {
     "robot": ("--robot=kr211", "robot 'kr211': no file"),
-    "example": ("--example=bridge", "--example must be one of two_joint_arm, beam, got 'bridge'"),
+    "example": (
+        "--example=bridge",
+        "--example must be one of two_joint_arm, beam, observer, virtual_output, got 'bridge'",
+    ),
     "rigid": ("--elasticity=rigid", "elasticity must be joints or structure"),
     "grid": ("--grid=1", "--grid must be at least 2, got 1"),
 }  # fmt: skip

@@ -62,3 +62,20 @@ def test_the_more_modes_the_nearer_to_the_joint():
 def test_an_impossible_beam_is_refused(wrong: dict, message: str):
     with pytest.raises(ValueError, match=message):
         ModalBeam(**wrong)
+
+
+@pytest.mark.parametrize("load", [0.2, 1.0, 5.0])
+def test_without_the_coupling_of_its_own_mass_the_end_has_a_stable_inverse(load: float):
+    """The zeros are then the natural frequencies of the clamped beam without its load, which stands still."""
+    beam = ModalBeam(num_modes=3, load=load)
+    assert not beam.zeros(1.0).is_minimum_phase
+    decoupled = beam.decoupled_zeros(1.0)
+    assert decoupled.is_minimum_phase
+    found = np.sort(np.imag(decoupled.values))[3:]
+    np.testing.assert_allclose(found, [3.516, 22.035, 61.697], rtol=1e-3)
+    assert beam.decoupled_zeros(1.0, load_coupled=False).is_minimum_phase
+
+
+def test_modes_of_a_supported_beam_are_not_decoupled():
+    with pytest.raises(ValueError, match="only clamped modes can be decoupled"):
+        ModalBeam(boundary="supported").decoupled_zeros()

@@ -1,0 +1,213 @@
+"""The textbook examples of zeros: numbers, a verdict, and what stands on the page of each."""
+
+from collections.abc import Callable
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from experiments.report.plot_page import Section, html_table
+from experiments.zeros.linear_arm import (
+    DISTANCE,
+    TIMES,
+    LinearArm,
+    filtered_path,
+    observed_error,
+    virtual_outputs,
+)
+from experiments.zeros.plots import beam_figure, locus_figure, plane_figure, time_figure
+from experiments.zeros.study import BEAM_MODES, one_json, two_joint_arm_limit, two_joint_arm_zeros
+from robots.dynamics.modal_beam import BOUNDARIES, ModalBeam
+from robots.dynamics.transmission_zeros import Zeros
+from systems.feedforward.inverse_observer import InverseObserver
+
+_BANDWIDTHS = (5.0, 10.0, 15.0, 20.0, 30.0, 40.0, 50.0)  # Hz
+_DRAWN = (15.0, 30.0)  # Hz
+
+
+class Example(NamedTuple):
+    """What there is to say of an example."""
+
+    numbers: dict[str, Any]  # for --json
+    verdict: str
+    sections: list[Section]
+
+
+def two_joint_arm() -> Example:
+    """Reiner (2010), section 3.5.3: from which point on the inverse is unstable."""
+    limit, zeros = two_joint_arm_limit(), two_joint_arm_zeros(0.5)
+    rates = ", ".join(f"{value:.2f}" for value in np.real(zeros.values))
+    verdict = (
+        f"The point 0.5 m beyond the centre of mass of the two-joint arm has zeros at {rates} 1/s; "
+        f"the inverse is stable up to {limit:.4f} m."
+    )
+    numbers = {**one_json(zeros), "x_l_m": 0.5, "largest_stable_x_l_m": limit}
+    return Example(numbers, verdict, [Section("Zeros, x_l = 0.5 m", "", plane_figure(zeros))])
+
+
+def beam() -> Example:
+    """Reiner (2010), sections 3.5.1 and 3.7: outputs along a driven beam, and a coupling that is left out."""
+    limits = {
+        boundary: {n: ModalBeam(num_modes=n, boundary=boundary).largest_stable_xi() for n in BEAM_MODES}
+        for boundary in BOUNDARIES
+    }
+    one, three = limits["clamped"][1], limits["clamped"][3]
+    nominal, decoupled = ModalBeam(num_modes=3).zeros(1.0), ModalBeam(num_modes=3).decoupled_zeros(1.0)
+    verdict = (
+        f"A driven beam with 0.45 of its mass at the end has a stable inverse for outputs up to {one:.3f} of "
+        f"its length with one mode, {three:.3f} with three; for its end, if the model leaves out what the "
+        "turning of the joint does to the modes."
+    )
+    head = ("boundary", *(f"{n} modes" for n in BEAM_MODES))
+    rows = [[b, *(f"{limit:.3f}" for limit in of.values())] for b, of in limits.items()]
+    sections = [Section(f"Output along the beam, {n} modes", "", beam_figure(n), 360) for n in (1, 3)]
+    sections += [
+        Section(f"Zeros by the place of the output, {n} modes", "", locus_figure(n), 420) for n in (3, 1)
+    ]
+    sections += [
+        Section("Largest stable output by number of modes", "", html_table(head, rows)),
+        Section(
+            "Output at the end, three modes",
+            "Squares of the zeros, in E I / (m l^3). A positive one makes the inverse unstable.",
+            html_table(
+                ("model", "s^2"),
+                [
+                    ["nominal", _squares(nominal)],
+                    ["without C_r of the beam, with that of the load", _squares(decoupled)],
+                ],
+            ),
+        ),
+    ]
+    numbers = {
+        **one_json(nominal),
+        "largest_stable_xi": {b: {str(n): limit for n, limit in of.items()} for b, of in limits.items()},
+        "decoupled": one_json(decoupled),
+    }
+    return Example(numbers, verdict, sections)
+
+
+def observer() -> Example:
+    """Reiner (2010), section 5.2.1, on the two-joint arm: as in figure 5.4."""
+    arm = LinearArm()
+    zeros = arm.zeros
+    plain = _largest(observed_error(arm, None))
+    highest, chosen = InverseObserver.highest_bandwidth(zeros), InverseObserver.beside(zeros)
+    shares = {hertz: _share(arm, hertz, plain) for hertz in (*_BANDWIDTHS, chosen.bandwidth)}
+    share = shares[chosen.bandwidth]
+    verdict = (
+        f"Around an approximate inverse of the two-joint arm an observer of {chosen.bandwidth:.1f} Hz, by "
+        f"the zero at {highest:.1f} Hz, leaves {share:.2f} of the largest error of {1e3 * plain:.3f} mm; "
+        f"one of {max(hertz for hertz, value in shares.items() if value is None):g} Hz is unstable."
+    )
+    curves = {"approximate inverse": observed_error(arm, None)}
+    for hertz in (*_DRAWN, chosen.bandwidth):
+        curves[f"observer of {hertz:.3g} Hz"] = observed_error(arm, InverseObserver(hertz))
+    errors = {name: 1e3 * np.abs(error) for name, error in curves.items() if error is not None}
+    rows = [
+        [f"{hertz:.1f}", "unstable" if value is None else f"{value:.3f}"]
+        for hertz, value in sorted(shares.items())
+    ]
+    sections = [
+        Section(
+            "Error with and without the observer",
+            f"Of a point that goes {DISTANCE:g} m; as in Reiner (2010), figure 5.4.",
+            time_figure(TIMES, errors, "error in mm"),
+            420,
+        ),
+        Section(
+            "Largest error by bandwidth",
+            "Relative to the approximate inverse alone. A bandwidth above the zero is refused where an "
+            "observer is made for an arm; here it shows why.",
+            html_table(("bandwidth in Hz", "relative error"), rows),
+        ),
+    ]
+    numbers = {
+        **one_json(zeros),
+        "highest_bandwidth_hz": highest,
+        "bandwidth_hz": chosen.bandwidth,
+        "largest_error_mm": {"approximate": 1e3 * plain, "observer": 1e3 * plain * (share or np.nan)},
+        "relative_error": {f"{hertz:.4g}": value for hertz, value in sorted(shares.items())},
+    }
+    return Example(numbers, verdict, sections)
+
+
+def virtual_output() -> Example:
+    """Reiner (2010), section 3.5.3, figure 3.12: zeros at wanted places, and what that costs on the way."""
+    arm = LinearArm()
+    own = np.real(arm.zeros.values)
+    wanted = -np.abs(np.array([own[0], own[0], own[-1]]))
+    found, alone, corrected = virtual_outputs(arm, wanted)
+    path = filtered_path()
+    off = {"virtual output": alone - path, "with quasi-static correction": corrected - path}
+    largest = {name: float(1e3 * np.abs(error).max()) for name, error in off.items()}
+    first, second = largest.values()
+    verdict = (
+        f"With zeros wanted at {', '.join(f'{zero:.2f}' for zero in wanted)} 1/s the arm can be inverted "
+        f"exactly for the virtual output; the point is off by {first:.1f} mm on the way, by {second:.3f} mm "
+        "with the quasi-static correction, and where it should be at the end."
+    )
+    reached = found.numerator.roots()
+    curves = {"wanted": path, "virtual output": alone, "with quasi-static correction": corrected}
+    sections = [
+        Section(
+            "Path of the point", "Reiner (2010), figure 3.12.", time_figure(TIMES, curves, "y in m"), 420
+        ),
+        Section(
+            "Deviation on the way",
+            "",
+            time_figure(TIMES, {name: 1e3 * error for name, error in off.items()}, "deviation in mm"),
+            360,
+        ),
+        Section(
+            "Zeros",
+            "Two at one place are ill-conditioned: they come out beside each other, though the polynomial is "
+            f"right to {found.error:.0e}.",
+            html_table(
+                ("wanted in 1/s", "reached in 1/s"),
+                [
+                    [f"{a:.4f}", f"{b:.4f}"]
+                    for a, b in zip(
+                        np.sort(wanted), np.sort_complex(np.asarray(reached, dtype=complex)), strict=True
+                    )
+                ],
+            ),
+        ),
+    ]
+    numbers = {
+        "zeros": [[float(np.real(zero)), float(np.imag(zero))] for zero in reached],
+        "slowest_rhp": None,
+        "poses": 1,
+        "wanted": wanted.tolist(),
+        "weights": found.weights.tolist(),
+        "largest_deviation_mm": {"alone": first, "corrected": second},
+    }
+    return Example(numbers, verdict, sections)
+
+
+EXAMPLES: dict[str, Callable[[], Example]] = {
+    each.__name__: each for each in (two_joint_arm, beam, observer, virtual_output)
+}
+
+
+def example_named(name: str) -> Example:
+    """An example by its name.
+
+    Raises:
+        ValueError: if there is no such example.
+    """
+    if name not in EXAMPLES:
+        raise ValueError(f"--example must be one of {', '.join(EXAMPLES)}, got '{name}'")
+    found = EXAMPLES[name]()
+    return found._replace(numbers={"example": name, **found.numbers})
+
+
+def _largest(error: np.ndarray | None) -> float:
+    return np.nan if error is None else float(np.abs(error).max())
+
+
+def _share(arm: LinearArm, bandwidth: float, plain: float) -> float | None:
+    error = observed_error(arm, InverseObserver(bandwidth))
+    return None if error is None else _largest(error) / plain
+
+
+def _squares(zeros: Zeros) -> str:
+    return ", ".join(f"{value:.1f}" for value in np.unique(np.real(zeros.values**2).round(1)))
