@@ -16,6 +16,7 @@ from experiments.calibration.calibrate_command import calibrate_command
 from experiments.calibration.design_command import design_command
 from experiments.cameras.command import cameras_app
 from experiments.cli.cluster import executor
+from experiments.cli.command_app import command_app
 from experiments.cli.console import (
     count,
     print_note,
@@ -49,10 +50,11 @@ from experiments.cli.prepare import Prepared, check, prepare
 from experiments.cli.staging import staged_file, staged_folder
 from experiments.cli.tables import print_summary
 from experiments.comparison.compare import compare, compared_laws, named_laws, simulating
-from experiments.comparison.learnt_file import WriteOption, calibrating_law, robot_writer
+from experiments.comparison.learnt_file import WriteOption, check_write, robot_writer
 from experiments.comparison.results import RESULTS, write_results
 from experiments.compensate.command import compensate_command
 from experiments.diagram.view import write_diagram
+from experiments.doctor.command import doctor_command
 from experiments.drivetrain.command import drivetrain_command
 from experiments.feedforward.command import feedforward_command
 from experiments.frames.commands import align_command, chain_command, frame_command, tool_command
@@ -81,12 +83,9 @@ from experiments.watch.command import watch_command
 from experiments.zeros.command import zeros_command
 from systems.servo import LAWS
 
-app = typer.Typer(
-    help="Puts the true tip of an industrial robot on its path: visual-servo laws, simulated and compared.",
-    no_args_is_help=True,
-    add_completion=False,
-    pretty_exceptions_enable=False,
-    context_settings={"help_option_names": ["-h", "--help"]},
+app = command_app(
+    "Puts the true tip of an industrial robot on its path: visual-servo laws, simulated and compared.",
+    completes=True,
 )
 
 LawOption = Annotated[
@@ -170,8 +169,7 @@ def compare_command(
         at_least("--jobs", 1, jobs)
         cycles = 1 if is_quick else cycles
         chosen = named_laws(laws)
-        if write:
-            calibrating_law(chosen)
+        check_write(write, chosen)
         changes = _settings(settings, None, feedforward, camera, laps)
         name, changes = on_station(scenario, changes, station, with_cell)
         prepared = prepare(name, changes, robot, is_quick)
@@ -236,8 +234,7 @@ def run_command(
         name, changes = on_station(scenario, changes, station, with_cell)
         prepared = prepare(name, changes, robot)
         law = prepared.scenario.law
-        if write:
-            calibrating_law([law])
+        check_write(write, [law])
         check(prepared, [law])
         print_note(console, prepared.note)
         is_guided = prepared.scenario.station.kind != "simulated"
@@ -322,6 +319,7 @@ app.command("align")(align_command)
 app.add_typer(robots_app, name="robots")
 app.command("watch")(watch_command)
 app.command("scenarios")(scenarios_command)
+app.command("doctor")(doctor_command)
 
 
 def _settings(

@@ -8,6 +8,8 @@ from collections.abc import Iterator, Mapping
 from pathlib import Path
 from types import ModuleType
 
+from robots.configuration.suggestion import did_you_mean
+
 
 class NamedClasses(Mapping[str, type]):
     """The classes of one kind that come with truetip, each imported when it is first asked for.
@@ -49,11 +51,19 @@ class NamedClasses(Mapping[str, type]):
             return self[name]
         file, colon, class_name = name.rpartition(":")
         if not (colon and file.endswith(".py")):
-            raise ValueError(f"{self._kind} must be one of {', '.join(self)}, or FILE.py:CLASS, got '{name}'")
+            guess = did_you_mean(name, self)
+            allowed = ", ".join(self)
+            raise ValueError(f"{self._kind} must be one of {allowed}, or FILE.py:CLASS, got '{name}'{guess}")
         found = getattr(_module_of(file, self._kind), class_name, None)
         if not isinstance(found, type):
-            raise ValueError(f"{self._kind}: {file} has no class '{class_name}'")
+            guess = did_you_mean(class_name, _classes_in(file, self._kind))
+            raise ValueError(f"{self._kind}: {file} has no class '{class_name}'{guess}")
         return found
+
+
+def _classes_in(file: str, kind: str) -> list[str]:
+    module = _module_of(file, kind)
+    return [name for name, each in vars(module).items() if isinstance(each, type)]
 
 
 def _module_of(file: str, kind: str) -> ModuleType:

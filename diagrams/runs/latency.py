@@ -24,6 +24,16 @@ class LatencyConfig:
     amplitude_deg: float = 4.0
     duration: float = 20.0  # s
 
+    def check(self) -> None:
+        """Refuses a motion that would show nothing. Raises ValueError, one line."""
+        if not 1 <= self.joint <= NUM_JOINTS:
+            raise ValueError(f"latency: joint must be 1 to {NUM_JOINTS}, got {self.joint}")
+        if not (self.duration >= 4.0 and 0.0 < self.amplitude_deg <= 20.0):
+            raise ValueError(
+                "latency: duration must be at least 4 s and amplitude_deg in (0, 20], got "
+                f"{self.duration} s and {self.amplitude_deg} deg"
+            )
+
 
 @dataclass(frozen=True)
 class LatencyRecord:
@@ -84,13 +94,7 @@ def measure_latency(
         StationError: if the station is not there or falls silent.
         ValueError: if there is no such joint, or the motion would leave its range.
     """
-    if not 1 <= config.joint <= NUM_JOINTS:
-        raise ValueError(f"latency: joint must be 1 to {NUM_JOINTS}, got {config.joint}")
-    if not (config.duration >= 4.0 and 0.0 < config.amplitude_deg <= 20.0):
-        raise ValueError(
-            "latency: duration must be at least 4 s and amplitude_deg in (0, 20], got "
-            f"{config.duration} s and {config.amplitude_deg} deg"
-        )
+    config.check()
     axis = config.joint - 1
     wire = HardwareLink(client, camera, scenario, robot, False, now)
     wire.connect(camera is not None)

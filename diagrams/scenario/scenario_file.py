@@ -6,6 +6,7 @@ from pathlib import Path
 from diagrams.scenario.former_names import renamed
 from robots.configuration.extended import FileKind, read_extended
 from robots.configuration.nodes import ConfigurationError, Node, parse
+from robots.configuration.suggestion import did_you_mean
 from robots.configuration.typed import merged
 
 
@@ -53,9 +54,9 @@ def _find(name: str, beside: Path) -> tuple[Path, str]:
     is_file = name.endswith((".yaml", ".yml"))
     path = beside / name if is_file else Path(str(_folder() / f"{name}.yaml"))
     if not path.is_file():
-        allowed = ", ".join(shipped_scenarios())
+        allowed, guess = ", ".join(shipped_scenarios()), did_you_mean(name, shipped_scenarios())
         raise ScenarioError(
-            f"scenario '{name}': no file {path}; give the path of a YAML file or one of {allowed}"
+            f"scenario '{name}': no file {path}; give the path of a YAML file or one of {allowed}{guess}"
         )
     return path, f"scenario {path if is_file else name}"
 

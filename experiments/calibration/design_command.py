@@ -50,6 +50,7 @@ def design_command(
     camera: Annotated[
         str | None,
         typer.Option(
+            "--camera-at",
             metavar="X,Y,Z",
             help="Position of a camera in m that must see the tool; by default cameras are all around.",
         ),
@@ -151,7 +152,7 @@ def _place(text: str) -> tuple[float, float, float]:
     try:
         x, y, z = (float(part) for part in text.split(","))
     except ValueError:
-        raise ValueError(f"--camera must be three numbers in m such as 1.5,0,1.2, got '{text}'") from None
+        raise ValueError(f"--camera-at must be three numbers in m such as 1.5,0,1.2, got '{text}'") from None
     return x, y, z
 
 

@@ -20,10 +20,18 @@ from experiments.cameras.report import print_study, write_study_page
 from experiments.cameras.study import CamerasStudy, covariances, study_json, study_setup
 from experiments.cameras.sweeps import study_sweeps
 from experiments.cli.cluster import executor
+from experiments.cli.command_app import command_app
 from experiments.cli.console import print_files, progress_bar, refusing
 from experiments.cli.json_output import human_console, json_output
 from experiments.cli.option_limits import at_least, positive
-from experiments.cli.options import JobsOption, JsonOption, ScenarioOption, SchedulerOption, SetOption
+from experiments.cli.options import (
+    JobsOption,
+    JsonOption,
+    OnlyPictureOption,
+    ScenarioOption,
+    SchedulerOption,
+    SetOption,
+)
 from experiments.cli.prepare import prepare
 from experiments.cli.staging import PAGE, TABLE, YAML, staged_file
 from experiments.report.files import write_text
@@ -36,10 +44,7 @@ from systems.vision.camera_rig_file import cell_text, with_cameras
 
 SIMULATED = "simulated"
 
-cameras_app = typer.Typer(
-    help="Calibrate the cameras of a cell, and study what limits the accuracy of a pose.",
-    no_args_is_help=True,
-)
+cameras_app = command_app("Calibrate the cameras of a cell, and study what limits the accuracy of a pose.")
 
 CellOption = Annotated[
     str, typer.Option("--cell", metavar="NAME|FILE", help="A shipped measuring cell or a YAML file.")
@@ -75,7 +80,7 @@ def calibrate_cameras_command(
     write: Annotated[
         str | None, typer.Option(metavar="FILE.yaml", help="The cell with the calibrated cameras.")
     ] = None,
-    out: Annotated[Path, typer.Option(metavar="FILE.html", help="The report.")] = Path("out/cameras.html"),
+    out: OnlyPictureOption = Path("out/cameras.html"),
     json_file: JsonOption = None,
 ) -> None:
     """Calibrate poses and lenses of the cameras with a wand and an L-frame."""
@@ -130,7 +135,7 @@ def study_cameras_command(
     ] = False,
     jobs: JobsOption = None,
     scheduler: SchedulerOption = None,
-    out: Annotated[Path, typer.Option(metavar="FILE.html", help="The report.")] = Path("out/study.html"),
+    out: OnlyPictureOption = Path("out/study.html"),
     json_file: JsonOption = None,
 ) -> None:
     """Study how cameras, light and markers limit the pose accuracy, and the effect on the laws."""

@@ -25,11 +25,18 @@ def refusing(*refusals: type[Exception]) -> Iterator[None]:
     try:
         yield
     except refusals as error:
-        fail(str(error), BAD_INPUT)
+        fail(_plain(error), BAD_INPUT)
     except SimulationError as error:
         fail(str(error), BROKEN_OFF)
     except KeyboardInterrupt as error:
         fail("interrupted, nothing was written", exit_code(error))
+
+
+def _plain(error: Exception) -> str:
+    """The message of an error; of one of the system the file first, and no number."""
+    if isinstance(error, OSError) and error.filename is not None and error.strerror:
+        return f"{error.filename}: {error.strerror.lower()}"
+    return str(error)
 
 
 def fail(message: str, code: int) -> None:

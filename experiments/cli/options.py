@@ -105,12 +105,16 @@ SchedulerOption = Annotated[
     ),
 ]
 OutOption = Annotated[Path, typer.Option("--out", metavar="DIR", help="Folder of the results.")]
-PictureOption = Annotated[Path, typer.Option(metavar="FILE.html", help="The picture.")]  # --out or --report
+PictureOption = Annotated[Path, typer.Option("--report", metavar="FILE.html", help="The picture.")]
+# Where nothing else is written, --out names it too.
+OnlyPictureOption = Annotated[
+    Path, typer.Option("--report", "--out", metavar="FILE.html", help="The picture.")
+]
 
 
 def json_option(text: str) -> Any:
     """``--json`` with a help text of its own; what it does is in `json_output`."""
-    return typer.Option("--json", metavar="FILE", help=text)
+    return typer.Option("--json", metavar="FILE|-", help=text)
 
 
 JsonOption = Annotated[str | None, json_option("The numbers; - prints them, and nothing else.")]

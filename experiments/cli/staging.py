@@ -3,7 +3,7 @@
 import os
 import shutil
 import tempfile
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 
@@ -54,10 +54,15 @@ def staged_file(path: str | Path, *suffixes: str) -> Iterator[Path]:
     path = Path(path)
     if path.is_dir():
         raise OSError(f"cannot write the file {path}: it is a folder")
-    if suffixes and path.suffix.lower() not in suffixes:
-        raise OSError(f"cannot write the file {path}: its name must end in {' or '.join(suffixes)}")
+    check_suffix(path, suffixes)
     with staged_folder(path.parent) as stage:
         yield stage / path.name
+
+
+def check_suffix(path: str | Path, suffixes: Sequence[str]) -> None:
+    """Raises OSError, one line, if there are suffixes and the name of a file ends in none of them."""
+    if suffixes and Path(path).suffix.lower() not in suffixes:
+        raise OSError(f"cannot write the file {path}: its name must end in {' or '.join(suffixes)}")
 
 
 def keep_files(stage: Path, folder: Path) -> None:

@@ -7,7 +7,7 @@ from typing import Annotated
 import typer
 
 from diagrams.record.log import RunLog
-from experiments.cli.staging import YAML, staged_file
+from experiments.cli.staging import YAML, check_suffix, staged_file
 from experiments.report.files import write_text
 from robots.description.robot_file import robot_text
 from systems.servo import LAWS
@@ -33,6 +33,18 @@ def calibrating_law(laws: Sequence[str]) -> str:
             f"got {', '.join(laws)}"
         )
     return found[0]
+
+
+def check_write(file: str | None, laws: Sequence[str]) -> None:
+    """Refuses ``--write`` before anything is built.
+
+    Raises:
+        OSError: if the name of the file does not say that it is YAML.
+        ValueError: as `calibrating_law`.
+    """
+    if file is not None:
+        calibrating_law(laws)
+        check_suffix(file, YAML)
 
 
 def robot_writer(

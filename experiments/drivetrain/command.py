@@ -2,14 +2,12 @@
 
 from contextlib import ExitStack
 from pathlib import Path
-from typing import Annotated
 
 import numpy as np
-import typer
 
 from experiments.cli.console import print_files, refusing
 from experiments.cli.json_output import human_console, json_output
-from experiments.cli.options import JsonOption
+from experiments.cli.options import JsonOption, OnlyPictureOption
 from experiments.cli.staging import PAGE, staged_file
 from experiments.drivetrain.figures import (
     PLAY_APPROXIMATIONS,
@@ -29,9 +27,7 @@ from robots.drivetrain.parts import PARTS
 
 
 def drivetrain_command(
-    out: Annotated[Path, typer.Option(metavar="FILE.html", help="The pictures.")] = Path(
-        "out/drivetrain.html"
-    ),
+    out: OnlyPictureOption = Path("out/drivetrain.html"),
     json_file: JsonOption = None,
 ) -> None:
     """Draw friction, efficiency, play and hysteresis as in Reiner (2010), figures 2.3 to 2.6."""

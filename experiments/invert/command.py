@@ -15,8 +15,8 @@ from experiments.cli.options import (
     GridOption,
     JobsOption,
     JsonOption,
+    OnlyPictureOption,
     PayloadOption,
-    PictureOption,
     StudiedRobotOption,
 )
 from experiments.cli.staging import PAGE, staged_file
@@ -35,7 +35,7 @@ def invert_command(
         float, typer.Option(metavar="SHARE", help="Every spring of the true robot is up to so much off.")
     ] = 0.0,
     seeds: Annotated[int, typer.Option(metavar="N", help="How many robots with such springs.")] = 1,
-    out: PictureOption = Path("out/invert.html"),
+    out: OnlyPictureOption = Path("out/invert.html"),
     json_file: JsonOption = None,
     jobs: JobsOption = None,
 ) -> None:

@@ -16,8 +16,8 @@ from experiments.cli.json_output import human_console, json_output
 from experiments.cli.options import (
     GridOption,
     JsonOption,
+    OnlyPictureOption,
     PayloadOption,
-    PictureOption,
     StudiedRobotOption,
 )
 from experiments.cli.staging import PAGE, staged_file
@@ -38,13 +38,13 @@ def modes_command(
     ] = "structure",
     grid: GridOption = 25,
     mode: Annotated[int, typer.Option(metavar="N", help="Number of the animated mode, from 1.")] = 1,
-    out: PictureOption = Path("out/modes.html"),
+    out: OnlyPictureOption = Path("out/modes.html"),
     animation: Annotated[
         Path | None,
         typer.Option(
             metavar="FILE.html",
             help="Animation of the mode, arm stretched.",
-            show_default="beside --out, as out/modes-animation.html",
+            show_default="beside --report, as out/modes-animation.html",
         ),
     ] = None,
     json_file: JsonOption = None,

@@ -9,6 +9,7 @@ import typer
 from rich.console import Console
 from rich.markup import escape
 
+from experiments.cli.command_app import command_app
 from experiments.cli.console import print_list, print_note, refusing
 from experiments.cli.staging import YAML, staged_file
 from experiments.report.files import write_text
@@ -17,7 +18,9 @@ from robots.description.model import RobotModel, load_robot, robot_of, shipped_r
 from robots.description.robot_file import robot_text
 from robots.description.urdf_in.reader import UrdfRobot, is_urdf, read_urdf
 
-robots_app = typer.Typer(help="List the robots that come with truetip, or make a robot file of a URDF.")
+robots_app = command_app(
+    "List the robots that come with truetip, or make a robot file of a URDF.", no_args_is_help=False
+)
 
 
 @robots_app.callback(invoke_without_command=True)

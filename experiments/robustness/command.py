@@ -19,6 +19,7 @@ from experiments.comparison.compare import named_laws
 from experiments.report.style import law_title
 from experiments.robustness.cases import CASES
 from experiments.robustness.study import Case, judged, run_trials, trials
+from robots.configuration.suggestion import did_you_mean
 from systems.reference.paths import make_path
 
 PATHS = ("rectangle", "circle", "figure_eight")
@@ -76,7 +77,8 @@ def robustness_command(
 
 def _case(name: str, settings: list[str]) -> Case:
     if name not in CASES:
-        raise ValueError(f"--cases: must be of {', '.join(CASES)}, got '{name}'")
+        guess = did_you_mean(name, CASES)
+        raise ValueError(f"--cases: must be of {', '.join(CASES)}, got '{name}'{guess}")
     return replace(CASES[name], settings=(*CASES[name].settings, *settings))
 
 

@@ -1,5 +1,6 @@
 """``truetip cell``: a robot cell that exists only in this process, for clients of robot and camera."""
 
+import ipaddress
 import json
 import os
 import signal
@@ -65,6 +66,8 @@ def cell_command(
     with refusing(ValueError, OSError), ExitStack() as stack:
         if duration is not None and not duration > 0.0:
             raise ValueError(f"--duration must be positive, got {duration:g} s")
+        if peer:
+            _check_address("--peer", peer)
         prepared = prepare(scenario, [*(settings or []), *fault_settings(faults)], robot)
         files = [
             stack.enter_context(staged_file(name, suffix)) if name else None
@@ -155,3 +158,10 @@ class _Stop:
     def is_reached(self, time: float) -> bool:
         """Whether to stop at the cell's time in s."""
         return self._is_asked or (self._duration is not None and time >= self._duration)
+
+
+def _check_address(option: str, given: str) -> None:
+    try:
+        ipaddress.ip_address(given)
+    except ValueError:
+        raise ValueError(f"{option} must be an address such as 192.168.125.1, got '{given}'") from None

@@ -49,6 +49,8 @@ def latency_command(
     """Measure the delays and clocks of a real station by moving one joint back and forth."""
     human = human_console(json_file)
     with json_output(json_file) as output, refusing(ValueError, OSError), ExitStack() as stack:
+        config = LatencyConfig(joint, amplitude, duration)
+        config.check()
         link = load_scenario(scenario, settings).station.link.kind
         name, changes = on_station(scenario, list(settings or []), link, with_cell)
         prepared = prepare(name, changes)
@@ -56,7 +58,7 @@ def latency_command(
         page = stack.enter_context(staged_file(report, *PAGE))
         written = stack.enter_context(staged_file(write, *YAML)) if write else None
         stack.enter_context(output.staged())
-        record = _measured(prepared, LatencyConfig(joint, amplitude, duration), with_cell)
+        record = _measured(prepared, config, with_cell)
         try:
             found = evaluate(record)
         except ImpossibleDelayError as error:

@@ -9,7 +9,13 @@ from rich.markup import escape
 
 from experiments.cli.console import print_files, progress_bar, refusing
 from experiments.cli.json_output import human_console, json_output
-from experiments.cli.options import GridOption, JsonOption, PayloadOption, PictureOption, StudiedRobotOption
+from experiments.cli.options import (
+    GridOption,
+    JsonOption,
+    OnlyPictureOption,
+    PayloadOption,
+    StudiedRobotOption,
+)
 from experiments.cli.staging import PAGE, staged_file
 from experiments.report.plot_page import Section, write_plot_page
 from experiments.zeros.examples import EXAMPLES, example_named
@@ -28,7 +34,7 @@ def zeros_command(
     example: Annotated[
         str | None, typer.Option(metavar="NAME", help=f"In place of a robot: {', '.join(EXAMPLES)}.")
     ] = None,
-    out: PictureOption = Path("out/zeros.html"),
+    out: OnlyPictureOption = Path("out/zeros.html"),
     json_file: JsonOption = None,
 ) -> None:
     """Find out whether an elastic robot has a stable exact inverse, and how fast its unstable zeros are."""

@@ -60,7 +60,9 @@ def read_nodes(path: Path, label: str) -> Node:
     """
     try:
         text = path.read_text(encoding="utf-8")
-    except (OSError, UnicodeDecodeError) as error:
+    except OSError as error:
+        raise ConfigurationError(f"{label}: {(error.strerror or _one_line(error)).lower()}") from error
+    except UnicodeDecodeError as error:
         raise ConfigurationError(f"{label}: {_one_line(error)}") from error
     return parse(text, label)
 

@@ -10,6 +10,7 @@ from pydrake.common.yaml import yaml_dump, yaml_load_typed
 
 from robots.configuration.nodes import Node
 from robots.configuration.quantity import Declaration, declaration, dotted, out_of_range
+from robots.configuration.suggestion import did_you_mean
 from robots.configuration.union import entries, selected, tags, union_members
 
 _Schema = TypeVar("_Schema")
@@ -131,7 +132,9 @@ def _with_aside(
     for key, node in aside.items():
         if not any(key in names for names in known.values()):
             names = dict.fromkeys(name for each in members for name in known[each])
-            raise node.refuse(f"unknown key '{path}.{key}'; known here: {', '.join(names)}")
+            raise node.refuse(
+                f"unknown key '{path}.{key}'; known here: {', '.join(names)}{did_you_mean(key, names)}"
+            )
     return {key: node for key, node in aside.items() if key in known[member]}
 
 
@@ -144,7 +147,8 @@ def _checked_fields(node: Node, schema: Any, path: str) -> dict[str, Any]:
     for key, entry in node.value.items():
         below = f"{path}.{key}".lstrip(".")
         if key not in known:
-            raise entry.refuse(f"unknown key '{below}'; known here: {', '.join(known)}")
+            guess = did_you_mean(key, known)
+            raise entry.refuse(f"unknown key '{below}'; known here: {', '.join(known)}{guess}")
         tree[key] = _checked(entry, hints[key], _declared(known[key], hints[key]), below)
     return tree
 
@@ -179,7 +183,8 @@ def _checked_dict(node: Node, schema: Any, declared: Declaration, path: str) -> 
         raise node.refuse(f"{path} must be a group of {', '.join(allowed or ['names'])}, got {node.plain!r}")
     for key, entry in node.value.items():
         if allowed is not None and key not in allowed:
-            raise entry.refuse(f"unknown key '{path}.{key}'; known here: {', '.join(allowed)}")
+            guess = did_you_mean(key, allowed)
+            raise entry.refuse(f"unknown key '{path}.{key}'; known here: {', '.join(allowed)}{guess}")
     inner = Declaration(sizes=declared.sizes)
     return {key: _checked(entry, schema, inner, f"{path}.{key}") for key, entry in node.value.items()}
 
@@ -240,7 +245,7 @@ def _checked_scalar(node: Node, schema: Any, declared: Declaration, path: str) -
     allowed = declared.choices() if declared.choices else None
     if allowed is not None and value not in allowed:
         names = ", ".join(name for name in allowed if name)
-        raise node.refuse(f"{path} must be one of {names}, got '{value}'")
+        raise node.refuse(f"{path} must be one of {names}, got '{value}'{did_you_mean(value, allowed)}")
     return value
 
 

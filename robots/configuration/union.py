@@ -6,6 +6,7 @@ from types import NoneType, UnionType
 from typing import Any, Union, get_args, get_origin
 
 from robots.configuration.nodes import Node
+from robots.configuration.suggestion import did_you_mean
 
 _SELECTOR = "kind"  # a key in place of a tag, as --set station.camera.kind=features needs it
 
@@ -46,8 +47,9 @@ def selected(members: tuple[type, ...], node: Node, path: str) -> type | None:
     for member in members:
         if name in (short_name(member), *tags(member)):
             return member
-    allowed = ", ".join(short_name(member) for member in members)
-    raise where.refuse(f"{path} must be one of {allowed}, got '{name}'")
+    names = [short_name(member) for member in members]
+    guess = did_you_mean(name, [tags(member)[1] for member in members] if node.tag else names)
+    raise where.refuse(f"{path} must be one of {', '.join(names)}, got '{name}'{guess}")
 
 
 def entries(node: Node, members: tuple[type, ...]) -> dict[str, Node] | None:

@@ -20,6 +20,7 @@ import numpy as np
 from robots.configuration.extended import FileKind, read_extended
 from robots.configuration.nodes import ConfigurationError, Node, read_nodes
 from robots.configuration.quantity import numbers, positive, quantity
+from robots.configuration.suggestion import did_you_mean
 from robots.configuration.typed import typed
 from robots.description.beam import Beam, beam_surrogate
 from robots.description.calibration import Calibration
@@ -280,6 +281,7 @@ def _find(name: str, beside: Path) -> tuple[Path, str]:
         raise RobotFileError(
             f"robot '{name}': no file {path}; "
             f"give the path of a YAML file or a URDF, or one of {', '.join(shipped_robots())}"
+            f"{did_you_mean(name, shipped_robots())}"
         )
     return path, f"robot file {path}"
 

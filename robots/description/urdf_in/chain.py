@@ -60,7 +60,9 @@ class UrdfText:
         try:
             self._lines = path.read_text(encoding="utf-8").splitlines()
             self.root = ElementTree.fromstring("\n".join(self._lines))
-        except (OSError, UnicodeDecodeError, ElementTree.ParseError) as error:
+        except OSError as error:
+            raise ConfigurationError(f"{label}: {(error.strerror or str(error)).lower()}") from error
+        except (UnicodeDecodeError, ElementTree.ParseError) as error:
             raise ConfigurationError(f"{label}: no readable URDF: {' '.join(str(error).split())}") from error
         if self.root.tag != "robot":
             raise ConfigurationError(f"{label}: a URDF begins with <robot>, got <{self.root.tag}>")

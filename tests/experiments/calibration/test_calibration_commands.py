@@ -117,7 +117,10 @@ def test_bad_rows_are_named_and_do_no_harm(calibrated: Path, tmp_path: Path):
         (["design", "--count", "3"], "count must be between 5"),
         (["design", "--criterion", "x"], "criterion must be one of b3, d, i, got 'x'"),
         (["design", "--robot", "none"], "robot 'none': no file"),
-        (["design", "--camera", "here"], "--camera must be three numbers in m such as 1.5,0,1.2, got 'here'"),
+        (
+            ["design", "--camera-at", "here"],
+            "--camera-at must be three numbers in m such as 1.5,0,1.2, got",
+        ),
         (["calibrate", "--noise", "loud"], "--noise must be estimate, source or the path of a YAML file"),
         (["calibrate", "--measurements", "x.csv", "--count", "30"], "--count is for simulated measurements"),
         (["calibrate", "--validation", "x.csv"], "--validation needs --measurements"),
