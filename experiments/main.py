@@ -58,6 +58,7 @@ from experiments.doctor.command import doctor_command
 from experiments.drivetrain.command import drivetrain_command
 from experiments.feedforward.command import feedforward_command
 from experiments.frames.commands import align_command, chain_command, frame_command, tool_command
+from experiments.health.command import health_command
 from experiments.invert.command import invert_command
 from experiments.metrics.run_metrics import timing, with_timing
 from experiments.modes.command import modes_command
@@ -318,6 +319,7 @@ app.command("tool")(tool_command)
 app.command("align")(align_command)
 app.add_typer(robots_app, name="robots")
 app.command("watch")(watch_command)
+app.command("health")(health_command)
 app.command("scenarios")(scenarios_command)
 app.command("doctor")(doctor_command)
 

@@ -1,0 +1,135 @@
+"""``truetip health``: a daily check that names what has changed: a camera, a joint or the tool."""
+
+from contextlib import ExitStack
+from pathlib import Path
+from typing import Annotated, Any
+
+import numpy as np
+import plotly.graph_objects as go
+import typer
+from rich.markup import escape
+
+from experiments.cli.console import count, print_files, progress_bar, refusing
+from experiments.cli.json_output import human_console, json_output
+from experiments.cli.option_limits import at_least
+from experiments.cli.options import JsonOption, PictureOption, RobotOption, ScenarioOption, SetOption
+from experiments.cli.prepare import prepare, simulated_only
+from experiments.cli.staging import PAGE, staged_file
+from experiments.health.history import History, read_history, write_history
+from experiments.health.study import DAY, NOISE, HealthStudy, Injected, deviations
+from experiments.report.plot_page import Section, html_table, write_plot_page
+from robots.description.model import RobotModel
+from robots.metrology.daily_check import TOOL, sizes_alone
+
+_HISTORY = (".parquet",)
+_AID = "An aid, not a safety function."
+
+
+def health_command(
+    scenario: ScenarioOption = "nominal",
+    settings: SetOption = None,
+    robot: RobotOption = None,
+    history: Annotated[
+        Path, typer.Option(metavar="FILE.parquet", help="Checks so far; new ones are appended.")
+    ] = Path("out/health.parquet"),
+    checks: Annotated[int, typer.Option(metavar="N", help="How many checks to run, one a day.")] = 1,
+    change: Annotated[
+        str | None,
+        typer.Option(
+            metavar="KIND:...",
+            help="Change the simulated station: joint:3:40 (mdeg), tool:0.2 (mm), "
+            "camera:04:50 (microradians).",
+        ),
+    ] = None,
+    change_at: Annotated[
+        int | None,
+        typer.Option(
+            "--change-at",
+            metavar="N",
+            help="The check in which it changes.",
+            show_default="the first new one",
+        ),
+    ] = None,
+    cell: Annotated[str, typer.Option(metavar="NAME|FILE", help="The cameras.")] = "probst",
+    out: PictureOption = Path("out/health.html"),
+    json_file: JsonOption = None,
+) -> None:
+    """Check cameras, joints and tool of a station, and name what has changed since the first check."""
+    human = human_console(json_file)
+    with json_output(json_file) as output, refusing(ValueError, OSError), ExitStack() as stack:
+        at_least("--checks", 1, checks)
+        prepared = prepare(scenario, settings or [], robot, needs_path=False)
+        simulated_only(prepared, "health", "leave out --station")
+        study = HealthStudy(prepared.scenario, prepared.robot, cell)
+        before = read_history(history) if history.exists() else study.begun()
+        injected = Injected.parse(change, study.names) if change else None
+        if change_at is not None and injected is None:
+            raise ValueError("--change-at needs --change")
+        first = len(before.time) + 1 if change_at is None else change_at
+        at_least("--change-at", 1, first)
+        page = stack.enter_context(staged_file(out, *PAGE))
+        table = stack.enter_context(staged_file(history, *_HISTORY))
+        stack.enter_context(output.staged())
+        with progress_bar(count(checks, "check")) as progress:
+            after = study.continued(before, checks, injected, first, progress)
+        alarms = study.alarms(after)
+        write_history(table, after)
+        verdict = _verdict(after, alarms)
+        _write_page(page, f"Health, {prepared.title}", verdict, after, prepared.robot, alarms)
+        output.write({"alarms": alarms, "history": str(history), "checks": len(after.time)})
+    human.print(escape(verdict))
+    print_files(human, out, history)
+
+
+def _verdict(history: History, alarms: list[dict[str, Any]]) -> str:
+    said = f"{count(len(history.time), 'check')} of {history.robot}: "
+    if not alarms:
+        return said + f"nothing has changed. {_AID}"
+    return said + "; ".join(map(_in_words, alarms)) + f". {_AID}"
+
+
+def _in_words(alarm: dict[str, Any]) -> str:
+    size, unit = _shown(alarm["size"], alarm["kind"])
+    sigma, _ = _shown(alarm["sigma"], alarm["kind"])
+    day = alarm["onset_s"] / DAY
+    said = f"{alarm['what']} changed by {abs(size):.3g} ± {sigma:.1g} {unit} on day {day:.5g}"
+    return f"{said}: {alarm['suggestion']}"
+
+
+def _shown(size: float, kind: str) -> tuple[float, str]:
+    """A size in the unit in which people think of it."""
+    if kind == "camera":
+        return 1e6 * size, "microradians"
+    if kind == TOOL:
+        return 1e3 * size, "mm"
+    return float(1e3 * np.rad2deg(size)), "mdeg"
+
+
+def _write_page(
+    path: Path, title: str, verdict: str, history: History, robot: RobotModel, alarms: list[dict[str, Any]]
+) -> None:
+    day = history.time / DAY
+    sizes = sizes_alone(robot, history.q, deviations(history), NOISE)
+    joints, tool, cameras = go.Figure(), go.Figure(), go.Figure()
+    for name, values in sizes.items():
+        if name == TOOL:
+            tool.add_trace(go.Scatter(x=day, y=1e3 * values, mode="lines+markers", name=name))
+        else:
+            shown = 1e3 * np.rad2deg(values)
+            joints.add_trace(go.Scatter(x=day, y=shown, mode="lines+markers", name=name))
+    for i, name in enumerate(history.cameras):
+        turn = 1e6 * np.linalg.norm(history.rotations[:, i], axis=1)
+        cameras.add_trace(go.Scatter(x=day, y=turn, mode="lines+markers", name=name))
+    for figure, unit in ((joints, "mdeg"), (tool, "mm"), (cameras, "microradians")):
+        figure.update_layout(xaxis={"title": "day"}, yaxis={"title": unit})
+    rows = [[alarm["kind"], _in_words(alarm)] for alarm in alarms]
+    sections = [
+        Section(
+            "Zeros of the joints", "How large each change would be if it were the only one.", joints, 380
+        ),
+        Section("Tool", "Likewise its shift from the first check.", tool, 300),
+        Section("Cameras", "By how much they have turned since they were calibrated.", cameras, 380),
+    ]
+    if rows:
+        sections.insert(0, Section("Alarms", "", html_table(("kind", "what"), rows)))
+    write_plot_page(path, title, verdict, sections)

@@ -1,0 +1,92 @@
+"""The history of checks in a Parquet file, one row a check."""
+
+import json
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pyarrow as pa
+import pyarrow.parquet as pq
+
+_ROBOT, _CAMERAS, _POSES = b"robot", b"cameras", b"poses_rad"
+
+
+@dataclass(frozen=True)
+class History:
+    """n checks of one robot in one cell."""
+
+    robot: str
+    cameras: tuple[str, ...]
+    q: np.ndarray  # rad, of the poses, (6, 6)
+    time: np.ndarray  # s, of the checks, (n,)
+    X_WE: np.ndarray  # of the poses, (n, 6, 4, 4)
+    rotations: np.ndarray  # of the cameras, mean of a check in rad, (n, cameras, 3)
+    alarms: list[list[dict[str, Any]]]  # of the cameras in each check
+
+    def appended(
+        self, time: float, X_WE: np.ndarray, rotations: np.ndarray, alarms: list[dict[str, Any]]
+    ) -> "History":
+        """With one more check."""
+        return History(
+            self.robot,
+            self.cameras,
+            self.q,
+            np.append(self.time, time),
+            np.concatenate([self.X_WE, X_WE[None]]),
+            np.concatenate([self.rotations, rotations[None]]),
+            [*self.alarms, alarms],
+        )
+
+
+def new_history(robot: str, cameras: tuple[str, ...], q: np.ndarray) -> History:
+    """A history without a check."""
+    return History(
+        robot, cameras, q, np.zeros(0), np.zeros((0, len(q), 4, 4)), np.zeros((0, len(cameras), 3)), []
+    )
+
+
+def write_history(path: Path, history: History) -> None:
+    """Writes a history. Raises OSError if it cannot be written."""
+    n = len(history.time)
+    columns: dict[str, Any] = {"time_s": history.time}
+    for pose in range(len(history.q)):
+        rows = history.X_WE[:, pose, :3].reshape(n, -1)
+        columns |= {f"pose{pose + 1}_{k // 4}{k % 4}": rows[:, k] for k in range(12)}
+    for i, name in enumerate(history.cameras):
+        columns |= {f"camera_{name}_{axis}_rad": history.rotations[:, i, k] for k, axis in enumerate("xyz")}
+    columns["camera_alarms"] = [json.dumps(each) for each in history.alarms]
+    table = pa.table(columns).replace_schema_metadata(
+        {
+            _ROBOT: history.robot,
+            _CAMERAS: json.dumps(history.cameras),
+            _POSES: json.dumps(history.q.tolist()),
+        }
+    )
+    pq.write_table(table, path)
+
+
+def read_history(path: Path) -> History:
+    """Reads what `write_history` has written.
+
+    Raises:
+        ValueError: if it is no such file.
+        OSError: if it cannot be read.
+    """
+    try:
+        table = pq.read_table(path)
+        head = table.schema.metadata or {}
+        cameras, q = tuple(json.loads(head[_CAMERAS])), np.array(json.loads(head[_POSES]))
+        data = {name: table[name].to_numpy() for name in table.column_names if name != "camera_alarms"}
+        n = table.num_rows
+        X = np.tile(np.eye(4), (n, len(q), 1, 1))
+        for pose in range(len(q)):
+            rows = np.stack([data[f"pose{pose + 1}_{k // 4}{k % 4}"] for k in range(12)], -1)
+            X[:, pose, :3] = rows.reshape(n, 3, 4)
+        turns = [[data[f"camera_{name}_{axis}_rad"] for axis in "xyz"] for name in cameras]
+        alarms = [json.loads(each) for each in table["camera_alarms"].to_pylist()]
+        return History(
+            head[_ROBOT].decode(), cameras, q, data["time_s"], X, np.moveaxis(np.array(turns), 2, 0), alarms
+        )
+    except (pa.ArrowInvalid, KeyError) as error:
+        raise ValueError(f"history {path}: not a history of truetip health") from error

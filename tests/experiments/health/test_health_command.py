@@ -1,0 +1,63 @@
+"""``truetip health``: checks are appended, changes are named, and what cannot be continued is refused."""
+
+import json
+from pathlib import Path
+
+import pyarrow.parquet as pq
+import pytest
+
+from tests.experiments.commands import files, refusal, truetip
+
+STILL = ["--set=station.elasticity=rigid", "--set=initial_error_mm=[0,0,0]",
+         "--set=station.camera.orientation_sigma_deg=0.01"]  # fmt: skip
+
+
+def health(folder: Path, *more: str):
+    options = ["--history", folder / "h.parquet", "--out", folder / "h.html", "--json", folder / "h.json"]
+    result = truetip("health", *STILL, *options, *more)
+    assert result.exit_code == 0, result.output
+    return json.loads((folder / "h.json").read_text())
+
+
+def test_a_camera_that_turns_is_named_and_the_check_is_in_the_history(tmp_path: Path):
+    (alarm,) = health(tmp_path, "--change", "camera:04:50")["alarms"]
+    assert (alarm["kind"], alarm["what"]) == ("camera", "camera 04")
+    assert alarm["onset_s"] == pytest.approx(1.0, abs=0.11)
+    assert abs(alarm["size"] - 50e-6) < 4.0 * alarm["sigma"] + 5e-6
+    assert pq.read_table(tmp_path / "h.parquet").num_rows == 1
+    assert "camera 04 changed by" in (tmp_path / "h.html").read_text()
+
+
+@pytest.mark.slow
+def test_a_history_goes_on_and_a_joint_that_drifts_is_named(tmp_path: Path):
+    assert health(tmp_path, "--checks", "2")["alarms"] == []
+    worn = health(tmp_path, "--change", "joint:3:40", "--checks", "2")
+    (alarm,) = worn["alarms"]
+    assert (alarm["kind"], alarm["what"], alarm["onset_s"]) == ("joint zero", "joint 3", 2 * 86400.0)
+    assert pq.read_table(tmp_path / "h.parquet").num_rows == worn["checks"] == 4
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (["--checks", "0"], "--checks must be at least 1, got 0"),
+        (["--change", "joint:7:1"], "--change must be joint:N:MDEG, tool:MM or camera:NAME:MICRORADIANS"),
+        (["--change", "camera:99:1"], "the cameras are 01, 02"),
+        (["--change-at", "2"], "--change-at needs --change"),
+        (["--set", "station.kind=egm"], "health does not drive a real station"),
+        (["--history", "h.csv"], "h.csv"),
+    ],
+)
+def test_wrong_arguments_are_refused_in_one_line(
+    arguments: list[str], message: str, tmp_path: Path, monkeypatch
+):
+    monkeypatch.chdir(tmp_path)
+    assert message in refusal(truetip("health", *STILL, *arguments))
+    assert files(tmp_path) == set()
+
+
+def test_a_file_that_is_no_history_is_refused_and_stays(tmp_path: Path):
+    path = tmp_path / "h.parquet"
+    path.write_text("something else")
+    assert "not a history of truetip health" in refusal(truetip("health", *STILL, "--history", path))
+    assert path.read_text() == "something else"

@@ -1,0 +1,57 @@
+"""The daily check: six poses name the joint whose zero has drifted, or the tool, or nothing."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from robots.description.geometric_errors import GeometricErrors
+from robots.description.model import load_robot
+from robots.kinematics.error_kinematics import ErrorKinematics
+from robots.measurement_design.constraints import AdmissibleConfigurations
+from robots.metrology.daily_check import TOOL, CheckNoise, check_poses, find_drift
+from robots.pose import pose_error
+
+ROBOT = load_robot("irb1200")
+Q = check_poses(ROBOT, AdmissibleConfigurations(ROBOT))
+NOISE = CheckNoise(position=30e-6, rotation=np.deg2rad(0.003))
+KINEMATICS = ErrorKinematics(ROBOT)
+
+
+def poses(errors: GeometricErrors) -> np.ndarray:
+    return KINEMATICS.forward(Q, errors.vector(ROBOT))
+
+
+def deviations(errors: GeometricErrors, since: int, checks: int, seed: int) -> np.ndarray:
+    """Measured poses of the checks less those of the first one; the errors begin at a check."""
+    rng = np.random.default_rng(seed)
+    before, after = poses(GeometricErrors()), poses(errors)
+    sigma = np.r_[np.full(3, NOISE.rotation), np.full(3, NOISE.position)]
+    shift = np.array([pose_error(after if k >= since else before, before) for k in range(checks)])
+    measured = shift + sigma * rng.standard_normal((checks, len(Q), 6))
+    return measured - measured[0]
+
+
+@pytest.mark.parametrize("joint", range(6))
+def test_a_joint_zero_that_drifts_by_40_millidegrees_is_named(joint):
+    offset = np.zeros(6)
+    offset[joint] = 0.04
+    for seed in range(5):
+        drift = find_drift(ROBOT, Q, deviations(GeometricErrors(joint_offset_deg=offset), 4, 8, seed), NOISE)
+        assert drift is not None
+        assert drift.what == f"joint {joint + 1}"
+        assert drift.onset == 4
+        assert abs(np.rad2deg(drift.size) - 0.04) < 4.0 * np.rad2deg(drift.sigma)
+
+
+def test_a_tool_that_was_bent_by_a_fifth_of_a_millimetre_is_named():
+    bent = replace(GeometricErrors(), tool_translation_mm=np.array([0.2, 0.0, 0.0]))
+    drift = find_drift(ROBOT, Q, deviations(bent, 3, 8, 0), NOISE)
+    assert drift is not None
+    assert (drift.what, drift.onset) == (TOOL, 3)
+    assert drift.size == pytest.approx(2e-4, abs=4.0 * drift.sigma)
+
+
+def test_a_month_without_change_is_silent():
+    for seed in range(20):
+        assert find_drift(ROBOT, Q, deviations(GeometricErrors(), 0, 30, seed), NOISE) is None
