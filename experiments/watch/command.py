@@ -10,7 +10,7 @@ from rich.markup import escape
 from experiments.cli.console import print_files, progress_bar, refusing
 from experiments.cli.json_output import human_console, json_output
 from experiments.cli.option_limits import at_least, positive
-from experiments.cli.options import JsonOption, PictureOption, RobotOption, ScenarioOption, SetOption
+from experiments.cli.options import JsonOption, OnlyPictureOption, RobotOption, ScenarioOption, SetOption
 from experiments.cli.prepare import prepare, simulated_only
 from experiments.cli.staging import PAGE, staged_file
 from experiments.watch.page import AID, run_verdict, study_verdict, write_run_page, write_study_page
@@ -44,7 +44,7 @@ def watch_command(
     every: Annotated[
         float, typer.Option(metavar="S", help="Between two sets of images of the empty cell in a study.")
     ] = 2.0,
-    out: PictureOption = Path("out/watch.html"),
+    out: OnlyPictureOption = Path("out/watch.html"),
     json_file: JsonOption = None,
 ) -> None:
     """Watch for people and slow the robot for them; an aid, not a safety function."""

@@ -13,7 +13,7 @@ STILL = ["--set=station.elasticity=rigid", "--set=initial_error_mm=[0,0,0]",
 
 
 def health(folder: Path, *more: str):
-    options = ["--history", folder / "h.parquet", "--out", folder / "h.html", "--json", folder / "h.json"]
+    options = ["--history", folder / "h.parquet", "--report", folder / "h.html", "--json", folder / "h.json"]
     result = truetip("health", *STILL, *options, *more)
     assert result.exit_code == 0, result.output
     return json.loads((folder / "h.json").read_text())

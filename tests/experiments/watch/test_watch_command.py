@@ -35,7 +35,9 @@ def recording(tmp_path_factory) -> Path:
 
 
 def watch(folder: Path, out: Path, *more: str):
-    return truetip("watch", "--images", folder, "--empty", EMPTY, *SMALL, "--out", out / "watch.html", *more)
+    return truetip(
+        "watch", "--images", folder, "--empty", EMPTY, *SMALL, "--report", out / "watch.html", *more
+    )
 
 
 def test_a_person_in_a_recording_stops_the_robot_and_the_page_shows_where(recording: Path, tmp_path: Path):
