@@ -4,10 +4,9 @@ from pathlib import Path
 from typing import Any
 
 from jinja2 import Environment, PackageLoader, StrictUndefined
-from markupsafe import Markup
-from plotly.offline import get_plotlyjs
 
 from experiments.report.files import write_text
+from experiments.report.packed import packed, packed_plotly
 
 # Everything that is not marked as HTML is escaped; a name that a template knows and nobody gives is an error.
 _ENVIRONMENT = Environment(
@@ -17,6 +16,7 @@ _ENVIRONMENT = Environment(
     trim_blocks=True,
     lstrip_blocks=True,
 )
+_ENVIRONMENT.filters["packed"] = packed
 _ENVIRONMENT.policies["json.dumps_kwargs"] = {"allow_nan": False, "separators": (",", ":")}
 
 
@@ -33,5 +33,5 @@ def write_page(path: str | Path, template: str, **context: Any) -> None:
         ValueError: if a number of the data is NaN or infinite.
         jinja2.UndefinedError: if the template needs something else.
     """
-    page = _ENVIRONMENT.get_template(template).render(plotly=Markup(get_plotlyjs()), **context)
+    page = _ENVIRONMENT.get_template(template).render(plotly=packed_plotly(), **context)
     write_text(path, page)

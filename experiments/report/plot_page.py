@@ -7,6 +7,7 @@ from pathlib import Path
 import plotly.graph_objects as go
 from markupsafe import Markup, escape
 
+from experiments.report.packed import later
 from experiments.report.page import write_page
 
 _CONFIG = {"responsive": True, "displayModeBar": False, "showSendToCloud": False, "plotlyServerURL": ""}
@@ -34,7 +35,7 @@ class Section:
             plot_bgcolor="rgba(0,0,0,0)",
             font={"color": "#7a8696"},
         )
-        return Markup(figure.to_html(full_html=False, include_plotlyjs=False, config=_CONFIG))
+        return later(figure.to_html(full_html=False, include_plotlyjs=False, config=_CONFIG))
 
 
 def write_plot_page(path: str | Path, title: str, verdict: str, sections: Sequence[Section]) -> None:

@@ -66,6 +66,11 @@ def test_the_report_draws_every_plot_without_an_error(opened, logs):
     )  # the scenario's script did not run
 
 
+def test_a_page_is_small_enough_to_be_mailed(report):
+    """With the library and the numbers of all plots, which weigh 1.5 MB and 0.3 MB compressed."""
+    assert report.stat().st_size < 2.5e6
+
+
 def test_no_figure_can_be_uploaded(opened):
     """The library's own button would send what the robot did to its maker."""
     assert 'data-title="Download plot' in opened.dom  # there are buttons
