@@ -18,6 +18,7 @@ from experiments.cli.options import (
 )
 from experiments.cli.staging import PAGE, staged_file
 from experiments.report.plot_page import Section, write_plot_page
+from experiments.zeros.body import body_zeros
 from experiments.zeros.examples import EXAMPLES, example_named
 from experiments.zeros.plots import plane_figure, workspace_figure
 from experiments.zeros.study import ZeroStudy, study_zeros, zeros_json
@@ -34,6 +35,12 @@ def zeros_command(
     example: Annotated[
         str | None, typer.Option(metavar="NAME", help=f"In place of a robot: {', '.join(EXAMPLES)}.")
     ] = None,
+    body: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="FILE", help="In place of a robot: a flexible body on a joint, as standard input data."
+        ),
+    ] = None,
     out: OnlyPictureOption = Path("out/zeros.html"),
     json_file: JsonOption = None,
 ) -> None:
@@ -45,10 +52,13 @@ def zeros_command(
         staged_file(out, *PAGE) as page,
         output.staged(),
     ):
-        if example is not None:
-            found = example_named(example)
+        if body is not None and example is not None:
+            raise ValueError("--body and --example are two different things: give one of them")
+        if body is not None or example is not None:
+            found = body_zeros(body, payload or 0.0) if body else example_named(str(example))
             numbers, verdict = found.numbers, found.verdict
-            write_plot_page(page, f"Zeros, example {example}", verdict, found.sections)
+            name = body.name if body else f"example {example}"
+            write_plot_page(page, f"Zeros, {name}", verdict, found.sections)
         else:
             model = load_robot(robot)
             mass = model.payload.largest_mass if payload is None else payload

@@ -21,7 +21,7 @@ from robots.dynamics.transmission_zeros import Zeros
 from systems.feedforward.inverse_observer import InverseObserver
 
 _BANDWIDTHS = (5.0, 10.0, 15.0, 20.0, 30.0, 40.0, 50.0)  # Hz
-_DRAWN = (15.0, 30.0)  # Hz
+_DRAWN = (15.0,)  # Hz
 
 
 class Example(NamedTuple):

@@ -7,6 +7,8 @@ import numpy as np
 import pytest
 
 from experiments.zeros.study import two_joint_arm_limit, two_joint_arm_zeros
+from robots.dynamics.flexible_body import beam_body
+from robots.dynamics.sid_file import sid_text
 from tests.experiments.browser import open_page
 from tests.experiments.commands import files, refusal, truetip
 
@@ -71,7 +73,18 @@ def test_the_two_joint_arm_is_minimum_phase_up_to_the_limit_of_the_source():
     assert not two_joint_arm_zeros(1.001 * limit).is_minimum_phase
 
 
+def test_a_body_of_a_file_on_a_joint(tmp_path: Path):
+    (tmp_path / "beam.sid").write_text(sid_text(beam_body(2.0, 3.0, 500.0, 8, 3)))
+    result = run(tmp_path, f"--body={tmp_path / 'beam.sid'}", "--payload=1.35", "--json", "-")
+    assert result.exit_code == 0, result.output
+    numbers = json.loads(result.stdout)
+    assert numbers["nodes"]["3"] is None  # a quarter of the way
+    assert numbers["nodes"]["9"] == numbers["slowest_rhp"] > 0.0
+    assert (tmp_path / "zeros.html").exists()
+
+
 REFUSED = {
+    "body": ("--body=nothing.sid", "nothing.sid"),
     "robot": ("--robot=kr211", "robot 'kr211': no file"),
     "example": (
         "--example=bridge",

@@ -1,0 +1,51 @@
+"""Zeros of a joint that turns a flexible body of a file: which of its nodes have a stable inverse."""
+
+from pathlib import Path
+
+import numpy as np
+
+from experiments.report.plot_page import Section, html_table
+from experiments.zeros.examples import Example
+from experiments.zeros.plots import plane_figure
+from experiments.zeros.study import one_json
+from robots.dynamics.sid_file import read_sid
+
+
+def body_zeros(path: Path, load: float) -> Example:
+    """Zeros from the torque of a joint about z to the nodes of a body, with a load (kg) at the last one.
+
+    Raises:
+        OSError, SidFileError: if the file cannot be read or is not what it should be.
+        ValueError: if the load is negative.
+    """
+    if not load >= 0.0:
+        raise ValueError(f"--payload must not be negative, got {load:g}")
+    body = read_sid(path)
+    away = np.hypot(body.places[:, 0], body.places[:, 1])
+    zeros = {node: body.zeros(node, load) for node in map(int, np.flatnonzero(away > 1e-9 * away.max()))}
+    hertz = body.frequencies() / (2.0 * np.pi)
+    rows = []
+    for node, each in zeros.items():
+        slowest = "-" if each.slowest_rhp is None else f"{each.slowest_rhp:.4g}"
+        rows.append([f"{node + 1}", f"{away[node]:.4f}", slowest])
+    unstable = [node for node, each in zeros.items() if not each.is_minimum_phase]
+    end = f"node {unstable[0] + 1} on, {away[unstable[0]]:.3f} m from the joint" if unstable else "no node on"
+    verdict = (
+        f"{path.name}: {len(hertz)} modes from {hertz[0]:.4g} Hz, {body.mass:.4g} kg and {load:g} kg at the "
+        f"last of {len(away)} nodes; turned by a joint about z, the exact inverse is unstable from {end}."
+    )
+    last = zeros[max(zeros)]
+    note = "Across the line from the joint to the node; - where the inverse is stable."
+    head = ("node", "from the joint in m", "slowest zero in the right half-plane in 1/s")
+    sections = [
+        Section("Nodes", note, html_table(head, rows)),
+        Section("Zeros of the last node", "", plane_figure(last)),
+    ]
+    numbers = {
+        "body": path.name,
+        "load_kg": load,
+        "frequencies_hz": hertz.tolist(),
+        **one_json(last),
+        "nodes": {str(node + 1): each.slowest_rhp for node, each in zeros.items()},
+    }
+    return Example(numbers, verdict, sections)
