@@ -33,6 +33,7 @@ __all__ = ["REQUESTED", "RealTimeRecord", "RealTimeRun", "StationError"]
 _WARM_UP = 60  # ticks
 REQUESTED = "ended on request"  # why a run ended that somebody wanted to end
 _WORTH_SAYING = 0.01  # s by which this machine was late
+_STOOD = 0.5  # s at rest by the guard, after which a run is over that nothing leads back
 _SWITCH = 5e-4  # s after which another thread, such as that of a progress bar, gives way
 
 
@@ -101,6 +102,8 @@ class RealTimeRun:
         self._pauses: list[tuple[float, float]] = []
         self._events: list[GuardEvent] = []
         self._stream: RunRecord | None = None
+        self._stopped_ticks = 0.0  # of the guard, until the last tick
+        self._stands_since: float | None = None  # s, if the guard holds the robot at rest
 
     @property
     def uses_camera(self) -> bool:
@@ -210,7 +213,32 @@ class RealTimeRun:
             if tick * self.period - shown > 0.5:
                 shown = tick * self.period
                 progress(min(1.0, self.servo.path_time(self._context) / self.path.duration))
-        return "path"
+            if self._stands_for(tick) > _STOOD and not self.scenario.servo.guard.resume:
+                break
+        return self._why_it_stands() if self._stands_since is not None else "path"
+
+    def _stands_for(self, tick: int) -> float:
+        """How long the guard has held the robot at rest until a tick, in s."""
+        status = self.servo.GetOutputPort("guard_status").Eval(self.servo.GetMyContextFromRoot(self._context))
+        stopped = float(status[KINDS.index("stopped")])
+        if stopped == self._stopped_ticks:
+            self._stands_since = None
+            return 0.0
+        self._stopped_ticks = stopped
+        if self._stands_since is None:
+            self._stands_since = tick * self.period
+        return tick * self.period - self._stands_since
+
+    def _why_it_stands(self) -> str:
+        since = self._stands_since or 0.0
+        seen = self._exposures[-1][0] if self._exposures else 0.0
+        is_blind = self.uses_camera and since - seen >= self.scenario.servo.guard.hold_after
+        why = (
+            f"the camera has shown nothing usable since {seen:.1f} s"
+            if is_blind
+            else "the law had no command"
+        )
+        return f"stopped by the guard at {since:.1f} s: {why}"
 
     def _write(
         self,

@@ -1,5 +1,7 @@
 """Clocks that are set, messages that are lost, joints that jump: no message moves a robot by surprise."""
 
+import re
+
 import numpy as np
 import pytest
 
@@ -113,6 +115,18 @@ def test_messages_that_are_lost_for_a_while_cost_time_and_no_jump(lost: float, o
     assert record.ended == "path"
     assert [event.kind for event in record.events] == ["interrupted"]
     assert_unsurprising(wire)
+
+
+@pytest.mark.parametrize("resume", [False, True])
+def test_a_camera_that_sees_nothing_any_more_stops_the_robot_and_the_run_says_so(resume: bool):
+    """The path is not over when its time is: the robot stands."""
+    settings = [f"servo.guard.resume={str(resume).lower()}", "servo.guard.stop_after=0.2"]
+    record, wire = guided(faulty(*settings, "station.camera.dropouts=[[1.2, 60]]"), "numerical_ik")
+    assert re.fullmatch(
+        r"stopped by the guard at \d\.\d s: the camera has shown nothing usable since \d\.\d s", record.ended
+    )
+    assert_unsurprising(wire)
+    assert not commands(wire)[2][-5:].any()
 
 
 def test_one_switch_leads_back_after_a_longer_silence(on_path: float):

@@ -1,0 +1,24 @@
+"""A process of the cell that dies: the robot stops smoothly, and the record opens."""
+
+from pathlib import Path
+
+import pytest
+
+from experiments.bench.faults import Case
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("who", "what", "then", "ended"),
+    [
+        ("client", "kill", "end", "-9"),
+        ("camera", "kill", "end", ""),
+        ("cell", "stop 1 s", "resume", "0: its path is over"),
+    ],
+)
+def test_the_robot_is_never_surprised(tmp_path: Path, who: str, what: str, then: str, ended: str):
+    outcome = Case(tmp_path, who, what, then).run()
+    assert outcome.ended.startswith(ended), outcome
+    assert outcome.recorded > 1.5
+    assert outcome.at_rest
+    assert max(outcome.commands + outcome.links) < 1.0 + 1e-6
