@@ -68,7 +68,7 @@ def test_loss_doubling_overtaking_and_jitter_cost_nothing_at_rest_and_are_all_co
     largest, static = largest_and_static(record.log, e)
     assert record.ended == "path"
     assert static <= 0.02
-    assert largest < 1.2 * 2.46  # mm, without faults 2.46
+    assert largest < 4.0  # mm, without faults 2.46: a lost message holds the last command
     lost, counters = wire.to_client.counts, record.counters
     # What a message overtakes is late; of a lost one the number is missing; a doubled one comes twice.
     assert counters["duplicates"] + counters["late"] == pytest.approx(
