@@ -63,6 +63,8 @@ from experiments.invert.command import invert_command
 from experiments.metrics.run_metrics import timing, with_timing
 from experiments.modes.command import modes_command
 from experiments.record.log_command import log_command
+from experiments.record.report_command import report_command
+from experiments.record.runs_command import runs_command
 from experiments.record.simulated import write_records
 from experiments.replay.live import LiveView, advance_live
 from experiments.report.report import verdict
@@ -302,6 +304,8 @@ def diagram_command(
 app.command("cell")(cell_command)
 app.command("latency")(latency_command)
 app.command("log")(log_command)
+app.command("report")(report_command)
+app.command("runs")(runs_command)
 app.command("modes")(modes_command)
 app.command("zeros")(zeros_command)
 app.add_typer(cameras_app, name="cameras")

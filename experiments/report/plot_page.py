@@ -52,17 +52,21 @@ def html_table(head: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
     return f"<div class=scroll><table>{_inside(head, rows)}</table></div>"
 
 
-def sortable_table(name: str, head: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
+def sortable_table(
+    name: str, head: Sequence[str], rows: Sequence[Sequence[str]], has_filter: bool = False
+) -> str:
     """A long table that sorts by a click on a head, with a button that saves it.
 
     Args:
         name: of the file, without its suffix; unlike all others of the page.
         head: names of the columns.
         rows: cells, text unless they are marked as HTML.
+        has_filter: whether a field above it hides the rows without the words that are typed there.
     """
     button = f'<button class=csv data-table="{name}">Save as CSV</button>'
     table = f'<table class=sortable id="{name}">{_inside(head, rows)}</table>'
-    return f'{button}<div class="scroll tall">{table}</div>'
+    filter_field = f'<input class=filter data-table="{name}" placeholder="Filter" aria-label="Filter"> '
+    return f'{filter_field if has_filter else ""}{button}<div class="scroll tall">{table}</div>'
 
 
 def _inside(head: Sequence[str], rows: Sequence[Sequence[str]]) -> str:

@@ -36,4 +36,11 @@ function prepareTables() {
       URL.revokeObjectURL(link.href);
     };
   }
+  for (const field of document.querySelectorAll("input.filter")) {
+    field.oninput = () => {
+      const words = field.value.toLowerCase().split(/\s+/).filter(Boolean);
+      for (const row of document.getElementById(field.dataset.table).tBodies[0].rows)
+        row.hidden = !words.every(word => row.textContent.toLowerCase().includes(word));
+    };
+  }
 }

@@ -1,0 +1,110 @@
+"""``truetip runs``: an index of the runs in a folder, with their key figures."""
+
+import json
+import os
+import time
+from collections.abc import Iterator
+from contextlib import ExitStack
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+from markupsafe import Markup, escape
+
+from experiments.cli.console import count, print_files, progress_bar, refusing
+from experiments.cli.json_output import human_console, json_output
+from experiments.cli.options import JsonOption, PictureOption
+from experiments.cli.staging import PAGE, staged_file
+from experiments.metrics.run_metrics import judged_by
+from experiments.report.data import norm
+from experiments.report.plot_page import Section, sortable_table, write_plot_page
+from experiments.report.style import law_title
+
+_FIGURES = ("largest mm", "rms mm", "at rest mm", "largest °")
+_HEAD = ("folder", "scenario", "law", "judged by", *_FIGURES, "guard", "made")
+_PAGES = ("report.html", "replay.html")
+_NOTE = (
+    "A line for each law of each comparison below the folder. Click on a head to sort; words in the field "
+    "hide what does not have them. Guard: ticks with an intervention."
+)
+
+
+def runs_command(
+    folder: Annotated[Path, typer.Argument(metavar="DIR", help="Folder with results of compare and run.")],
+    report: PictureOption = Path("out/runs.html"),
+    json_file: JsonOption = None,
+) -> None:
+    """List the runs below a folder on a page: key figures, a filter, links to their reports."""
+    human = human_console(json_file)
+    with json_output(json_file) as output, refusing(ValueError, OSError), ExitStack() as stack:
+        if not folder.is_dir():
+            raise ValueError(f"{folder}: is no folder")
+        page = stack.enter_context(staged_file(report, *PAGE))
+        stack.enter_context(output.staged())
+        with progress_bar("reading") as progress:
+            found = list(runs_below(folder, progress))
+        if not found:
+            raise ValueError(f"{folder}: there is no summary.json below it, which compare and run write")
+        rows = [_row(run, folder, report.parent) for run in found]
+        comparisons = count(len({run["folder"] for run in found}), "comparison")
+        verdict = f"{count(len(found), 'law')} in {comparisons} below {folder}."
+        table = sortable_table("runs", _HEAD, rows, has_filter=True)
+        write_plot_page(page, "Runs", verdict, [Section("Runs", _NOTE, table)])
+        output.write(found)
+    human.print(verdict)
+    print_files(human, report)
+
+
+def runs_below(folder: Path, progress: Any = None) -> Iterator[dict[str, Any]]:
+    """Key figures of every law of every ``summary.json`` below a folder, the newest first.
+
+    Raises:
+        ValueError: if a summary is not what compare and run write.
+        OSError: if a file cannot be read.
+    """
+    files = sorted(folder.rglob("summary.json"), key=lambda file: (-file.stat().st_mtime, str(file)))
+    for number, file in enumerate(files):
+        try:
+            result = json.loads(file.read_text(encoding="utf-8"))
+            source = judged_by(result)
+            for law, run in result["runs"].items():
+                yield {
+                    "folder": str(file.parent),
+                    "scenario": result["scenario"],
+                    "law": law,
+                    "judged_by": source,
+                    "max_norm_mm": run[source]["max_norm_mm"],
+                    "rms_norm_mm": run[source]["rms_norm_mm"],
+                    "static_mm": norm(run[source]["static_mm"]),
+                    "max_angle_deg": run[source]["max_angle_deg"],
+                    "guard": sum(run["guard"].values()),
+                    "made": time.strftime("%Y-%m-%d %H:%M", time.localtime(file.stat().st_mtime)),
+                }
+        except (KeyError, TypeError, AttributeError, json.JSONDecodeError) as error:
+            raise ValueError(f"{file}: no summary of a comparison") from error
+        if progress:
+            progress((number + 1) / len(files))
+
+
+def _row(run: dict[str, Any], folder: Path, beside: Path) -> list[str]:
+    place = Path(run["folder"])
+    name = escape(os.path.relpath(place, folder))
+    links = [
+        Markup(' <a href="{}">{}</a>').format(_address(place / page, beside), page.removesuffix(".html"))
+        for page in _PAGES
+        if (place / page).exists()
+    ]
+    numbers = [run[key] for key in ("max_norm_mm", "rms_norm_mm", "static_mm", "max_angle_deg")]
+    return [
+        name + Markup("").join(links),
+        run["scenario"],
+        law_title(run["law"]),
+        run["judged_by"],
+        *("–" if value is None else f"{value:.3f}" for value in numbers),
+        str(run["guard"]),
+        run["made"],
+    ]
+
+
+def _address(page: Path, beside: Path) -> str:
+    return Path(os.path.relpath(page, beside)).as_posix()

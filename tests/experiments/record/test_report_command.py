@@ -1,0 +1,85 @@
+"""``truetip report`` and ``truetip runs``: what was found stays to be found."""
+
+import json
+from pathlib import Path
+
+import pytest
+
+from diagrams.record.log import RunLog
+from experiments.metrics.run_metrics import summary
+from experiments.record.runs_command import runs_below
+from experiments.record.simulated import write_records
+from experiments.report.files import write_json
+from tests.experiments.browser import open_page
+from tests.experiments.commands import files, refusal, truetip
+from tests.experiments.synthetic import comparison
+
+
+@pytest.fixture(scope="module")
+def logs() -> dict[str, list[RunLog]]:
+    found = comparison(cycles=2, with_joints=True)
+    return {law: list(found[law]) for law in ("open_loop", "pbvs")}
+
+
+def test_the_report_of_records_is_that_of_the_runs(logs: dict[str, list[RunLog]], tmp_path: Path):
+    write_records(tmp_path, "# line one (payload=3)\nseed: 0\n", logs)
+    records = sorted(tmp_path.glob("*.mcap"))
+    assert len(records) == 4
+    result = truetip("report", *records, "--report", tmp_path / "page.html", "--json", "-")
+    assert result.exit_code == 0, result.output
+    again, first = json.loads(result.stdout), summary("line one (payload=3)", logs)
+    assert again["scenario"] == "line one (payload=3)"
+    for law, run in first["runs"].items():
+        for key in ("max_norm_mm", "rms_norm_mm"):
+            # A record keeps quaternions and nanoseconds.
+            assert again["runs"][law]["true"][key] == pytest.approx(run["true"][key], rel=1e-6)
+        assert again["runs"][law]["true"]["iso_9283"]["cycles"] == 2
+    assert (tmp_path / "page.html").stat().st_size < 2.5e6
+
+
+def test_one_run_twice_is_refused(logs: dict[str, list[RunLog]], tmp_path: Path):
+    write_records(tmp_path, "", {"pbvs": logs["pbvs"][:1]})
+    before = files(tmp_path)
+    record = tmp_path / "pbvs-1.mcap"
+    said = refusal(truetip("report", record, record, "--report", tmp_path / "page.html"))
+    assert "a run of law pbvs with seed 0 is there twice" in said
+    assert files(tmp_path) == before
+
+
+def test_an_index_has_a_line_for_each_law_with_its_figures(logs: dict[str, list[RunLog]], tmp_path: Path):
+    for name in ("a", "b/c"):
+        (tmp_path / name).mkdir(parents=True)
+        write_json(tmp_path / name / "summary.json", summary(f"scenario {name}", logs))
+        (tmp_path / name / "report.html").write_text("")
+    found = list(runs_below(tmp_path))
+    assert len(found) == 4
+    expected = summary("", logs)["runs"]["pbvs"]["true"]["max_norm_mm"]
+    assert {each["max_norm_mm"] for each in found if each["law"] == "pbvs"} == {expected}
+    result = truetip("runs", tmp_path, "--report", tmp_path / "pages" / "runs.html")
+    assert result.exit_code == 0, result.output
+    page = (tmp_path / "pages" / "runs.html").read_text()
+    assert 'href="../b/c/report.html"' in page
+    assert "4 laws in 2 comparisons" in page
+
+
+def test_words_in_the_filter_hide_the_other_lines(logs: dict[str, list[RunLog]], tmp_path: Path):
+    write_json(tmp_path / "summary.json", summary("it", logs))
+    truetip("runs", tmp_path, "--report", tmp_path / "runs.html")
+    page = tmp_path / "runs.html"
+    typed = (
+        '<script>const field = document.querySelector("input.filter"); field.value = "pbvs it"; '
+        "field.oninput();</script></body>"
+    )
+    page.write_text(page.read_text().replace("</body>", typed))
+    opened = open_page(page, 3000)
+    assert not [line for line in opened.console if "rror" in line]
+    assert opened.dom.count('<tr hidden="">') == 1
+
+
+@pytest.mark.parametrize(
+    ("text", "reason"), [("{}", "no summary of a comparison"), (None, "no summary.json")]
+)
+def test_a_folder_without_runs_is_refused(text: str | None, reason: str, tmp_path: Path):
+    if text is not None:
+        (tmp_path / "summary.json").write_text(text)
+    assert reason in refusal(truetip("runs", tmp_path, "--report", tmp_path / "runs.html"))
