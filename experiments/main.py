@@ -59,6 +59,7 @@ from experiments.drivetrain.command import drivetrain_command
 from experiments.feedforward.command import feedforward_command
 from experiments.frames.commands import align_command, chain_command, frame_command, tool_command
 from experiments.health.command import health_command
+from experiments.identify.command import identify_command
 from experiments.invert.command import invert_command
 from experiments.metrics.run_metrics import timing, with_timing
 from experiments.modes.command import modes_command
@@ -311,6 +312,7 @@ app.command("zeros")(zeros_command)
 app.add_typer(cameras_app, name="cameras")
 app.command("feedforward")(feedforward_command)
 app.command("invert")(invert_command)
+app.command("identify")(identify_command)
 app.command("design")(design_command)
 app.command("calibrate")(calibrate_command)
 app.command("compensate")(compensate_command)

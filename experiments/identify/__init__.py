@@ -1,0 +1,1 @@
+"""``truetip identify``: stiffness and damping of a robot from recorded motions."""

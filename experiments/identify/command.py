@@ -1,0 +1,138 @@
+"""``truetip identify``: stiffness and damping of a robot from its own motion."""
+
+from contextlib import ExitStack
+from pathlib import Path
+from typing import Annotated
+
+import typer
+from rich import box
+from rich.console import Console
+from rich.markup import escape
+from rich.table import Table
+
+from experiments.cli.console import count, print_files, progress_bar, refusing
+from experiments.cli.json_output import human_console, json_output
+from experiments.cli.option_limits import at_least
+from experiments.cli.options import JobsOption, JsonOption, StudiedRobotOption
+from experiments.cli.staging import PAGE, TABLE, YAML, staged_file
+from experiments.feedforward.command import realistic_robot
+from experiments.identify.cases import MotionCases, default_cases, load_cases
+from experiments.identify.plots import table_head, table_rows, verdict, write_identify_page
+from experiments.identify.recording_file import Recording, read_recording, write_recording
+from experiments.identify.simulated import places, simulated
+from experiments.identify.study import IdentifyStudy, identify_json, study_identification, with_rectangle
+from experiments.report.files import write_text
+from robots.description.model import RobotModel, load_robot
+from robots.description.robot_file import robot_text
+
+
+def identify_command(
+    robot: StudiedRobotOption = "kr210",
+    cases: Annotated[
+        Path | None,
+        typer.Option(metavar="FILE", help="Motions and sensors, a YAML file.", show_default="18 motions"),
+    ] = None,
+    recording: Annotated[
+        Path | None,
+        typer.Option(metavar="FILE", help="A recorded table (CSV).", show_default="simulated"),
+    ] = None,
+    columns: Annotated[
+        Path | None,
+        typer.Option(metavar="FILE", help="What its columns are (YAML).", show_default="beside the table"),
+    ] = None,
+    plant: Annotated[
+        str | None,
+        typer.Option(
+            "--plant",
+            metavar="NAME|FILE",
+            help="What moves in the simulation, or was recorded, to compare with.",
+            show_default="the realistic variant; unknown for a recording",
+        ),
+    ] = None,
+    gear_parts: Annotated[
+        bool, typer.Option(help="Gears may have play, hysteresis and ripple, or are linear.")
+    ] = True,
+    rectangle: Annotated[
+        bool, typer.Option(help="Drive a rectangle with the identified inverse model; needs --plant.")
+    ] = True,
+    seed: Annotated[int, typer.Option(metavar="N", help="Of the noise of simulated sensors.")] = 0,
+    write: Annotated[
+        Path | None,
+        typer.Option(metavar="FILE.yaml", help="The identified robot, for --robot of every command."),
+    ] = None,
+    write_table: Annotated[
+        Path | None,
+        typer.Option(
+            "--write-recording", metavar="FILE.csv", help="Keep what was simulated, for --recording."
+        ),
+    ] = None,
+    report: Annotated[Path, typer.Option(metavar="FILE.html", help="The report.")] = Path(
+        "out/identify.html"
+    ),
+    json_file: JsonOption = None,
+    jobs: JobsOption = None,
+) -> None:
+    """Identify stiffness and damping from short motions, gyros and accelerometers."""
+    human = human_console(json_file)
+    with json_output(json_file) as output, refusing(ValueError, OSError), ExitStack() as stack:
+        at_least("--jobs", 1, jobs)
+        at_least("--seed", 0, seed)
+        if recording is not None and (cases is not None or write_table is not None):
+            raise ValueError("--recording is what was recorded: it takes no --cases and no --write-recording")
+        if recording is None and columns is not None:
+            raise ValueError("--columns says what a --recording has, and there is none")
+        model = load_robot(robot)
+        truth = _plant(robot, plant, recording is not None)
+        page = stack.enter_context(staged_file(report, *PAGE))
+        robot_file = stack.enter_context(staged_file(write, *YAML)) if write else None
+        table = stack.enter_context(staged_file(write_table, *TABLE)) if write_table else None
+        stack.enter_context(output.staged())
+        if recording is not None:
+            recorded = read_recording(recording, columns)
+        else:
+            assert truth is not None
+            motions = load_cases(cases, model) if cases else default_cases(model)
+            recorded = _simulated(model, truth, motions, seed, jobs)
+            if table:
+                write_recording(table, recorded)
+        payload = model.payload.largest_mass if recorded.payload is None else recorded.payload
+        with progress_bar(f"identification from {count(len(recorded.cases), 'motion')}") as progress:
+            study = study_identification(
+                model, truth, payload, recorded.cases, recorded.sensors, gear_parts, progress
+            )
+        if rectangle and truth is not None:
+            with progress_bar("rectangle") as progress:
+                study = with_rectangle(study, jobs, progress)
+        write_identify_page(page, study)
+        if robot_file:
+            write_text(robot_file, robot_text(study.identified))
+        output.write(identify_json(study))
+    _print(human, study)
+    print_files(human, report, write, write_table)
+
+
+def _plant(robot: str, plant: str | None, is_recorded: bool) -> RobotModel | None:
+    if plant is not None:
+        return load_robot(plant)
+    return None if is_recorded else realistic_robot(robot)
+
+
+def _simulated(
+    model: RobotModel, truth: RobotModel, motions: MotionCases, seed: int, jobs: int | None
+) -> Recording:
+    with progress_bar(f"recording of {count(len(motions.starts(model)), 'motion')}") as progress:
+        cases = simulated(model, truth, motions, seed, jobs, progress)
+    payload = model.payload.largest_mass if motions.payload is None else motions.payload
+    return Recording(payload, cases, places(motions.logger))
+
+
+def _print(human: Console, study: IdentifyStudy) -> None:
+    table = Table(box=box.SIMPLE_HEAD)
+    for name in table_head(study):
+        table.add_column(
+            name, justify="left" if name in ("parameter", "unit") else "right", no_wrap=name == "parameter"
+        )
+    for row in table_rows(study):
+        table.add_row(*map(escape, row))
+    human.print(table)
+    human.print(escape(verdict(study)))

@@ -1,0 +1,155 @@
+"""The page of an identification: parameters, and measured against modelled signals of every case."""
+
+from pathlib import Path
+
+import numpy as np
+import plotly.graph_objects as go
+from plotly.subplots import make_subplots
+
+from experiments.identify.study import IdentifyStudy
+from experiments.report.plot_page import Section, html_table, sortable_table, write_plot_page
+
+_MEASURED, _BEFORE, _AFTER = "#7a8696", "#e0a43a", "#2f7fd0"
+_SHOWN_CASES = 6
+
+
+def table_head(study: IdentifyStudy) -> list[str]:
+    """Of the table of parameters."""
+    return ["parameter", "value", "sigma", "unit", "known"] + (
+        ["true", "error"] if study.plant is not None else []
+    )
+
+
+def table_rows(study: IdentifyStudy) -> list[list[str]]:
+    """Parameters with their uncertainty, and the truth of a simulated robot."""
+    rows = []
+    for each in study.parameters:
+        row = [
+            each.name,
+            f"{each.value:.4g}",
+            f"{each.sigma / abs(each.value):.2%}" if each.value else "-",
+            each.unit,
+            "yes" if each.identifiable else "no",
+        ]
+        if study.plant is not None:
+            row += [
+                "-" if each.true is None else f"{each.true:.4g}",
+                f"{each.value / each.true - 1.0:+.2%}" if each.true else "-",
+            ]
+        rows.append(row)
+    return rows
+
+
+def verdict(study: IdentifyStudy) -> str:
+    """What was found, in a few sentences."""
+    springs = [each for each in study.parameters if each.name.startswith("stiffness_")]
+    known = sum(each.identifiable for each in springs)
+    said = [
+        f"{known} of {len(springs)} springs are identifiable from {len(study.found.cases)} motions, in "
+        f"{study.seconds:.0f} s and {study.found.fit.evaluations} evaluations."
+    ]
+    if study.plant is not None and known:
+        stiffness, damping = (np.abs(study.errors(kind)) for kind in ("stiffness_", "damping_"))
+        said.append(
+            f"They are within {stiffness.max():.1%} of the truth (median {np.median(stiffness):.1%})"
+            + (f", dampers within {damping.max():.0%}." if len(damping) else ".")
+        )
+    if study.weak:
+        said.append(f"Not identifiable: {', '.join(study.weak)}.")
+    if study.rectangle_ratio is not None:
+        said.append(
+            f"On a rectangle the inverse model leaves {study.rectangle_ratio['identified']:.2f} of the "
+            f"deviation of the rigid one, with the former beliefs {study.rectangle_ratio['nominal']:.2f}."
+        )
+    return " ".join(said)
+
+
+def signals_figure(study: IdentifyStudy, case: int) -> go.Figure:
+    """Measured and modelled readings of a case, a row a sensor: its axis that moves most."""
+    found = study.found
+    figure = make_subplots(len(found.sensors), 1, shared_xaxes=True, vertical_spacing=0.012)
+    for row, sensor in enumerate(found.sensors, 1):
+        channels = slice(3 * row - 3, 3 * row)
+        measured = found.measured[:, case, channels]
+        axis = int(np.argmax(np.nanstd(measured, axis=0)))
+        curves = (
+            ("measured", measured[:, axis], _MEASURED),
+            ("before", found.before[:, case, channels][:, axis], _BEFORE),
+            ("after", found.after[:, case, channels][:, axis], _AFTER),
+        )
+        known = np.isfinite(measured[:, axis])
+        for name, curve, colour in curves:
+            trace = go.Scatter(
+                x=found.times[known], y=curve[known], name=name, line={"color": colour, "width": 1.4}
+            )
+            figure.add_trace(trace.update(legendgroup=name, showlegend=row == 1), row, 1)
+        figure.update_yaxes(title=f"{sensor.name} {'xyz'[axis]}", row=row, col=1)
+    return figure.update_xaxes(title="time in s", row=len(found.sensors))
+
+
+def spectra_figure(study: IdentifyStudy) -> go.Figure:
+    """Amplitude of all sensors' readings over frequency, root mean square over cases and channels."""
+    found = study.found
+    figure = go.Figure()
+    known = np.isfinite(found.measured).all(axis=(1, 2))
+    step = float(found.times[1] - found.times[0])
+    spread = found.fit.spread
+    frequency = np.fft.rfftfreq(int(known.sum()), step)
+    for name, curve, colour in (
+        ("measured", found.measured, _MEASURED),
+        ("left before", found.measured - found.before, _BEFORE),
+        ("left after", found.measured - found.after, _AFTER),
+    ):
+        scaled = curve[known] / spread
+        amplitude = np.abs(np.fft.rfft(scaled - scaled.mean(0), axis=0))
+        shown = np.sqrt(np.mean(np.square(amplitude), axis=(1, 2)))
+        figure.add_trace(go.Scatter(x=frequency[1:], y=shown[1:], name=name, line={"color": colour}))
+    figure.update_xaxes(title="frequency in Hz", range=[0.0, 100.0])
+    return figure.update_yaxes(title="amplitude over spread", type="log")
+
+
+def correlation_figure(study: IdentifyStudy) -> go.Figure:
+    """Correlations of the unknowns."""
+    fit = study.found.fit
+    shown = fit.covariance / np.outer(fit.sigma, fit.sigma)
+    names = fit.parameters.names
+    heat = go.Heatmap(z=shown, x=names, y=names, zmin=-1.0, zmax=1.0, colorscale="RdBu")
+    return go.Figure(heat).update_yaxes(autorange="reversed")
+
+
+def sensitivity_rows(study: IdentifyStudy) -> list[list[str]]:
+    """Unknowns, the best known first: standard deviation by noise, and with what the model lacks."""
+    fit = study.found.fit
+    noise = np.sqrt(np.diagonal(fit.noise_covariance))
+    order = np.argsort(fit.sigma)
+    return [[fit.parameters.names[i], f"{noise[i]:.2g}", f"{fit.sigma[i]:.2g}"] for i in order]
+
+
+def write_identify_page(path: Path, study: IdentifyStudy) -> None:
+    """All of it as a page that opens offline."""
+    sections = [
+        Section(
+            "Parameters",
+            "Dampers as retardation times, damper over spring. Sigma contains what cases and sensors "
+            "disagree about; known is what is sure to 3 % (springs) or 25 % (dampers).",
+            html_table(table_head(study), table_rows(study)),
+        ),
+        Section("Spectra", "All sensors and cases.", spectra_figure(study), 420),
+    ]
+    height = 110 * len(study.found.sensors)
+    shown = range(0, len(study.found.cases), max(1, len(study.found.cases) // _SHOWN_CASES))
+    for case in shown:
+        title = f"Case {study.found.cases[case].name}: measured, and modelled before and after"
+        note = f"The stamps of the sensors were ahead by {1e3 * study.found.lags[case]:.2f} ms."
+        sections.append(Section(title, note, signals_figure(study, case), height))
+    sections += [
+        Section(
+            "Sensitivity",
+            "Standard deviations of all unknowns (springs, times and widths relative): by noise, and in all.",
+            sortable_table("sensitivity", ["unknown", "by noise", "in all"], sensitivity_rows(study)),
+        ),
+        Section("Correlations", "Of the unknowns.", correlation_figure(study), 800),
+    ]
+    write_plot_page(
+        path, f"Identification of {study.robot.name}, {study.payload:g} kg", verdict(study), sections
+    )

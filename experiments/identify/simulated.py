@@ -1,0 +1,142 @@
+"""Recordings of a simulated robot: the full nonlinear plant with drives and all parts of drive trains."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from pydrake.systems.analysis import Simulator
+from pydrake.systems.framework import DiagramBuilder
+from pydrake.systems.primitives import LogVectorOutput
+
+from diagrams.integration import Integration, IntegratorConfig
+from diagrams.scenario.scenario import StationConfig
+from diagrams.station import SimulatedStation
+from experiments.cli.workers import Progress, SimulationError, in_processes
+from experiments.feedforward.trial import CommandPlayer, Trial, commands
+from experiments.identify.cases import MotionCases
+from robots.description.model import NUM_JOINTS, RobotModel
+from robots.identification.motion import SensorPlace
+from robots.identification.recording import RecordedCase
+from systems.cell.inertial_sensors import InertialLoggerConfig
+from systems.feedforward import FeedforwardConfig
+
+_STEP = 1e-3  # s, of the integrator and of the robot's log
+
+
+@dataclass(frozen=True)
+class CaseRun:
+    """One motion under a rigid-body feedforward, which excites without damage; Reiner (2010), 4.2.2."""
+
+    name: str
+    trial: Trial
+    logger: InertialLoggerConfig
+    ringing: float  # s
+    seed: int
+
+    def run(self, progress: Progress | None = None) -> RecordedCase:
+        """Simulates it.
+
+        Raises:
+            SimulationError: if the integration breaks off.
+        """
+        trial = self.trial
+        config = StationConfig(elasticity="structure", payload=trial.payload)
+        period, ahead = config.period, config.drive.command_delay + config.drive.dead_time
+        end = trial.settle + trial.profile.duration + self.ringing
+        told = commands(trial, np.arange(0.0, end, period) + ahead, period)
+        builder = DiagramBuilder()
+        plant = trial.plant or trial.robot
+        station = builder.AddNamedSystem(
+            "station", SimulatedStation(plant, config, "cascade", takes_torque=True, inertial=[self.logger])
+        )
+        player = builder.AddNamedSystem("commands", CommandPlayer(told, period))
+        for name in ("position_command", "velocity_command", "torque_feedforward"):
+            builder.Connect(player.GetOutputPort(name), station.GetInputPort(name))
+        logs = [
+            LogVectorOutput(station.GetOutputPort(name), builder, step)
+            for name, step in (
+                ("truth.motor_state", _STEP),
+                ("truth.motor_torque", _STEP),
+                ("inertial_sample_1", self.logger.true_period),
+            )
+        ]
+        simulator = Simulator(builder.Build())
+        context = simulator.get_mutable_context()
+        station.set_at_rest(context, told[0, 0], self.seed)
+        rate = station.fastest_rate(context)
+        integration = Integration(IntegratorConfig("radau3", max_step=_STEP), period, rate)
+        integration.initialize(simulator)
+        # Play and friction break the estimate of the error, which then asks for ever smaller steps.
+        simulator.get_mutable_integrator().set_fixed_step_mode(True)
+        try:
+            integration.advance(simulator, end)
+        except RuntimeError as error:
+            raise SimulationError(f"{self.name}: {' '.join(str(error).split())}") from error
+        motor, torque, samples = (log.FindLog(context).data().T for log in logs)
+        time = logs[0].FindLog(context).sample_times()
+        # What is logged of a sampled port at a tick is the sample of the tick before.
+        samples = samples[1:]
+        if progress:
+            progress(1.0)
+        return RecordedCase(
+            self.name,
+            time,
+            motor[:, :NUM_JOINTS],
+            motor[:, NUM_JOINTS:],
+            torque,
+            samples[:, 0],
+            samples[:, 1:].reshape(len(samples), -1, 3),
+        )
+
+
+def simulated(
+    robot: RobotModel,
+    plant: RobotModel,
+    cases: MotionCases,
+    seed: int,
+    processes: int | None = None,
+    progress: Callable[[float], None] | None = None,
+) -> list[RecordedCase]:
+    """Records all cases.
+
+    Args:
+        robot: as the controller knows it.
+        plant: what moves.
+        cases: what is moved.
+        seed: of the noise of the sensors.
+        processes: how many work at a time; None for one per core.
+        progress: is called now and then with the share that is done, 0 to 1.
+
+    Raises:
+        ValueError: if a case or a sensor is impossible.
+        SimulationError: if a run broke off.
+    """
+    payload = robot.payload.largest_mass if cases.payload is None else cases.payload
+    config = FeedforwardConfig(kind="rigid")
+    runs = []
+    for number, (q, angle) in enumerate(cases.starts(robot), 1):
+        trial = Trial(
+            robot, payload, q, angle, config, plant, settle=cases.settle, speeding_up=cases.speeding_up
+        )
+        runs.append(CaseRun(f"{number}", trial, cases.logger, cases.ringing, 1000 * seed + number))
+    return in_processes(_run, runs, processes, progress)
+
+
+def _run(job: CaseRun, progress: Progress) -> RecordedCase:
+    return job.run(progress)
+
+
+def places(logger: InertialLoggerConfig) -> list[SensorPlace]:
+    """The sensors of a logger as their data sheets have them, without their bias."""
+    return [
+        SensorPlace(
+            sensor.name,
+            sensor.kind,
+            sensor.body,
+            np.array(sensor.position, dtype=float),
+            sensor.rotation,
+            sensor.bandwidth,
+            sensor.noise_sigma,
+        )
+        for sensor in logger.sensors
+    ]

@@ -1,0 +1,141 @@
+"""A robot identified from recorded motions, and how well its inverse model then follows a rectangle."""
+
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from experiments.cli.workers import Progress, SimulationError, in_processes
+from experiments.feedforward.rectangle import RectangleTrial
+from robots.description.model import RobotModel
+from robots.identification.arm_identification import ArmIdentification, identify_arm
+from robots.identification.identified_robot import FoundParameter, found_parameters, identified_robot
+from robots.identification.motion import SensorPlace
+from robots.identification.recording import RecordedCase
+from systems.feedforward import FeedforwardConfig
+
+_STIFFNESS, _DAMPING = "stiffness_", "damping_"
+
+
+@dataclass(frozen=True)
+class IdentifyStudy:
+    """What was found of a robot, and what it is good for."""
+
+    robot: RobotModel  # as it was believed to be
+    plant: RobotModel | None  # what moved in a simulation
+    payload: float  # kg
+    found: ArmIdentification
+    parameters: list[FoundParameter]
+    identified: RobotModel
+    seconds: float  # from the recording to the parameters
+    rectangle_ratio: dict[str, float] | None  # deviation with `elastic_structure` over that with `rigid`
+
+    def errors(self, kind: str) -> np.ndarray:
+        """Relative errors of identifiable parameters of a kind, ``"stiffness_"`` or ``"damping_"``."""
+        return np.array(
+            [
+                each.value / each.true - 1.0
+                for each in self.parameters
+                if each.true and each.identifiable and each.name.startswith(kind)
+            ]
+        )
+
+    @property
+    def weak(self) -> list[str]:
+        """Springs and dampers that the recording does not show well enough."""
+        kinds = (_STIFFNESS, _DAMPING)
+        return [
+            each.name for each in self.parameters if each.name.startswith(kinds) and not each.identifiable
+        ]
+
+
+def study_identification(
+    robot: RobotModel,
+    plant: RobotModel | None,
+    payload: float,
+    recorded: Sequence[RecordedCase],
+    sensors: list[SensorPlace],
+    gear_parts: bool = True,
+    progress: Callable[[float], None] | None = None,
+) -> IdentifyStudy:
+    """Identifies a robot; without the rectangle.
+
+    Args:
+        robot: as it is believed to be.
+        plant: what moved, if that is known.
+        payload: mass at the flange in kg.
+        recorded: the motions.
+        sensors: in the order of their readings.
+        gear_parts: whether gears may have play, hysteresis and ripple.
+        progress: is called now and then with the share that is done, 0 to 1.
+
+    Raises:
+        RecordingError: if the recording cannot be used.
+        ValueError: if a sensor sits where the robot has no body.
+    """
+    started = time.perf_counter()
+    found = identify_arm(robot, payload, recorded, sensors, gear_parts, progress)
+    parameters = found_parameters(robot, found.fit, plant)
+    identified = identified_robot(robot, found.fit)
+    seconds = time.perf_counter() - started
+    return IdentifyStudy(robot, plant, payload, found, parameters, identified, seconds, None)
+
+
+def with_rectangle(
+    study: IdentifyStudy, processes: int | None, progress: Callable[[float], None]
+) -> IdentifyStudy:
+    """The study with the rectangle of `truetip feedforward` driven on what moved.
+
+    Raises:
+        SimulationError: if a run broke off.
+    """
+    rigid, elastic = (FeedforwardConfig(kind, rough_path="accept") for kind in ("rigid", "elastic_structure"))
+    trials = [
+        RectangleTrial(robot, study.payload, config, study.plant)
+        for robot, config in ((study.robot, rigid), (study.robot, elastic), (study.identified, elastic))
+    ]
+    of_rigid, nominal, identified = in_processes(_integral, trials, processes, progress)
+    return replace(
+        study, rectangle_ratio={"nominal": nominal / of_rigid, "identified": identified / of_rigid}
+    )
+
+
+def _integral(trial: RectangleTrial, progress: Progress) -> float:
+    try:
+        return trial.run(progress).integral
+    except RuntimeError as error:
+        raise SimulationError(f"{trial.config.kind}: {' '.join(str(error).split())}") from error
+
+
+def identify_json(study: IdentifyStudy) -> dict[str, Any]:
+    """The numbers in SI units; ``true`` and errors only where the truth is known."""
+    fit = study.found.fit
+    numbers: dict[str, Any] = {
+        "robot": study.robot.name,
+        "payload_kg": study.payload,
+        "cases": len(study.found.cases),
+        "parameters": {
+            each.name: {
+                "value": each.value,
+                "sigma": each.sigma,
+                "unit": each.unit,
+                "identifiable": each.identifiable,
+            }
+            | ({} if each.true is None else {"true": each.true})
+            for each in study.parameters
+        },
+        "weak": study.weak,
+        "condition": fit.condition,
+        "seconds": study.seconds,
+        "evaluations": fit.evaluations,
+    }
+    if study.plant is not None:
+        for label, kind in (("stiffness", _STIFFNESS), ("damping", _DAMPING)):
+            errors = np.abs(study.errors(kind))
+            numbers[f"worst_{label}_error"] = float(errors.max()) if len(errors) else None
+            numbers[f"median_{label}_error"] = float(np.median(errors)) if len(errors) else None
+    if study.rectangle_ratio is not None:
+        numbers["rectangle_ratio"] = study.rectangle_ratio
+    return numbers

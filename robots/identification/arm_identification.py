@@ -1,0 +1,169 @@
+"""From recorded motions to springs and dampers: times aligned, axes checked, unknowns found in stages."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from robots.description.model import RobotModel
+from robots.identification.arm_along_motion import ArmAlongMotion, ElasticArm
+from robots.identification.arm_fit import ArmFit, ArmProblem
+from robots.identification.arm_response import ArmResponse
+from robots.identification.elastic_parameters import ElasticParameters
+from robots.identification.motion import MotionCase, SensorPlace
+from robots.identification.recording import RecordedCase, check_axes, check_excitation, lag_of
+
+_FEW = 6  # cases of the first stages, where the unknowns are still far away
+_NEAR = 1e-3  # relative, at which a stage is left for the next one
+
+Progress = Callable[[float], None]
+
+
+@dataclass(frozen=True)
+class ArmIdentification:
+    """What was found, and what it was found from."""
+
+    arm: ElasticArm
+    cases: list[MotionCase]  # on the robot's time axis
+    sensors: list[SensorPlace]
+    lags: np.ndarray  # (cases,) s, by which the stamps of the sensors were ahead
+    fit: ArmFit
+    times: np.ndarray  # (m,) s, of the readings that were compared
+    measured: np.ndarray  # (m, cases, channels), NaN where there is none
+    before: np.ndarray  # the same as the first beliefs have it
+    after: np.ndarray  # and as the unknowns that were found have it
+
+
+class _Data:
+    """Cases with their linearised motions; times and offsets of the sensors move as the model gets better."""
+
+    def __init__(
+        self,
+        arm: ElasticArm,
+        recorded: Sequence[RecordedCase],
+        sensors: list[SensorPlace],
+        progress: Progress,
+    ) -> None:
+        self.recorded, self.sensors = recorded, sensors
+        self.motions: list[ArmAlongMotion] = []
+        for case in recorded:
+            self.motions.append(arm.along(case.at_lag(0.0)))
+            progress(len(self.motions) / len(recorded))
+        self.lags = np.zeros(len(recorded))
+        self.cases: list[MotionCase] = []
+
+    def align(self, modelled: Sequence[np.ndarray]) -> None:
+        """Brings the sensors to the robot's time, and takes their bias from the rest before the motion.
+
+        Args:
+            modelled: what sensors should show at the samples of the cases, (n, sensors, 3) each.
+        """
+        self.cases = []
+        for i, (case, shown) in enumerate(zip(self.recorded, modelled, strict=True)):
+            self.lags[i] = lag_of(case, shown, self.sensors, float(self.lags[i]))
+            aligned = case.at_lag(float(self.lags[i]))
+            resting = _resting(aligned)
+            bias = np.nanmean(aligned.readings[resting] - shown[resting], axis=0)
+            self.cases.append(replace(aligned, readings=aligned.readings - bias))
+
+    def problem(self, parameters: ElasticParameters, ratio: np.ndarray, chosen: Sequence[int]) -> ArmProblem:
+        """Of some cases."""
+        cases = [self.cases[i] for i in chosen]
+        response = ArmResponse([self.motions[i] for i in chosen], cases, self.sensors, parameters, ratio)
+        measured = np.full((len(response.kept), len(cases), 3 * len(self.sensors)), np.nan)
+        for column, case in enumerate(cases):
+            kept = response.kept[response.kept < len(case.theta)]
+            measured[: len(kept), column] = case.readings[kept].reshape(len(kept), -1)
+        return ArmProblem(response, measured, parameters)
+
+    def align_to(self, parameters: ElasticParameters, ratio: np.ndarray, p: np.ndarray) -> int:
+        """Aligns all cases to what unknowns p make of them; returns how many evaluations that took."""
+        problem = self.problem(parameters, ratio, range(len(self.recorded)))
+        shown, kept = problem.readings(p), problem.response.kept
+        found = []
+        for column, case in enumerate(self.recorded):
+            n = len(case.time)
+            samples = np.arange(n)
+            flat = np.stack([np.interp(samples, kept, each) for each in shown[:, column].T], axis=1)
+            found.append(flat.reshape(n, -1, 3))
+        self.align(found)
+        return problem.evaluations
+
+
+def _resting(case: MotionCase) -> np.ndarray:
+    """Samples before the motion at which the sensors were read, (n,) bool."""
+    speed = np.abs(case.rate).max(1)
+    begins = int(np.argmax(speed > 1e-3 * max(speed.max(), 1e-12)))
+    resting = np.asarray(np.isfinite(case.readings).all((1, 2)))
+    resting[max(begins, 1) :] = False
+    if not resting.any():
+        resting[:] = False
+        resting[int(np.argmax(np.isfinite(case.readings).all((1, 2))))] = True
+    return resting
+
+
+def _turning(cases: Sequence[MotionCase], ratio: np.ndarray) -> list[int]:
+    """Joints whose motors make a turn or more in one of the cases."""
+    turns = np.max([np.ptp(case.theta, axis=0) for case in cases], axis=0) * np.abs(ratio) / (2.0 * np.pi)
+    return np.flatnonzero(turns >= 1.0).tolist()
+
+
+def identify_arm(
+    robot: RobotModel,
+    payload: float,
+    recorded: Sequence[RecordedCase],
+    sensors: list[SensorPlace],
+    gear_parts: bool = True,
+    progress: Progress | None = None,
+) -> ArmIdentification:
+    """Finds springs and dampers of gears, bearings and beams.
+
+    Args:
+        robot: as it is believed to be; its springs and dampers are the start.
+        payload: mass at the flange in kg.
+        recorded: the motions, each from rest, all with the same period.
+        sensors: in the order of the readings.
+        gear_parts: whether gears may have play, hysteresis and ripple.
+        progress: is called now and then with the share that is done, 0 to 1.
+
+    Raises:
+        RecordingError: if the recording cannot be used; the message says why.
+        ValueError: if a sensor sits on a body that the robot does not have.
+    """
+    tell = progress or (lambda share: None)
+    arm = ElasticArm(robot, payload, sensors)
+    data = _Data(arm, recorded, sensors, lambda share: tell(0.2 * share))
+    rigid = [motion.readings.reshape(len(motion.readings), -1, 3) for motion in data.motions]
+    check_excitation([case.at_lag(0.0) for case in recorded], rigid, sensors)
+    data.align(rigid)
+    check_axes(data.cases, rigid, sensors)
+    floor = np.repeat([max(sensor.sigma, 1e-9) for sensor in sensors], 3)
+    few = list(range(0, len(recorded), max(1, len(recorded) // _FEW)))
+    everything = list(range(len(recorded)))
+    evaluations = 0
+
+    # Linear gears first: where the springs are far off, play only makes valleys to be lost in.
+    plain = ElasticParameters(arm, gear_parts=False)
+    p = plain.start.copy()
+    for steps in (8, 5):
+        problem = data.problem(plain, robot.gear_ratio, few)
+        p = problem.solve(p, problem.spread(p, floor), "soft_l1", steps, 5.0 * _NEAR)
+        evaluations += problem.evaluations + data.align_to(plain, robot.gear_ratio, p)
+    tell(0.4)
+
+    parameters = ElasticParameters(arm, gear_parts, _turning(data.cases, robot.gear_ratio))
+    found = parameters.start.copy()
+    found[: len(p)] = p
+    for steps in (6, 3):
+        problem = data.problem(parameters, robot.gear_ratio, few)
+        found = problem.solve(found, problem.spread(found, floor), "soft_l1", steps, _NEAR)
+        evaluations += problem.evaluations + data.align_to(parameters, robot.gear_ratio, found)
+    tell(0.7)
+    problem = data.problem(parameters, robot.gear_ratio, everything)
+    found = problem.solve(found, problem.spread(found, floor), "soft_l1", 4, _NEAR)
+    tell(0.95)
+    before = problem.readings(parameters.start)
+    fit = problem.fit(found, problem.spread(found, floor), evaluations)
+    after = problem.readings(found)
+    times = problem.response.kept * recorded[0].period
+    return ArmIdentification(arm, data.cases, sensors, data.lags, fit, times, problem.measured, before, after)

@@ -1,0 +1,145 @@
+"""truetip identify: springs of a robot that moved are found, wrong input is one line."""
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+from typer.testing import Result
+
+from experiments.identify.recording_file import Recording, read_recording, write_recording
+from robots.description.model import load_robot
+from robots.identification.motion import SensorPlace
+from robots.identification.recording import RecordedCase
+from tests.experiments.browser import open_page
+from tests.experiments.commands import files, refusal, truetip
+
+GYRO = SensorPlace("hand", "gyro", "link_5", np.array([0.1, 0.0, 0.0]), np.eye(3), 200.0, 2e-3)
+ROWS = 80
+
+CASES = """\
+angles_deg: [6]
+ringing: 0.4
+positions_deg:
+- [0, -90, 90, 0, 0, 0]
+- [0, -30, 30, 0, 60, 0]
+- [0, -60, 0, 45, -60, 0]
+- [0, -110, 40, 0, 90, 90]
+"""
+
+
+def run(folder: Path, *arguments: str) -> Result:
+    return truetip("identify", f"--report={folder / 'identify.html'}", *arguments)
+
+
+def resting(folder: Path) -> Path:
+    """A recording of a robot that stands still."""
+    time = 1e-3 * np.arange(ROWS)
+    theta = np.tile(np.deg2rad([0.0, -60.0, 40.0, 0.0, 30.0, 0.0]), (ROWS, 1))
+    shown = GYRO.sigma * np.random.default_rng(2).normal(size=(ROWS, 1, 3))
+    case = RecordedCase("rest", time, theta, 0.0 * theta, 0.0 * theta, time, shown)
+    path = folder / "rest.csv"
+    write_recording(path, Recording(100.0, [case], [GYRO]))
+    return path
+
+
+def test_a_recording_is_read_as_it_was_written(tmp_path: Path):
+    path = resting(tmp_path)
+    found = read_recording(path)
+    assert (found.payload, [case.name for case in found.cases]) == (100.0, ["rest"])
+    assert found.cases[0].readings.shape == (ROWS, 1, 3)
+    assert found.cases[0].period == pytest.approx(1e-3)
+    np.testing.assert_allclose(found.sensors[0].position, GYRO.position)
+    assert (found.sensors[0].kind, found.sensors[0].sigma) == ("gyro", 2e-3)
+
+
+def test_a_recording_without_motion_says_what_it_cannot_show(tmp_path: Path):
+    result = run(tmp_path, f"--recording={resting(tmp_path)}")
+    assert "no excitation" in refusal(result)
+    assert "gears, bearings and beams cannot be seen" in refusal(result)
+    assert files(tmp_path) == {"rest.csv", "rest.yaml"}
+
+
+def changed(path: Path, old: str, new: str) -> Path:
+    text = path.read_text()
+    assert old in text
+    path.write_text(text.replace(old, new, 1))
+    return path
+
+
+def test_wrong_tables_are_refused_with_file_and_line(tmp_path: Path):
+    path = resting(tmp_path)
+    lines = path.read_text().splitlines()
+    fields = lines[7].split(",")
+    fields[3] = "nan"
+    path.write_text("\n".join([*lines[:7], ",".join(fields), *lines[8:]]))
+    message = refusal(run(tmp_path, f"--recording={path}"))
+    assert f"{path}, line 8: 'nan' in column 'position_1' is no number" in message
+    path.write_text("\n".join([*lines[:7], *lines[8:]]))
+    assert "line 8: samples of the robot must be evenly spaced" in refusal(
+        run(tmp_path, f"--recording={path}")
+    )
+
+
+def test_wrong_column_maps_are_refused(tmp_path: Path):
+    path = resting(tmp_path)
+    changed(path.with_suffix(".yaml"), "hand_x", "hand_u")
+    assert "no column 'hand_u', there are case, time" in refusal(run(tmp_path, f"--recording={path}"))
+    changed(path.with_suffix(".yaml"), "link_5", "link_9")
+    changed(path.with_suffix(".yaml"), "hand_u", "hand_x")
+    assert "has no body 'link_9'" in refusal(run(tmp_path, f"--recording={path}"))
+
+
+REFUSED = {
+    "robot": (["--robot=kr211"], "robot 'kr211': no file"),
+    "plant": (["--robot=irb140"], "robot 'irb140-realistic': no file"),
+    "recording": (["--recording=none.csv"], "column map none.yaml"),
+    "both": (["--recording=none.csv", "--cases=mine.yaml"], "takes no --cases"),
+    "columns": (["--columns=mine.yaml"], "--columns says what a --recording has"),
+    "cases": (["--cases=mine.yaml"], "cases mine.yaml"),
+    "report": (["--report=identify.txt"], "its name must end in .html"),
+    "jobs": (["--jobs=0"], "--jobs must be at least 1, got 0"),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize(("options", "message"), REFUSED.values(), ids=REFUSED)
+def test_wrong_input_is_refused_in_one_line_and_leaves_nothing(tmp_path: Path, options, message: str):
+    assert message in refusal(run(tmp_path, *options))
+    assert files(tmp_path) == set()
+
+
+@pytest.mark.slow
+def test_springs_that_are_a_fifth_softer_than_believed_are_found(tmp_path: Path):
+    """Four motions of the nonlinear plant with linear gears: the main gears and the beam within 3 %."""
+    (tmp_path / "cases.yaml").write_text(CASES)
+    softer = tmp_path / "softer.yaml"
+    base = load_robot("kr210")
+    softer.write_text(
+        "extends: kr210\njoints:\n"
+        + "".join(
+            f"- {{drive_train: {{stiffness: {0.8 * joint.drive_train.stiffness}, source: assumed}}}}\n"
+            for joint in base.joints
+        )
+    )
+    robot = tmp_path / "identified.yaml"
+    result = run(
+        tmp_path,
+        f"--plant={softer}",
+        f"--cases={tmp_path / 'cases.yaml'}",
+        "--no-gear-parts",
+        "--no-rectangle",
+        "--jobs=2",
+        f"--write={robot}",
+        "--json=-",
+    )
+    assert result.exit_code == 0, result.output
+    numbers = json.loads(result.stdout)
+    for name in ("stiffness_gear_1", "stiffness_gear_2", "stiffness_gear_3", "stiffness_beam_2_y"):
+        found = numbers["parameters"][name]
+        assert abs(found["value"] / found["true"] - 1.0) < 0.03, name
+    assert numbers["worst_stiffness_error"] < 0.03
+    assert load_robot(str(robot)).joints[1].drive_train.stiffness == pytest.approx(
+        0.8 * base.joints[1].drive_train.stiffness, rel=0.03
+    )
+    opened = open_page(tmp_path / "identify.html")
+    assert not [line for line in opened.console if "rror" in line]
