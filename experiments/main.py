@@ -12,6 +12,7 @@ from rich.markup import escape
 
 from diagrams.record.log import RunLog
 from diagrams.runs.simulation import Experiment
+from experiments.accept.command import accept_app
 from experiments.calibration.calibrate_command import calibrate_command
 from experiments.calibration.design_command import design_command
 from experiments.cameras.command import cameras_app
@@ -325,6 +326,7 @@ app.command("tool")(tool_command)
 app.command("align")(align_command)
 app.add_typer(robots_app, name="robots")
 app.command("watch")(watch_command)
+app.add_typer(accept_app, name="accept")
 app.command("health")(health_command)
 app.command("scenarios")(scenarios_command)
 app.command("doctor")(doctor_command)

@@ -1,0 +1,189 @@
+"""The test cycle of ISO 9283: five poses in a cube, visited again and again, and a square through four."""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from diagrams.record.log import RunLog
+from diagrams.scenario.scenario import Scenario
+from experiments.metrics.iso9283 import path_distance, repeatability
+from robots.pose import pose_error, zyx_from_rotation
+from systems.reference.paths import make_path
+from systems.reference.shapes.points import Points, Rectangle, Waypoint
+
+ORDER = (0, 1, 2, 3, 4, 0, 1, 0, 3, 0)  # poses of a cycle; P1 is reached from P5, P2 and P4
+_INSIDE = 0.8  # P2 to P5 are a tenth of the diagonal within the corners of the cube
+_ATTAINED = 0.1  # s, over which an attained pose is the mean
+_AFTER_CORNER = 0.3  # s, in which the path overshoots
+
+
+@dataclass(frozen=True)
+class Cycle:
+    """Where the five poses are, and how the cycle is run."""
+
+    poses: np.ndarray  # X_WE of P1 to P5, (5, 4, 4)
+    dwell: float  # s, at rest at every pose
+    band: float  # m, within which a pose counts as stable
+
+
+def cube_poses(scenario: Scenario, edge: float) -> np.ndarray:
+    """P1 to P5 of a cube about the middle of the scenario's path, (5, 4, 4), the tool as half way along it.
+
+    The plane is that of the corners C1, C2, C7 and C8: it is inclined by 45 degrees.
+    """
+    path = make_path(scenario.reference)
+    X = path.sample(np.linspace(path.path_start, path.dwell_start, 401))[0]
+    middle = 0.5 * (X[:, :3, 3].min(axis=0) + X[:, :3, 3].max(axis=0))
+    half = 0.5 * edge * _INSIDE
+    corners = half * np.array([[0, 0, 0], [1, 1, 1], [-1, 1, -1], [-1, -1, -1], [1, -1, 1]])
+    poses = np.tile(np.eye(4), (5, 1, 1))
+    poses[:, :3, :3] = X[200, :3, :3]
+    poses[:, :3, 3] = middle + corners
+    return poses
+
+
+def pose_scenario(scenario: Scenario, cycle: Cycle, cycles: int, speed: float) -> Scenario:
+    """The scenario that visits the poses; a move takes 1/speed of the time that it has at full speed."""
+    points = Points([_waypoint(cycle.poses[i]) for i in ORDER])
+    return _with_path(scenario, points, cycle, cycles, speed)
+
+
+def path_scenario(scenario: Scenario, cycle: Cycle, cycles: int, speed: float) -> Scenario:
+    """The scenario that runs the square P2, P3, P4, P5 through its corners."""
+    square = Rectangle([_waypoint(cycle.poses[i]) for i in (1, 2, 3, 4, 1)])
+    return _with_path(scenario, square, cycle, cycles, speed)
+
+
+def _with_path(
+    scenario: Scenario, path: Points | Rectangle, cycle: Cycle, cycles: int, speed: float
+) -> Scenario:
+    acceleration = speed**2 * scenario.reference.acceleration
+    reference = replace(
+        scenario.reference, path=path, dwell=cycle.dwell, laps=cycles, acceleration=acceleration
+    )
+    return replace(scenario, reference=reference)
+
+
+def _waypoint(X: np.ndarray) -> Waypoint:
+    return Waypoint(1e3 * X[:3, 3], np.rad2deg(zyx_from_rotation(X[:3, :3])))
+
+
+def pose_results(log: RunLog, scenario: Scenario, cycle: Cycle, cycles: int) -> dict[str, float | None]:
+    """AP, RP, vAP, distances, drift, stabilisation and overshoot, in mm, degrees and s.
+
+    Args:
+        log: of a run of `pose_scenario`.
+        scenario: of that run.
+        cycle: its poses.
+        cycles: how often they were visited, at least 2.
+    """
+    moves = len(ORDER) - 1
+    settle = scenario.reference.settle
+    span = (log.dwell_start - settle) / (moves * cycles)  # of a rest and a move
+    reached = [
+        (ORDER[k % moves + 1], ORDER[k % moves], settle + (k + 1) * span) for k in range(moves * cycles)
+    ]
+    attained, error, came_from, stable, overshoot = [], [], [], [], []
+    for pose, before, arrival in reached:
+        rest = (log.time >= arrival - 1e-9) & (log.time < arrival + cycle.dwell - 1e-9)
+        end = rest & (log.time >= arrival + cycle.dwell - _ATTAINED)
+        e = pose_error(np.broadcast_to(cycle.poses[pose], (int(end.sum()), 4, 4)), log.X_WE_true[end])
+        mean = log.X_WE_true[end, :3, 3].mean(axis=0)
+        away = np.linalg.norm(log.X_WE_true[rest, :3, 3] - mean, axis=1)
+        seconds, beyond = _settled(away, log.time[rest] - arrival, cycle.band)
+        attained.append(mean)
+        error.append(e.mean(axis=0))
+        came_from.append((pose, before))
+        stable.append(seconds)
+        overshoot.append(beyond)
+    p, e, to = np.array(attained), np.array(error), np.array([pose for pose, _ in came_from])
+    visits = {pose: p[to == pose] for pose in range(5)}
+    accuracy = {k: float(np.linalg.norm(e[to == k, 3:].mean(axis=0))) for k in range(5)}
+    middles = [
+        p[[j for j, pair in enumerate(came_from) if pair == (0, before)]].mean(axis=0) for before in (4, 1, 3)
+    ]
+    apart = [float(np.linalg.norm(a - b)) for a in middles for b in middles]
+    # P2 to P4, each measured once a cycle by the visit of the first half.
+    first, second = (_of_pair(p, came_from, pair) for pair in ((1, 0), (3, 2)))
+    count = min(len(first), len(second))
+    lengths = np.linalg.norm(first[:count] - second[:count], axis=1)
+    wanted = float(np.linalg.norm(cycle.poses[1, :3, 3] - cycle.poses[3, :3, 3]))
+    quarter = max(1, len(visits[0]) // 4)
+    drift = visits[0][-quarter:].mean(axis=0) - visits[0][:quarter].mean(axis=0)
+    return {
+        "AP_mm": 1e3 * max(accuracy.values()),
+        "RP_mm": 1e3 * max(float(repeatability(x)) for x in visits.values() if len(x) > 1),
+        "AP_deg": float(np.rad2deg(max(np.linalg.norm(e[to == k, :3].mean(axis=0)) for k in range(5)))),
+        "vAP_mm": 1e3 * max(apart),
+        "AD_mm": 1e3 * float(lengths.mean() - wanted),
+        "RD_mm": 1e3 * 3.0 * float(lengths.std(ddof=1)) if count > 1 else None,
+        "dAP_mm": 1e3 * float(np.linalg.norm(drift)),
+        "stabilisation_s": max(stable),
+        "overshoot_mm": 1e3 * max(overshoot),
+    }
+
+
+def path_results(log: RunLog, scenario: Scenario, cycle: Cycle) -> dict[str, float]:
+    """AT and RT with orientation, corner deviation and velocity, in mm, degrees and percent."""
+    path = make_path(scenario.reference)
+    lap = float(path.lap_starts[1] - path.lap_starts[0])
+    since = np.arange(0.0, lap, scenario.station.period)
+    wanted, V, _ = path.sample(path.lap_starts[0] + since)
+    # Laps may begin between two ticks: errors vary less between these than positions do.
+    off = log.X_WE_true[:, :3, 3] - log.X_WE_desired[:, :3, 3]
+    p = wanted[:, :3, 3] + np.stack([_at(log.time, off, start + since) for start in path.lap_starts])
+    nearest = np.clip(np.searchsorted(log.time, path.lap_starts[:, None] + since), 0, len(log.time) - 1)
+    angles = pose_error(wanted, log.X_WE_true[nearest])[..., :3].mean(axis=0)
+    mean = p.mean(axis=0)
+    # Some time before and after, for the tip is late.
+    around = path.sample(path.lap_starts[0] + np.arange(-0.5, lap + 0.5, scenario.station.period))[0]
+    distances = path_distance(
+        since, mean, np.arange(-0.5, lap + 0.5, scenario.station.period), around[:, :3, 3]
+    )
+    speed = np.linalg.norm(np.gradient(p, since, axis=1), axis=2)
+    quick = np.linalg.norm(V[:, 3:], axis=1)
+    middle = quick > 0.99 * quick.max()
+    ratio = speed[:, middle].max(axis=1) / quick.max() - 1.0
+    rounding, over = _corners(mean, since, cycle, lap)
+    return {
+        "AT_mm": 1e3 * float(distances.max()),
+        "RT_mm": 1e3 * float(repeatability(p).max()),
+        "AT_deg": float(np.rad2deg(np.linalg.norm(angles, axis=1).max())),
+        "CR_mm": 1e3 * rounding,
+        "CO_mm": 1e3 * over,
+        "AV_percent": 100.0 * float(ratio.mean()),
+        "RV_percent": 300.0 * float(ratio.std(ddof=1)),
+    }
+
+
+def _settled(away: np.ndarray, since: np.ndarray, band: float) -> tuple[float, float]:
+    """When a tip stays within a band, in s from the end of the command, and how far it was then."""
+    outside = np.flatnonzero(away > band)
+    seconds = float(since[min(outside[-1] + 1, len(since) - 1)]) if len(outside) else 0.0
+    inside = np.flatnonzero(away <= band)
+    return seconds, float(away[inside[0] :].max()) if len(inside) else float(away.max())
+
+
+def _of_pair(p: np.ndarray, came_from: list[tuple[int, int]], pair: tuple[int, int]) -> np.ndarray:
+    """Attained positions of those visits to a pose that began at another."""
+    return p[[k for k, each in enumerate(came_from) if each == pair]]
+
+
+def _at(time: np.ndarray, p: np.ndarray, when: np.ndarray) -> np.ndarray:
+    return np.stack([np.interp(when, time, p[:, k]) for k in range(3)], -1)
+
+
+def _corners(p: np.ndarray, since: np.ndarray, cycle: Cycle, lap: float) -> tuple[float, float]:
+    """The largest rounding of the corners P3, P4 and P5, and the largest overshoot behind them, in m."""
+    corners = cycle.poses[[1, 2, 3, 4, 1], :3, 3]
+    rounding, over = [], []
+    for k in (1, 2, 3):
+        corner, after = corners[k], corners[k + 1]
+        time = k * lap / 4.0
+        near = np.abs(since - time) < 0.5
+        rounding.append(float(np.linalg.norm(p[near] - corner, axis=1).min()))
+        late = (since >= time) & (since < time + _AFTER_CORNER)
+        along = (after - corner) / np.linalg.norm(after - corner)
+        off = p[late] - corner
+        over.append(float(np.linalg.norm(off - np.outer(off @ along, along), axis=1).max()))
+    return max(rounding), max(over)

@@ -1,0 +1,74 @@
+"""``truetip accept``: ball-bar lengths against a maximum, the ISO 9283 table, and what is refused."""
+
+import json
+from pathlib import Path
+
+import pytest
+
+from tests.experiments.commands import files, refusal, truetip
+
+
+def test_noise_of_pixels_decides_whether_cameras_pass(tmp_path: Path):
+    def passed(sigma: float) -> dict:
+        out = ["--report", tmp_path / "c.html", "--json", tmp_path / "c.json"]
+        assert truetip("accept", "cameras", "--pixel-sigma", sigma, *out).exit_code == 0
+        return json.loads((tmp_path / "c.json").read_text())
+
+    quiet, loud = passed(0.02), passed(2.0)
+    assert (quiet["lines"], quiet["lengths"]) == (7, 35)
+    assert quiet["passed"]
+    assert not loud["passed"]
+    assert loud["probing_error_mm"] > 20.0 * quiet["probing_error_mm"]
+
+
+def test_recorded_lengths_are_judged_by_the_largest_error(tmp_path: Path):
+    rows = []
+    for line in range(1, 8):
+        for k in range(1, 6):
+            error = 0.3 if (line, k) == (3, 4) else 0.05
+            rows.append(f"{line},{200 * k},{200 * k + error}")
+    table = tmp_path / "lengths.csv"
+    table.write_text("\n".join(["line,nominal_mm,measured_mm", *rows]))
+    result = truetip("accept", "cameras", "--lengths", table, "--report", tmp_path / "c.html", "--json", "-")
+    numbers = json.loads(result.stdout)
+    assert numbers["largest_length_error_mm"] == pytest.approx(0.3)
+    assert (numbers["at_line"], numbers["at_length_mm"], numbers["passed"]) == (3, 800.0, False)
+    table.write_text("\n".join(["line,nominal_mm,measured_mm", *rows[:30]]))
+    assert "7 lines with 5 lengths each are needed, got 6 lines" in refusal(
+        truetip("accept", "cameras", "--lengths", table, "--report", tmp_path / "d.html")
+    )
+
+
+@pytest.mark.slow
+def test_the_table_of_a_robot_has_a_column_for_each_speed(tmp_path: Path):
+    result = truetip(
+        "accept", "robot", "--scenario", "nominal", "--law", "open_loop", "--cycles", "2", "--dwell", "0.3",
+        "--speeds", "100,50", "--set=station.elasticity=rigid", "--set=initial_error_mm=[0,0,0]",
+        "--set=reference.acceleration=4", "--set=reference.settle=0.2",
+        "--report", tmp_path / "r.html", "--json", tmp_path / "r.json",
+    )  # fmt: skip
+    assert result.exit_code == 0, result.output
+    fast, slow = json.loads((tmp_path / "r.json").read_text())["rows"]
+    assert fast["AP_mm"] < 0.05  # a rigid robot without errors that follows its commands
+    assert slow["AT_mm"] <= fast["AT_mm"]
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (["robot", "--cycles", "1"], "--cycles must be at least 2, got 1"),
+        (["robot", "--speeds", "fast"], "--speeds must be numbers such as 0,7, got 'fast'"),
+        (["robot", "--loads", "-1"], "--loads must be between 0 and 1000, got -1"),
+        (["robot", "--cube", "0"], "--cube must be positive"),
+        (["robot", "--set", "station.kind=egm"], "accept robot does not drive a real station"),
+        (["cameras", "--count", "4"], "--count must be at least 5, got 4"),
+        (["cameras", "--box", "1e5"], "a ball is not seen by two cameras"),
+        (["cameras", "--lengths", "none.csv"], "none.csv"),
+    ],
+)
+def test_wrong_arguments_are_refused_in_one_line(
+    arguments: list[str], message: str, tmp_path: Path, monkeypatch
+):
+    monkeypatch.chdir(tmp_path)
+    assert message in refusal(truetip("accept", *arguments))
+    assert files(tmp_path) == set()

@@ -1,0 +1,100 @@
+"""The results of the ISO 9283 cycle from made-up runs, whose errors are known."""
+
+import numpy as np
+import pytest
+
+from diagrams.record.log import RunLog
+from diagrams.scenario.scenario import Scenario, load_scenario
+from experiments.accept.robot_cycle import (
+    Cycle,
+    cube_poses,
+    path_results,
+    path_scenario,
+    pose_results,
+    pose_scenario,
+)
+from systems.reference.paths import make_path
+
+BASE = load_scenario("nominal", ["reference.settle=0.5", "reference.acceleration=4"])
+CYCLE = Cycle(cube_poses(BASE, 0.25), dwell=0.5, band=1e-4)
+CYCLES = 4
+
+
+def log_of(scenario: Scenario, error) -> RunLog:
+    """A run whose tip is off by ``error(times)``, (n, 3) in m, and otherwise follows."""
+    path = make_path(scenario.reference)
+    time = np.arange(0.0, path.duration, 4e-3)
+    wanted = path.sample(time)[0]
+    true = wanted.copy()
+    true[:, :3, 3] += error(time)
+    none = np.zeros((len(time), 6))
+    return RunLog(
+        "made_up", 0, time, wanted, true, true, none, none, none, none, none, none, {}, [],
+        path.path_start, path.dwell_start, path.duration, tuple(path.lap_starts),
+    )  # fmt: skip
+
+
+def test_the_five_poses_are_a_tenth_of_the_diagonal_within_the_corners_of_an_inclined_plane():
+    p = CYCLE.poses[:, :3, 3]
+    np.testing.assert_allclose(np.linalg.norm(p[1:] - p[0], axis=1), 0.4 * np.sqrt(3.0) * 0.25, rtol=1e-9)
+    normal = np.cross(p[1] - p[0], p[2] - p[0])
+    np.testing.assert_allclose((p - p[0]) @ normal, 0.0, atol=1e-12)
+    np.testing.assert_allclose(np.ptp(p, axis=0), 0.2, rtol=1e-9)
+
+
+def test_a_constant_offset_is_accuracy_and_neither_scatter_nor_drift():
+    scenario = pose_scenario(BASE, CYCLE, CYCLES, 1.0)
+    offset = np.array([3e-4, 0.0, 4e-4])
+    found = pose_results(log_of(scenario, lambda t: np.tile(offset, (len(t), 1))), scenario, CYCLE, CYCLES)
+    assert found["AP_mm"] == pytest.approx(0.5, rel=1e-9)
+    for name in ("RP_mm", "vAP_mm", "AD_mm", "RD_mm", "dAP_mm", "AP_deg", "stabilisation_s", "overshoot_mm"):
+        assert found[name] == pytest.approx(0.0, abs=1e-6), name
+
+
+def test_a_tip_that_drifts_steadily_has_moved_by_three_quarters_of_its_way():
+    scenario = pose_scenario(BASE, CYCLE, CYCLES, 1.0)
+    end = make_path(scenario.reference).dwell_start
+
+    def drifting(t: np.ndarray) -> np.ndarray:
+        return np.outer(t / end, [1e-3, 0.0, 0.0])
+
+    found = pose_results(log_of(scenario, drifting), scenario, CYCLE, CYCLES)
+    assert found["dAP_mm"] == pytest.approx(0.75, abs=0.03)
+
+
+def test_a_tip_that_rings_out_needs_the_time_until_its_amplitude_is_that_of_the_band():
+    scenario = pose_scenario(BASE, CYCLE, CYCLES, 1.0)
+    moves = 9 * CYCLES
+    span = (make_path(scenario.reference).dwell_start - 0.5) / moves
+
+    def ringing(t: np.ndarray) -> np.ndarray:
+        since = np.mod(t - 0.5, span)  # of the last arrival
+        return np.outer(1e-3 * np.exp(-since / 0.05) * np.cos(2 * np.pi * 20.0 * since), [0.0, 0.0, 1.0])
+
+    found = pose_results(log_of(scenario, ringing), scenario, CYCLE, CYCLES)
+    assert 0.05 * np.log(10.0) - 0.03 < found["stabilisation_s"] < 0.05 * np.log(10.0) + 0.01
+    assert 0.1 < found["overshoot_mm"] < 1.0
+
+
+def test_a_tip_that_is_late_is_on_the_path_and_one_beside_it_is_not():
+    scenario = path_scenario(BASE, CYCLE, CYCLES, 1.0)
+    path = make_path(scenario.reference)
+
+    def late(t: np.ndarray) -> np.ndarray:
+        return path.sample(t - 0.02)[0][:, :3, 3] - path.sample(t)[0][:, :3, 3]
+
+    found = path_results(log_of(scenario, late), scenario, CYCLE)
+    assert found["AT_mm"] < 0.01
+    assert found["CR_mm"] < 0.01  # every corner is reached, for the path rests in it
+    assert abs(found["AV_percent"]) < 0.5
+    normal = np.cross(*(CYCLE.poses[[1, 2], :3, 3] - CYCLE.poses[0, :3, 3]))
+    beside = 2e-4 * normal / np.linalg.norm(normal)
+    found = path_results(log_of(scenario, lambda t: np.tile(beside, (len(t), 1))), scenario, CYCLE)
+    assert found["AT_mm"] == pytest.approx(0.2, rel=1e-3)
+    assert found["RT_mm"] == pytest.approx(0.0, abs=1e-6)
+
+
+def test_half_the_speed_takes_twice_the_time():
+    fast, slow = (make_path(pose_scenario(BASE, CYCLE, 2, speed).reference) for speed in (1.0, 0.5))
+    rests = 18 * CYCLE.dwell
+    assert slow.dwell_start - 0.5 - rests == pytest.approx(2.0 * (fast.dwell_start - 0.5 - rests))
