@@ -273,6 +273,13 @@ def learnt(servo: Servo, root_context: Context) -> dict[str, Any] | None:
     return None if report is None else dict(report(servo.law.GetMyContextFromRoot(root_context)))
 
 
+def learn(servo: Servo, root_context: Context) -> None:
+    """Lets a law learn that can do so after its command is out, see its ``learn(context)``."""
+    catch_up = getattr(servo.law, "learn", None)
+    if catch_up is not None:
+        catch_up(servo.law.GetMyMutableContextFromRoot(root_context))
+
+
 def predicted_tip(servo: Servo, root_context: Context) -> Prediction | None:
     """Where a law that predicts it says that the tip was last, see its ``predicted_tip(context)``."""
     predict = getattr(servo.law, "predicted_tip", None)

@@ -20,7 +20,7 @@ from diagrams.record.run_record import RunRecord, marks, write_event, write_tick
 from diagrams.record.topics import POSE, pose_message
 from diagrams.runs.simulation import guard_events, start_position
 from diagrams.scenario.scenario import Scenario, ScenarioError
-from diagrams.servo import Servo, calibrated, law_name, learnt
+from diagrams.servo import Servo, calibrated, law_name, learn, learnt
 from robots.description.model import NUM_JOINTS, RobotModel, load_robot
 from systems.guard.guard import KINDS
 from systems.link.clock import ClockQuality, steady_time
@@ -277,6 +277,7 @@ class RealTimeRun:
         self._update(self._context)
         command = self.station.command(self._context)
         wire.send_command(*command)
+        learn(self.servo, self._context)  # nobody waits for it any more
         if self._stream is not None:
             self._write(self._stream, time, report, wire.effort, command, sample)
         self._stand_before_next()

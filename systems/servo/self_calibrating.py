@@ -9,51 +9,21 @@ from pydrake.systems.framework import Context, DiscreteValues, LeafSystem
 
 from robots.description.model import NUM_JOINTS, RobotModel
 from systems.controller_model import ControllerModel
-from systems.estimation import kernels
-from systems.estimation.dead_time import CommandDelay
-from systems.estimation.drive_model import DEAD_TIME, DriveModel
-from systems.estimation.events import DEAD_TIME_CHANGED, Event, EventLog
+from systems.estimation.drive_model import DEAD_TIME
 from systems.estimation.findings import calibrated_robot, findings
-from systems.estimation.memory import History, Layout, Views
+from systems.estimation.memory import Layout, Views
 from systems.estimation.parameter_lead import ParameterLead
 from systems.estimation.preview_planner import PreviewPlanner, Wanted
 from systems.estimation.probe import Probe
-from systems.estimation.tip_estimator import Pair, TipEstimator
-from systems.estimation.tip_model import TipModel, moved
 from systems.guard.guard import GuardConfig
 from systems.reference.reference import PathAhead
 from systems.samples import JointSample, PoseSample
 from systems.servo.self_calibrating_config import SelfCalibratingConfig
+from systems.servo.self_calibrating_learning import UNREST, Learning
 
-_REACH = 0.1  # s, how far back plans and encoders are remembered, beyond the delays
-_FIRST_LEARNT = 0.4  # s after the start: before that the robot is led onto its plan
-_UPSET = 3e-4  # rad, a following error that no drive makes on its own: load or dead time have changed
-_UPSET_PAUSE = 0.3  # s without learning after it, so that the drives come to rest
-_LONGEST_PAUSE = 0.6  # s, after which what is left has to be learnt
-_CALM_AGAIN = 1.0  # s after an upset before there can be another one
-_SETTLING = 0.2  # s that the drives take to come to rest after a dead time was corrected
-_ASTRAY = 3e-3  # rad, by which motors may miss their plan before its loads are not those of the robot
-_UNREST = 0.5  # m/s^2, while the robot is led onto its plan, or the plan is not where motors are
 _STARTING = 1.5  # s
-_LOOK_EVERY = 5  # ticks, between two searches for the dead time
 _CAREFUL = 0.25  # of the planned speed, while the dead time or the load is not what it was
 _BEFORE_PATH = 0.6  # s, at which it is held until the dead time is found; a slowed path needs time to stop
-_GIVE_UP = 1.6  # s after the start: what is believed of the dead time has to do
-
-# A row of the plan: motors, loads, links, tip, unrest, columns and correction of the drive model,
-# states of the gears' hysteresis.
-_PLAN = Layout(
-    theta=(6,),
-    velocity=(6,),
-    acceleration=(6,),
-    loads=(5, 18),
-    motion=(12,),
-    twist=(6,),
-    unrest=(1,),
-    columns=(24,),
-    correction=(6,),
-    states=(12,),
-)
 
 
 class SelfCalibrating(LeafSystem):
@@ -95,38 +65,21 @@ class SelfCalibrating(LeafSystem):
             ValueError: if a part refuses its configuration.
         """
         super().__init__()
-        self._model, self._config, self._guard = model, config, guard
+        self._model = model
         self.period = model.period
-        self.tip_model = TipModel(model, config.estimator.spread)
-        self.estimator = TipEstimator(self.tip_model, config.estimator)
+        self._learning = learning = Learning(model, config)
+        self.tip_model, self.estimator, self._drives = learning.tip_model, learning.estimator, learning.drives
         self._lead = ParameterLead(self.tip_model.size, config.lead_frequency, config.lead_acceleration)
         self._planner = PreviewPlanner(self.tip_model, model.period)
-        self._drives = DriveModel(model, config.drives)
         self._probe = Probe(model.robot, config.probe)
-        self._delay = CommandDelay(model.period, config.dead_time)
-        self._events = EventLog()
-        reach = _REACH + max(model.command_delay, config.dead_time.longest) + model.camera_delay
-        length = int(np.ceil(reach / model.period))
-        self._plan, self._encoders = History(_PLAN.size, length), History(2 * NUM_JOINTS, length)
-        # Gears yield later than they are loaded, by what their damping holds back.
-        self._load_lag = float(np.median(self.tip_model.lag[:6]))
         self._layout = Layout(
-            estimator=self.estimator.layout,
             lead=self._lead.layout,
             planner=self._planner.layout,
-            drives=self._drives.layout,
-            plan=self._plan.layout,
-            encoders=self._encoders.layout,
-            delay=self._delay.layout,
             columns=(6, self.tip_model.size),
             start_time=(1,),
-            first=(1,),  # the first planned instant
             planned=(1,),  # the last instant of the plan
-            compared=(1,),  # how many planned instants encoders have been compared at
-            upset_at=(1,),
-            paused_until=(1,),
-            events=self._events.layout,
             amplitude=(6,),
+            **learning.arrays,
         )
         self._views = Views(self._layout)
         self._reference = self.DeclareAbstractInputPort("reference", Value[object]())
@@ -151,11 +104,8 @@ class SelfCalibrating(LeafSystem):
     def _first_memory(self) -> np.ndarray:
         vector = np.zeros(self._layout.size)
         memory = self._layout.view(vector)
-        self.estimator.start(memory.estimator)
-        self._drives.start(memory.drives)
+        self._learning.start(memory)
         memory.lead.x[:] = self.tip_model.mean
-        memory.upset_at[0] = memory.paused_until[0] = -np.inf
-        self._delay.start(memory.delay, self._model.command_delay)
         return vector
 
     def _rehearse(self) -> None:
@@ -173,9 +123,9 @@ class SelfCalibrating(LeafSystem):
         Phi = self._drives.features(plan.velocity, plan.acceleration, command.columns)
         self._drives.learn(memory.drives, Phi, still)
         for time in (0.0, 1.0):
-            self._encoders.append(memory.encoders, time, np.concatenate((q, still)))
-        self._encoders.at(memory.encoders, 0.5)
-        self._encoders_at(memory, 0.5)
+            self._learning.encoders.append(memory.encoders, time, np.concatenate((q, still)))
+        self._learning.encoders.at(memory.encoders, 0.5)
+        self._learning.encoders_at(memory, 0.5)
 
     def memory(self, context: Context) -> SimpleNamespace:
         """All that the law remembers, as arrays that must not be written to."""
@@ -188,7 +138,7 @@ class SelfCalibrating(LeafSystem):
         return {
             "dead_time_s": float(memory.delay.delay[0]) + late,
             **findings(self.estimator, memory.estimator),
-            "events": self._events.read(memory.events),
+            "events": self._learning.events.read(memory.events),
         }
 
     def predicted_tip(self, context: Context) -> tuple[float, np.ndarray, np.ndarray] | None:
@@ -202,7 +152,7 @@ class SelfCalibrating(LeafSystem):
         memory = self._layout.view(np.array(context.get_discrete_state(self._memory).value()))
         if not sample.valid or not memory.planner.started[0]:
             return None
-        pair = self._pair(memory, sample)
+        pair = self._learning.pair(memory, sample.time, sample.X_WE.GetAsMatrix4())
         if pair is None:
             return None
         time = sample.time + self.estimator.clock_offset(memory.estimator, sample.time)
@@ -214,28 +164,28 @@ class SelfCalibrating(LeafSystem):
         """The robot as it is known now, see `systems.estimation.findings.calibrated_robot`."""
         return calibrated_robot(self.estimator, self.memory(context).estimator, of)
 
+    def learn(self, context: Context) -> None:
+        """Learns from what was heard at the last tick, which the next tick does otherwise.
+
+        It makes no difference to any command. On a wire it is asked for when the reply is on its way, and the
+        next message finds it done.
+
+        Args:
+            context: of this system, after its tick.
+        """
+        values = context.get_mutable_discrete_state(self._memory)
+        self._learning.learn(self._views(values.get_mutable_value()))
+
     def _tick(self, context: Context, discrete_state: DiscreteValues) -> None:
         time = context.get_time()
         reference: PathAhead = self._reference.Eval(context)
         joints: JointSample = self._joints.Eval(context)
         sample: PoseSample = self._camera.Eval(context)
         memory = self._views(discrete_state.get_mutable_value(int(self._memory)))
-        measurement = discrete_state.get_mutable_value(int(self._outputs[4]))
-        self._encoders.append(
-            memory.encoders, joints.time, np.concatenate((joints.position, joints.velocity))
-        )
-        self._delay.search.measure(memory.delay.search, joints.time, joints.position)
-        self._watch_delay(memory, time)
-        self._compare_drives(memory, reference)
-        if sample.valid and sample.time > measurement[2]:
-            pair = self._pair(memory, sample)
-            measurement[2] = sample.time
-            if pair is not None:
-                event = self.estimator.add(memory.estimator, pair)
-                if event is not None:
-                    self._events.note(memory.events, time, event)
-                measurement[0] = time
-        self.estimator.work(memory.estimator)
+        self._learning.learn(memory)  # unless somebody has asked for it since the last tick
+        self._learning.hear(memory, time, (joints, sample), reference.path.path_start)
+        seen = (memory.heard.accepted[0], 0.0, memory.heard.newest[0])
+        discrete_state.set_value(int(self._outputs[4]), seen)
         if not joints.running:
             # When it runs again it starts from where it stands then.
             memory.planner.started[0] = 0.0
@@ -257,14 +207,14 @@ class SelfCalibrating(LeafSystem):
         if not memory.delay.known[0]:
             is_near = reference.path_time(instant) > reference.path.path_start - _BEFORE_PATH
             return 0.0 if is_near else 1.0
-        is_upset = time < memory.paused_until[0] or not self._delay.is_settled(memory.delay, instant)
+        is_upset = time < memory.paused_until[0] or not self._learning.delay.is_settled(memory.delay, instant)
         return _CAREFUL if is_upset else 1.0
 
     def _command(
         self, memory: SimpleNamespace, reference: PathAhead, time: float, position: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Plans for the instant when a command of now acts, and says what to command."""
-        instant = time + self._delay.step(memory.delay, float(memory.planned[0]))
+        instant = time + self._learning.delay.step(memory.delay, float(memory.planned[0]))
         path_start = reference.path.path_start
         delay = memory.delay
         is_steady = delay.delay[0] == delay.target[0]
@@ -291,7 +241,7 @@ class SelfCalibrating(LeafSystem):
         drives = memory.drives
         command = self._drives.command(drives, motion, plan.loads, self._model.payload)
         is_starting = since_start < _STARTING and np.abs(memory.planner.start_error).max() > 1e-3
-        unrest = 0.0 if self._delay.is_settled(memory.delay, instant) and not is_starting else _UNREST
+        unrest = 0.0 if self._learning.delay.is_settled(memory.delay, instant) and not is_starting else UNREST
         row = np.concatenate(
             (
                 *motion,
@@ -304,87 +254,8 @@ class SelfCalibrating(LeafSystem):
                 plan.states,
             )
         )
-        self._plan.append(memory.plan, instant, row)
-        self._delay.search.command(memory.delay.search, time, plan.theta)
+        self._learning.plan.append(memory.plan, instant, row)
+        self._learning.delay.search.command(memory.delay.search, time, plan.theta)
         memory.planned[0] = instant
         # While the delay is corrected the path is sent faster or slower than it is to be travelled.
         return command.position, (1.0 + memory.delay.rate[0]) * command.velocity, command.torque
-
-    def _pair(self, memory: SimpleNamespace, sample: PoseSample) -> Pair | None:
-        """The encoders and the plan at the instant of an exposure."""
-        count = int(memory.encoders.count[0])
-        newest = memory.encoders.times[(count - 1) % self._encoders.length]
-        offset = self.estimator.clock_offset(memory.estimator, sample.time)
-        exposure = min(sample.time + offset, newest)
-        encoders = self._encoders_at(memory, exposure)
-        loaded = self._plan.at(memory.plan, exposure - self._load_lag)
-        planned = self._plan.at(memory.plan, exposure)
-        if encoders is None or loaded is None or planned is None:
-            return None
-        then, now = _PLAN.view(loaded), _PLAN.view(planned)
-        if memory.delay.known[0] and np.abs(now.theta - encoders).max() > _ASTRAY:
-            return None
-        X_WE = sample.X_WE.GetAsMatrix4()
-        # As it would have been seen had the clock been right: the column stands for all of the offset.
-        X_WE = moved(X_WE[None], ((exposure - sample.time) * now.twist)[None])[0]
-        is_settling = exposure < memory.delay.settled[0] + _SETTLING
-        unrest = _UNREST if is_settling else float(now.unrest[0])
-        return Pair(encoders, then.loads, then.motion, now.twist, X_WE, unrest, then.states, sample.time)
-
-    def _encoders_at(self, memory: SimpleNamespace, time: float) -> np.ndarray | None:
-        """Positions between two samples, a cubic through positions and velocities, rad, (6,)."""
-        place = self._encoders.around(memory.encoders, time)
-        if place is None:
-            return None
-        position = np.empty(NUM_JOINTS)
-        kernels.history.cubic(memory.encoders.times, memory.encoders.rows, *place, position)
-        return position
-
-    def _watch_delay(self, memory: SimpleNamespace, time: float) -> None:
-        """Searches for the dead time until it is known, and again while the motors do what no drive does."""
-        since_start = time - memory.start_time[0]
-        if not memory.planner.started[0]:
-            return
-        is_upset = time < memory.paused_until[0]
-        if memory.delay.known[0] and not is_upset:
-            return
-        if round(time / self.period) % _LOOK_EVERY == 0:
-            was_known = bool(memory.delay.known[0])
-            change = self._delay.look(memory.delay)
-            if was_known and change:
-                self._events.note(memory.events, time, Event(DEAD_TIME_CHANGED, change, 0.0))
-                memory.upset_at[0] = time
-        if since_start > _GIVE_UP:
-            memory.delay.known[0] = 1.0
-
-    def _compare_drives(self, memory: SimpleNamespace, reference: PathAhead) -> None:
-        """Learns from where the motors were at planned instants that have passed."""
-        plan, count = memory.plan, int(memory.plan.count[0])
-        newest = memory.encoders.times[(int(memory.encoders.count[0]) - 1) % self._encoders.length]
-        first = memory.first[0] + _FIRST_LEARNT
-        for k in range(max(int(memory.compared[0]), count - self._plan.length), count):
-            instant = plan.times[k % self._plan.length]
-            if instant > newest + 1e-9:
-                break
-            memory.compared[0] = k + 1
-            actual = self._encoders_at(memory, instant)
-            if actual is None or instant < first or not self._delay.is_settled(memory.delay, instant):
-                continue
-            row = _PLAN.view(plan.rows[k % self._plan.length])
-            y = row.theta - actual + row.correction
-            Phi = self._drives.features(row.velocity, row.acceleration, row.columns)
-            self._learn_drives(memory, (instant, Phi, y), instant > reference.path.path_start)
-
-    def _learn_drives(self, memory: SimpleNamespace, sample, on_path: bool) -> None:
-        instant, Phi, y = sample
-        drives = memory.drives
-        if on_path and np.abs(y - Phi @ drives.beta).max() > _UPSET:
-            if instant > memory.upset_at[0] + _CALM_AGAIN:
-                memory.upset_at[0] = instant
-            memory.paused_until[0] = min(instant + _UPSET_PAUSE, memory.upset_at[0] + _LONGEST_PAUSE)
-        if instant <= memory.paused_until[0]:
-            return
-        if np.isfinite(memory.paused_until[0]):
-            memory.paused_until[0] = -np.inf
-            self._drives.widen(drives)
-        self._drives.learn(drives, Phi, y)

@@ -1,0 +1,222 @@
+"""What the self-calibrating law learns from encoders and camera, apart from what it commands."""
+
+from types import SimpleNamespace
+
+import numpy as np
+
+from robots.description.model import NUM_JOINTS
+from systems.controller_model import ControllerModel
+from systems.estimation import kernels
+from systems.estimation.dead_time import CommandDelay
+from systems.estimation.drive_model import DriveModel
+from systems.estimation.events import DEAD_TIME_CHANGED, Event, EventLog
+from systems.estimation.memory import History, Layout
+from systems.estimation.tip_estimator import Pair, TipEstimator
+from systems.estimation.tip_model import TipModel, moved
+from systems.samples import JointSample, PoseSample
+from systems.servo.self_calibrating_config import SelfCalibratingConfig
+
+_REACH = 0.1  # s, how far back plans and encoders are remembered, beyond the delays
+_FIRST_LEARNT = 0.4  # s after the start: before that the robot is led onto its plan
+_UPSET = 3e-4  # rad, a following error that no drive makes on its own: load or dead time have changed
+_UPSET_PAUSE = 0.3  # s without learning after it, so that the drives come to rest
+_LONGEST_PAUSE = 0.6  # s, after which what is left has to be learnt
+_CALM_AGAIN = 1.0  # s after an upset before there can be another one
+_SETTLING = 0.2  # s that the drives take to come to rest after a dead time was corrected
+_ASTRAY = 3e-3  # rad, by which motors may miss their plan before its loads are not those of the robot
+UNREST = 0.5  # m/s^2, while the robot is led onto its plan, or the plan is not where motors are
+_LOOK_EVERY = 5  # ticks, between two searches for the dead time
+_GIVE_UP = 1.6  # s after the start: what is believed of the dead time has to do
+
+# A row of the plan: motors, loads, links, tip, unrest, columns and correction of the drive model,
+# states of the gears' hysteresis.
+PLAN = Layout(
+    theta=(6,),
+    velocity=(6,),
+    acceleration=(6,),
+    loads=(5, 18),
+    motion=(12,),
+    twist=(6,),
+    unrest=(1,),
+    columns=(24,),
+    correction=(6,),
+    states=(12,),
+)
+
+
+class Learning:
+    """Holds encoders and camera against the plan, in a part of the law's memory.
+
+    A tick takes note of what it hears, with `hear`, and plans with what was known before: its command does
+    not wait. `learn` does the rest, after the reply of the message or at the beginning of the next tick.
+    """
+
+    def __init__(self, model: ControllerModel, config: SelfCalibratingConfig) -> None:
+        """Builds the parts. Raises what they raise."""
+        self._model, self._period = model, model.period
+        self.tip_model = TipModel(model, config.estimator.spread)
+        self.estimator = TipEstimator(self.tip_model, config.estimator)
+        self.drives = DriveModel(model, config.drives)
+        self.delay = CommandDelay(model.period, config.dead_time)
+        self.events = EventLog()
+        reach = _REACH + max(model.command_delay, config.dead_time.longest) + model.camera_delay
+        length = int(np.ceil(reach / model.period))
+        self.plan, self.encoders = History(PLAN.size, length), History(2 * NUM_JOINTS, length)
+        # Gears yield later than they are loaded, by what their damping holds back.
+        self._load_lag = float(np.median(self.tip_model.lag[:6]))
+        self.arrays = {
+            "estimator": self.estimator.layout,
+            "drives": self.drives.layout,
+            "plan": self.plan.layout,
+            "encoders": self.encoders.layout,
+            "delay": self.delay.layout,
+            "events": self.events.layout,
+            "heard": Layout(  # at the last tick
+                is_new=(1,),  # whether nothing has been learnt of it yet
+                time=(1,),
+                has_pose=(1,),
+                newest=(1,),  # exposure of the newest pose, s
+                X_WE=(4, 4),
+                accepted=(1,),  # when the last pose came that was learnt from, s
+                path_start=(1,),
+            ),
+            "first": (1,),  # the first planned instant
+            "compared": (1,),  # how many planned instants encoders have been compared at
+            "upset_at": (1,),
+            "paused_until": (1,),
+        }
+
+    def start(self, memory: SimpleNamespace) -> None:
+        """Writes what is known before the first sample."""
+        self.estimator.start(memory.estimator)
+        self.drives.start(memory.drives)
+        memory.upset_at[0] = memory.paused_until[0] = -np.inf
+        memory.heard.newest[0] = memory.heard.accepted[0] = -np.inf
+        self.delay.start(memory.delay, self._model.command_delay)
+
+    def hear(
+        self,
+        memory: SimpleNamespace,
+        time: float,
+        samples: tuple[JointSample, PoseSample],
+        path_start: float,
+    ) -> None:
+        """Takes note of samples, from which there is to learn once the command of this tick is out.
+
+        Args:
+            memory: of the law.
+            time: of the tick in s.
+            samples: of joints and camera.
+            path_start: when the path begins, s.
+        """
+        joints, sample = samples
+        row = np.concatenate((joints.position, joints.velocity))
+        self.encoders.append(memory.encoders, joints.time, row)
+        self.delay.search.measure(memory.delay.search, joints.time, joints.position)
+        heard = memory.heard
+        heard.time[0], heard.is_new[0], heard.path_start[0] = time, 1.0, path_start
+        heard.has_pose[0] = sample.valid and sample.time > heard.newest[0]
+        if heard.has_pose[0]:
+            heard.newest[0], heard.X_WE[:] = sample.time, sample.X_WE.GetAsMatrix4()
+
+    def learn(self, memory: SimpleNamespace) -> None:
+        """Learns from what was heard last; once."""
+        heard = memory.heard
+        if not heard.is_new[0]:
+            return
+        heard.is_new[0] = 0.0
+        time = float(heard.time[0])
+        self._watch_delay(memory, time)
+        self._compare_drives(memory)
+        if heard.has_pose[0]:
+            pair = self.pair(memory, float(heard.newest[0]), heard.X_WE)
+            if pair is not None:
+                event = self.estimator.add(memory.estimator, pair)
+                if event is not None:
+                    self.events.note(memory.events, time, event)
+                heard.accepted[0] = time
+        self.estimator.work(memory.estimator)
+
+    def pair(self, memory: SimpleNamespace, stamp: float, X_WE: np.ndarray) -> Pair | None:
+        """The encoders and the plan at the instant of an exposure; None if they are not known, or astray.
+
+        Args:
+            memory: of the law.
+            stamp: of the exposure in s, as the camera has it.
+            X_WE: the pose seen, (4, 4).
+        """
+        count = int(memory.encoders.count[0])
+        newest = memory.encoders.times[(count - 1) % self.encoders.length]
+        offset = self.estimator.clock_offset(memory.estimator, stamp)
+        exposure = min(stamp + offset, newest)
+        encoders = self.encoders_at(memory, exposure)
+        loaded = self.plan.at(memory.plan, exposure - self._load_lag)
+        planned = self.plan.at(memory.plan, exposure)
+        if encoders is None or loaded is None or planned is None:
+            return None
+        then, now = PLAN.view(loaded), PLAN.view(planned)
+        if memory.delay.known[0] and np.abs(now.theta - encoders).max() > _ASTRAY:
+            return None
+        # As it would have been seen had the clock been right: the column stands for all of the offset.
+        X_WE = moved(X_WE[None], ((exposure - stamp) * now.twist)[None])[0]
+        is_settling = exposure < memory.delay.settled[0] + _SETTLING
+        unrest = UNREST if is_settling else float(now.unrest[0])
+        return Pair(encoders, then.loads, then.motion, now.twist, X_WE, unrest, then.states, stamp)
+
+    def encoders_at(self, memory: SimpleNamespace, time: float) -> np.ndarray | None:
+        """Positions between two samples, a cubic through positions and velocities, rad, (6,)."""
+        place = self.encoders.around(memory.encoders, time)
+        if place is None:
+            return None
+        position = np.empty(NUM_JOINTS)
+        kernels.history.cubic(memory.encoders.times, memory.encoders.rows, *place, position)
+        return position
+
+    def _watch_delay(self, memory: SimpleNamespace, time: float) -> None:
+        """Searches for the dead time until it is known, and again while the motors do what no drive does."""
+        since_start = time - memory.start_time[0]
+        if not memory.planner.started[0]:
+            return
+        is_upset = time < memory.paused_until[0]
+        if memory.delay.known[0] and not is_upset:
+            return
+        if round(time / self._period) % _LOOK_EVERY == 0:
+            was_known = bool(memory.delay.known[0])
+            change = self.delay.look(memory.delay)
+            if was_known and change:
+                self.events.note(memory.events, time, Event(DEAD_TIME_CHANGED, change, 0.0))
+                memory.upset_at[0] = time
+        if since_start > _GIVE_UP:
+            memory.delay.known[0] = 1.0
+
+    def _compare_drives(self, memory: SimpleNamespace) -> None:
+        """Learns from where the motors were at planned instants that have passed."""
+        plan, count = memory.plan, int(memory.plan.count[0])
+        newest = memory.encoders.times[(int(memory.encoders.count[0]) - 1) % self.encoders.length]
+        first = memory.first[0] + _FIRST_LEARNT
+        for k in range(max(int(memory.compared[0]), count - self.plan.length), count):
+            instant = plan.times[k % self.plan.length]
+            if instant > newest + 1e-9:
+                break
+            memory.compared[0] = k + 1
+            actual = self.encoders_at(memory, instant)
+            if actual is None or instant < first or not self.delay.is_settled(memory.delay, instant):
+                continue
+            row = PLAN.view(plan.rows[k % self.plan.length])
+            y = row.theta - actual + row.correction
+            Phi = self.drives.features(row.velocity, row.acceleration, row.columns)
+            self._learn_drives(memory, (instant, Phi, y), instant > memory.heard.path_start[0])
+
+    def _learn_drives(self, memory: SimpleNamespace, sample, on_path: bool) -> None:
+        instant, Phi, y = sample
+        drives = memory.drives
+        if on_path and np.abs(y - Phi @ drives.beta).max() > _UPSET:
+            if instant > memory.upset_at[0] + _CALM_AGAIN:
+                memory.upset_at[0] = instant
+            memory.paused_until[0] = min(instant + _UPSET_PAUSE, memory.upset_at[0] + _LONGEST_PAUSE)
+        if instant <= memory.paused_until[0]:
+            return
+        if np.isfinite(memory.paused_until[0]):
+            memory.paused_until[0] = -np.inf
+            self.drives.widen(drives)
+        self.drives.learn(drives, Phi, y)
