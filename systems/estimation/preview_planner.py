@@ -9,7 +9,7 @@ from robots.pose import pose_error
 from systems.estimation import kernels
 from systems.estimation.arm_geometry import Arm, Constants
 from systems.estimation.arm_loads import NUM_SETS
-from systems.estimation.kernels.arrays import PathInstant
+from systems.estimation.kernels.arrays import FollowerState, PathInstant
 from systems.estimation.memory import Layout
 from systems.estimation.tip_model import TipModel
 
@@ -140,38 +140,26 @@ class PreviewPlanner:
         model = self._model
         constants = self.constants(memory, x)
         left, fading = _blend(since_start)
-        motion = np.empty((4, 6))
-        motion[0] = memory.q + step * (1.5 * memory.rates[0] - 0.5 * memory.rates[1] + memory.wander)
-        aside = np.array(wanted.aside)
         instant = PathInstant(
             wanted.X_WE,
             wanted.V_WE,
             left * memory.start_error,
             fading * memory.start_error,
             rate[model.G],
-            aside,
+            np.array(wanted.aside),
             float(step),
             _NEWTON_STEP,
         )
         columns, loads, yields = np.empty((6, len(constants.frame))), np.empty((NUM_SETS, 18)), np.empty(6)
-        arm = constants, model.loads.masses, model.unknowns(x)
-        kernels.plan.follow(*arm, instant, memory.rates, motion, columns, loads, yields)
-        memory.q[:], memory.wander[:] = motion[0], motion[3]
-        memory.rates[1] = memory.rates[0]
-        memory.rates[0] = motion[1]
-        q, v, a = motion[:3] + aside
-        yields, states = self._with_gear_errors(memory, x, q, yields, loads)
+        arm, moving = (constants, model.loads.masses, model.unknowns(x)), np.empty((3, 6))
+        state = FollowerState(memory.q, memory.rates, memory.wander)
+        kernels.plan.follow(*arm, instant, state, moving, columns, loads, yields)
+        yields, states = self._with_gear_errors(memory, x, moving[0], yields, loads)
         yields += left * memory.start_yield
-        history = memory.yields
-        history[1:] = history[:-1].copy()
-        history[0] = yields
-        y_rate = (11.0 * history[0] - 18.0 * history[1] + 9.0 * history[2] - 2.0 * history[3]) / (6.0 * step)
-        y_bend = (2.0 * history[0] - 5.0 * history[1] + 4.0 * history[2] - history[3]) / step**2
-        velocity = v + motion[3]
-        theta = q + yields - self._gear_lag * y_rate
-        twist = columns[:, :6] @ velocity
-        moving = np.concatenate((v, a))
-        return MotorPlan(theta, velocity + y_rate, a + y_bend, loads, moving, twist, columns, states)
+        motion, history = np.empty((4, 6)), memory.yields
+        kernels.plan.motors(moving, memory.wander, yields, history, step, self._gear_lag, columns, motion)
+        theta, velocity, acceleration, twist = motion
+        return MotorPlan(theta, velocity, acceleration, loads, moving[1:].ravel(), twist, columns, states)
 
 
 def _blend(since_start: float) -> tuple[float, float]:

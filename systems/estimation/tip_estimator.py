@@ -178,14 +178,12 @@ class TipEstimator:
                 self._innovations.forget(innovations)
                 if memory.was_settled[0]:
                     self._doubt(memory)
-        y = r + H @ memory.xi
-        weighted = (weight * self._weights)[:, None] * H
-        memory.A_open += H.T @ weighted
-        memory.b_open += weighted.T @ y
+        sums = memory.A_open, memory.b_open, memory.sum_y, memory.sum_H
+        kernels.information.add_sample(r, H, memory.xi, self._weights, weight, *sums)
         since_first = [self._since_first(memory, pair.time)]
         means = [pair.theta, found.gears[0], pair.motion, pair.twist, since_first]
         means += [shapes.ravel()] if shapes is not None else []
-        self._open(memory, np.concatenate(means), (y, H, weight))
+        self._open(memory, np.concatenate(means), weight)
         memory.count[0] += 1.0
         moved_away = np.abs(pair.theta - memory.first_theta).max() > config.keyframe_step
         is_long = memory.samples[0] >= config.keyframe_samples
@@ -219,15 +217,12 @@ class TipEstimator:
         if self._keyframes.work(memory.keyframes, constants, memory.xi, self._config.relinearise):
             self._solve(memory)
 
-    def _open(self, memory: SimpleNamespace, means: np.ndarray, sample) -> None:
-        y, H, weight = sample
+    def _open(self, memory: SimpleNamespace, means: np.ndarray, weight: float) -> None:
         if memory.samples[0] == 0.0:
             memory.first_theta[:] = means[:6]
         memory.samples[0] += 1.0
         memory.weight[0] += weight
         memory.sums += weight * means
-        memory.sum_y += weight * y
-        memory.sum_H += weight * H
 
     def _close(self, memory: SimpleNamespace) -> None:
         """Makes the open samples a keyframe: one pose at their mean, with their mean error."""

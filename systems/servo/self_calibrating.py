@@ -15,6 +15,7 @@ from systems.estimation.memory import Layout, Views
 from systems.estimation.parameter_lead import ParameterLead
 from systems.estimation.preview_planner import PreviewPlanner, Wanted
 from systems.estimation.probe import Probe
+from systems.estimation.tip_estimator import Pair
 from systems.guard.guard import GuardConfig
 from systems.reference.reference import PathAhead
 from systems.samples import JointSample, PoseSample
@@ -122,6 +123,9 @@ class SelfCalibrating(LeafSystem):
             command = self._drives.command(memory.drives, motion, plan.loads, self._model.payload)
         Phi = self._drives.features(plan.velocity, plan.acceleration, command.columns)
         self._drives.learn(memory.drives, Phi, still)
+        pair = Pair(q, plan.loads, plan.motion, plan.twist, X_WE)
+        for _ in range(40):  # the first ones are only looked at
+            self.estimator.add(memory.estimator, pair)
         for time in (0.0, 1.0):
             self._learning.encoders.append(memory.encoders, time, np.concatenate((q, still)))
         self._learning.encoders.at(memory.encoders, 0.5)

@@ -76,3 +76,11 @@ class PathInstant(NamedTuple):
     aside: np.ndarray  # (3, 6), a motion of the joints beside the path: rad and derivatives
     step: float  # s since the instant before
     newton_step: float  # rad, a step of Newton's method that is small enough to be the last
+
+
+class FollowerState(NamedTuple):
+    """What planning one instant hands on to the next."""
+
+    q: np.ndarray  # (6,) rad, of the joints behind the gears
+    rates: np.ndarray  # (2, 6), of the last two instants, newest first
+    wander: np.ndarray  # (6,) rad/s, by which joints move because parameters do

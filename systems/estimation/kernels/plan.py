@@ -55,38 +55,38 @@ def _newton(c, x, q, wanted, frames, columns, inverse):
 
 
 @compiled
-def follow(c, masses, unknowns, wanted, rates, motion, columns, loads, yields):
+def follow(c, masses, unknowns, wanted, state, moving, columns, loads, yields):
     """The joints behind the gears where a stiff arm is on the path, and what motion and load bend there.
 
     Args:
         c, masses, unknowns: the arm.
         wanted: `PathInstant`.
-        rates: of the last two instants, newest first, (2, 6).
-        motion: (4, 6): joints in rad, at first about where they are on the path; then, written, their
-            velocity and acceleration, and how fast they move because parameters do. All without the motion
-            beside the path.
-        columns: (6, C), loads: (5, 18), yields: (6,) in rad, by which springs make motors be ahead of links,
-            are written.
+        state: `FollowerState`; is renewed.
+        moving: (3, 6) rad and derivatives of the joints, with the motion beside the path; columns: (6, C);
+            loads: (5, 18); yields: (6,) in rad, by which springs make motors be ahead of links; are written.
     """
     frames, inverse, X = np.empty((7, 4, 4)), np.empty((6, 6)), np.empty((4, 4))
-    if _newton(c, unknowns.x, motion[0], wanted, frames, columns, inverse) > wanted.newton_step:
-        _newton(c, unknowns.x, motion[0], wanted, frames, columns, inverse)
+    q, rates, wander = state.q, state.rates, state.wander
+    for i in range(6):
+        q[i] += wanted.step * (1.5 * rates[0, i] - 0.5 * rates[1, i] + wander[i])
+    if _newton(c, unknowns.x, q, wanted, frames, columns, inverse) > wanted.newton_step:
+        _newton(c, unknowns.x, q, wanted, frames, columns, inverse)
     drift = np.empty(6)
     for i in range(6):
         drift[i] = wanted.error_rate[i]
         for k in range(len(c.chosen)):
             drift[i] += columns[i, 18 + k] * wanted.parameter_rate[k]
-    is_aside, moving = False, np.empty((3, 6))
+    is_aside = False
     for i in range(6):
-        v = wander = 0.0
+        v = wander[i] = 0.0
         for j in range(6):
             v += inverse[i, j] * wanted.V_WE[j]
-            wander -= inverse[i, j] * drift[j]
-        motion[1, i], motion[3, i] = v, wander
-        motion[2, i] = (1.5 * v - 2.0 * rates[0, i] + 0.5 * rates[1, i]) / wanted.step
+            wander[i] -= inverse[i, j] * drift[j]
+        moving[0, i] = q[i] + wanted.aside[0, i]
+        moving[1, i] = v + wanted.aside[1, i]
+        moving[2, i] = (1.5 * v - 2.0 * rates[0, i] + 0.5 * rates[1, i]) / wanted.step + wanted.aside[2, i]
+        rates[1, i], rates[0, i] = rates[0, i], v
         is_aside = is_aside or wanted.aside[0, i] != 0.0 or wanted.aside[1, i] != 0.0
-        for k in range(3):
-            moving[k, i] = motion[k, i] + wanted.aside[k, i]
     if is_aside:
         place(c, moving[0], X, frames, columns)
         invert(columns, inverse)
@@ -100,3 +100,31 @@ def follow(c, masses, unknowns, wanted, rates, motion, columns, loads, yields):
             for j in range(6, 18):
                 tilt += columns[k, j] * deflection[j]
             yields[i] -= inverse[i, k] * tilt
+
+
+@compiled
+def motors(moving, wander, yields, history, step, lag, columns, out):
+    """Motion of the motors, (3, 6), and the twist of the tip as the fourth row.
+
+    Args:
+        moving: of the joints behind the gears, (3, 6), and ``wander``, (6,), what parameters add to velocity.
+        yields: by which motors are ahead, (6,); ``history`` the last four of them, newest first, is renewed.
+        step: s since the instant before.
+        lag: of the gears, by their damping, s, (6,).
+        columns: (6, C).
+        out: (4, 6), is written.
+    """
+    for i in range(6):
+        for k in range(3, 0, -1):
+            history[k, i] = history[k - 1, i]
+        history[0, i] = yields[i]
+        y0, y1, y2, y3 = yields[i], history[1, i], history[2, i], history[3, i]
+        rate = (11.0 * y0 - 18.0 * y1 + 9.0 * y2 - 2.0 * y3) / (6.0 * step)
+        bend = (2.0 * y0 - 5.0 * y1 + 4.0 * y2 - y3) / step**2
+        out[0, i] = moving[0, i] + y0 - lag[i] * rate
+        out[1, i] = moving[1, i] + wander[i] + rate
+        out[2, i] = moving[2, i] + bend
+    for k in range(6):
+        out[3, k] = 0.0
+        for i in range(6):
+            out[3, k] += columns[k, i] * (moving[1, i] + wander[i])
