@@ -64,6 +64,8 @@ from experiments.identify.command import identify_command
 from experiments.invert.command import invert_command
 from experiments.metrics.run_metrics import timing, with_timing
 from experiments.modes.command import modes_command
+from experiments.plan.command import plan_command
+from experiments.plan.plan_option import PlanOption, plan_settings
 from experiments.record.log_command import log_command
 from experiments.record.report_command import report_command
 from experiments.record.runs_command import runs_command
@@ -146,6 +148,7 @@ def compare_command(
     robot: RobotOption = None,
     feedforward: FeedforwardOption = None,
     camera: CameraOption = None,
+    plan: PlanOption = None,
     station: StationOption = None,
     with_cell: WithCellOption = False,
     yes: YesOption = False,
@@ -175,7 +178,7 @@ def compare_command(
         cycles = 1 if is_quick else cycles
         chosen = named_laws(laws)
         check_write(write, chosen)
-        changes = _settings(settings, None, feedforward, camera, laps)
+        changes = [*plan_settings(plan), *_settings(settings, None, feedforward, camera, laps)]
         name, changes = on_station(scenario, changes, station, with_cell)
         prepared = prepare(name, changes, robot, is_quick)
         check(prepared, chosen)
@@ -314,6 +317,7 @@ app.add_typer(cameras_app, name="cameras")
 app.command("feedforward")(feedforward_command)
 app.command("invert")(invert_command)
 app.command("identify")(identify_command)
+app.command("plan")(plan_command)
 app.command("design")(design_command)
 app.command("calibrate")(calibrate_command)
 app.command("compensate")(compensate_command)

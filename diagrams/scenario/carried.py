@@ -21,7 +21,7 @@ from robots.measurement_design.constraints import AdmissibleConfigurations
 from robots.pose import rotation_from_zyx, zyx_from_rotation
 from systems.cell.events.station_events import PayloadChange
 from systems.reference.paths import ReferenceConfig, make_path
-from systems.reference.shapes import Circle, FigureEight, Points, Rectangle, Shape, Waypoint
+from systems.reference.shapes import Circle, Planned, Points, Rectangle, Shape, Waypoint
 
 PATH, HOME, PAYLOAD = "reference.path", "home_deg", "station.payload"  # what is carried over
 _SAME = 0.05  # m, and of direction cosines: robots that are one machine with errors differ by less
@@ -130,6 +130,8 @@ class _Motion:
 
     def of(self, path: Shape) -> Shape:
         """The path where it now is."""
+        if isinstance(path, Planned):
+            raise ScenarioError("a planned path belongs to the robot for which it was planned: plan it again")
         if isinstance(path, (Rectangle, Points)):
             points = [Waypoint(self.point_mm(w.translation_mm), self.tool(w.zyx_deg)) for w in path.waypoints]
             return replace(path, waypoints=points)
@@ -140,7 +142,6 @@ class _Motion:
         }
         if isinstance(path, Circle):
             return replace(path, radius_mm=self.scale * path.radius_mm, **moved)
-        assert isinstance(path, FigureEight)
         lengths = {"length_mm": self.scale * path.length_mm, "width_mm": self.scale * path.width_mm}
         return replace(path, **lengths, **moved)
 

@@ -68,25 +68,61 @@ class Trial:
         period, ahead = config.period, config.drive.command_delay + config.drive.dead_time
         stop = self.settle + self.profile.duration
         told = commands(self, np.arange(0.0, stop + RINGING, period) + ahead, period)
-        builder = DiagramBuilder()
-        station = builder.AddNamedSystem(
-            "station", SimulatedStation(self.plant or self.robot, config, "cascade", takes_torque=True)
-        )
-        player = builder.AddNamedSystem("commands", CommandPlayer(told, period))
-        for index in range(player.num_output_ports()):
-            port = player.get_output_port(index)
-            builder.Connect(port, station.GetInputPort(port.get_name()))
-        simulator = Simulator(builder.Build())
-        context = simulator.get_mutable_context()
-        station.set_at_rest(context, told[0, 0], seed=0)
-        rate = station.fastest_rate(context)
-        integration = Integration(IntegratorConfig(max_step=_MAX_STEP), period, rate)
-        integration.initialize(simulator)
+        simulator, station, integration = at_rest(self.plant or self.robot, config, told)
         integration.advance(simulator, stop)
-        found = _watched(simulator, station, integration, stop + RINGING)
+        watch = WristWatch(station)
+        watch.begin(simulator)
+        integration.advance(simulator, stop + RINGING)
         if progress:
             progress(1.0)
-        return found
+        return watch.found
+
+
+class WristWatch:
+    """Notes how the wrist of a station accelerates at every step of the integrator."""
+
+    def __init__(self, station: SimulatedStation) -> None:
+        """Takes the station that is simulated."""
+        self._plant = station.plant
+        self._wrist = station.plant.GetBodyByName(f"link_{_WRIST}")
+        self._times: list[float] = []
+        self._accelerations: list[np.ndarray] = []
+
+    def begin(self, simulator: Simulator) -> None:
+        """Watches from now on."""
+        self._record(simulator.get_context())
+        simulator.set_monitor(self._record)
+
+    @property
+    def found(self) -> tuple[np.ndarray, np.ndarray]:
+        """Times in s, shape (n,), and accelerations in m/s^2, shape (n, 3)."""
+        return np.array(self._times), np.array(self._accelerations)
+
+    def _record(self, root_context: Context) -> EventStatus:
+        own = self._plant.GetMyContextFromRoot(root_context)
+        self._times.append(root_context.get_time())
+        acceleration = self._plant.EvalBodySpatialAccelerationInWorld(own, self._wrist)
+        self._accelerations.append(acceleration.translational())
+        return EventStatus.DidNothing()
+
+
+def at_rest(
+    robot: RobotModel, config: StationConfig, told: np.ndarray
+) -> tuple[Simulator, SimulatedStation, Integration]:
+    """A station that will be told commands (n, 3, 6), one row a tick, at rest where they begin."""
+    builder = DiagramBuilder()
+    station = builder.AddNamedSystem("station", SimulatedStation(robot, config, "cascade", takes_torque=True))
+    player = builder.AddNamedSystem("commands", CommandPlayer(told, config.period))
+    for index in range(player.num_output_ports()):
+        port = player.get_output_port(index)
+        builder.Connect(port, station.GetInputPort(port.get_name()))
+    simulator = Simulator(builder.Build())
+    context = simulator.get_mutable_context()
+    station.set_at_rest(context, told[0, 0], seed=0)
+    rate = station.fastest_rate(context)
+    integration = Integration(IntegratorConfig(max_step=_MAX_STEP), config.period, rate)
+    integration.initialize(simulator)
+    return simulator, station, integration
 
 
 class CommandPlayer(LeafSystem):
@@ -133,22 +169,3 @@ def criterion(times: np.ndarray, accelerations: np.ndarray) -> float:
     """C in m/s of accelerations in m/s^2, shape (n, 3), at times in s, Reiner (2010) eq. (6.1)."""
     mean = trapezoid(accelerations, times, axis=0) / (times[-1] - times[0])
     return float(trapezoid(np.abs(accelerations - mean), times, axis=0).sum())
-
-
-def _watched(
-    simulator: Simulator, station: SimulatedStation, integration: Integration, end: float
-) -> tuple[np.ndarray, np.ndarray]:
-    """Goes on to a time in s; the times of all steps and how the wrist accelerated, in m/s^2, (n, 3)."""
-    plant, wrist = station.plant, station.plant.GetBodyByName(f"link_{_WRIST}")
-    times, accelerations = [], []
-
-    def record(root_context: Context) -> EventStatus:
-        own = plant.GetMyContextFromRoot(root_context)
-        times.append(root_context.get_time())
-        accelerations.append(plant.EvalBodySpatialAccelerationInWorld(own, wrist).translational())
-        return EventStatus.DidNothing()
-
-    record(simulator.get_context())
-    simulator.set_monitor(record)
-    integration.advance(simulator, end)
-    return np.array(times), np.array(accelerations)

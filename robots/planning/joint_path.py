@@ -8,10 +8,10 @@ from numpy.polynomial import chebyshev
 
 from robots.description.model import RobotModel
 
-_DEGREES = (8, 12, 18, 26, 36, 50)  # of the polynomials that are tried
+_DEGREES = (6, 8, 10, 12, 15, 18, 22, 27, 33, 40, 50)  # of the polynomials that are tried
 _LOOKED_AT = 201  # parameters
 _ROUNDING = 1e-9  # rad
-_SMALL = 1e-7  # of the largest value: the last coefficients of a polynomial that is good enough
+_SMALL = 1e-7  # rad: the last coefficients of a polynomial that is good enough
 
 
 class PathError(ValueError):
@@ -45,24 +45,29 @@ def interpolated(values: np.ndarray) -> Curve:
     return Curve(np.linalg.solve(vandermonde, flat).reshape(values.shape))
 
 
-def smooth_curve(function: Callable[[np.ndarray], np.ndarray], what: str) -> Curve:
-    """The polynomial of lowest degree that a function of s is, to a ten millionth.
+def smooth_curve(
+    function: Callable[[np.ndarray], np.ndarray],
+    what: str,
+    scale: np.ndarray | float = 1.0,
+    accuracy: float = _SMALL,
+) -> Curve:
+    """The polynomial of low degree that a function of s is.
 
     Args:
         function: of parameters (n,) in rising order, values (n, k).
         what: the function is, for the refusal.
+        scale: of its values, shape (k,) or one number.
+        accuracy: share of the scale by which the polynomial may be off.
 
     Raises:
         PathError: if it has a corner or is singular; with the place.
     """
     for degree in _DEGREES:
         curve = interpolated(function(nodes(degree)))
-        size = np.abs(curve.coefficients).max(axis=0)
-        tail = np.abs(curve.coefficients[-3:]).max(axis=0)
-        if (tail <= _SMALL * np.maximum(size, 1.0)).all():
+        if (np.abs(curve.coefficients[-3:]) <= accuracy * scale).all():
             return curve
     s = np.linspace(0.0, 1.0, 400)
-    worst = int(np.abs(curve.at(s) - function(s)).max(axis=1).argmax())
+    worst = int((np.abs(curve.at(s) - function(s)) / scale).max(axis=1).argmax())
     raise PathError(
         f"{what} is not smooth near {100.0 * s[worst]:.0f} % of the path: a corner, or an arm nearly singular"
     )

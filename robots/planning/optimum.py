@@ -15,13 +15,11 @@ from robots.planning.use import OVER_TIME, energy
 
 OBJECTIVES = ("time", "energy")
 ITERATIONS = 60  # of IPOPT, at most
-_SMOOTH = {
-    "time": 1e-10,
-    "energy": 1e-9,
-}  # weight of the fourth derivative, which nothing else holds where no limit binds
+# Weight of the fourth derivative: without it limits are used in ways that a drive of 4 ms cannot follow.
+_SMOOTH = {"time": 5e-7, "energy": 1e-8}
 _ROUNDED = 0.03  # of the mean power at the start, below which the magnitude of a power is rounded
-_SLOWEST = 20.0  # times the duration of the start
-_NEAR = 0.3  # use of a limit at the start, from which on the optimiser looks at it
+_SLOWEST = 2.5  # times the duration of the start: beyond that the optimiser is lost
+_NEAR = 0.45  # use of a limit at the start, from which on the optimiser looks at it
 _MISSED = 1.002  # use of a limit that it did not look at, for which it looks again
 _ROUNDS = 3
 
@@ -34,6 +32,11 @@ class Optimum:
     iterations: int
     status: str  # of IPOPT
 
+    @property
+    def is_solved(self) -> bool:
+        """Whether the optimiser has converged."""
+        return self.status in ("Solve_Succeeded", "Solved_To_Acceptable_Level")
+
 
 def optimum(
     dynamics: PathDynamics,
@@ -42,6 +45,7 @@ def optimum(
     objective: str = "time",
     recuperation: bool = False,
     duration: float | None = None,
+    smoother: float = 1.0,
 ) -> Optimum:
     """Optimises a motion.
 
@@ -52,6 +56,7 @@ def optimum(
         objective: of `OBJECTIVES`; energy needs a duration.
         recuperation: whether braking gives energy back.
         duration: s, of the motion; None if it is free.
+        smoother: times the weight that keeps the motion smooth, where the optimiser does not converge.
 
     Raises:
         ValueError: if there is no such objective, or energy has no duration.
@@ -65,7 +70,7 @@ def optimum(
     rows = _used(dynamics, limits, start) > _NEAR
     motion = start
     for _ in range(_ROUNDS):
-        found, motion = _solved(dynamics, limits, motion, rows, (objective, recuperation, duration))
+        found, motion = _solved(dynamics, limits, motion, rows, (objective, recuperation, duration, smoother))
         iterations += found.iterations
         if "Infeasible" in found.status:
             break
@@ -93,7 +98,7 @@ def _solved(
     limits: MotionLimits,
     start: TimeSpline,
     rows: np.ndarray,
-    aim: tuple[str, bool, float | None],
+    aim: tuple[str, bool, float | None, float],
 ) -> tuple[Solution, TimeSpline]:
     count, unit, duration = len(start.coefficients), start.duration, aim[2]
     free = slice(AT_REST, count - AT_REST)
@@ -126,9 +131,9 @@ def _program(
     limits: MotionLimits,
     start: TimeSpline,
     rows: np.ndarray,
-    aim: tuple[str, bool, float | None],
+    aim: tuple[str, bool, float | None, float],
 ) -> PointProgram:
-    objective, recuperation, _ = aim
+    objective, recuperation, _, smoother = aim
     unit = start.duration
     y, w = ca.SX.sym("y", ORDERS + 1), ca.SX.sym("w")
     T = y[ORDERS]
@@ -139,14 +144,16 @@ def _program(
     speed, torque = values[:NUM_JOINTS], values[3 * NUM_JOINTS : 4 * NUM_JOINTS]
     lasting = [int(joint) for joint in np.flatnonzero(np.isfinite(limits.continuous_torque))]
     means = [(torque[joint] / float(limits.continuous_torque[joint])) ** 2 for joint in lasting]
-    cost = w * T + _SMOOTH[objective] * w * y[ORDERS - 1] ** 2
+    cost = w * T + smoother * _SMOOTH[objective] * w * y[ORDERS - 1] ** 2
     if objective == "energy":
         times = points(len(start.coefficients)) * unit
         of_start = energy(dynamics.demand(start.rates(times)), times)
         power = torque * speed
         if not recuperation:
             power = ca.sqrt(power**2 + (_ROUNDED * of_start / unit) ** 2)
-        cost = w * ca.sum1(power) * T * unit / of_start + _SMOOTH[objective] * w * y[ORDERS - 1] ** 2
+        cost = (
+            w * ca.sum1(power) * T * unit / of_start + smoother * _SMOOTH[objective] * w * y[ORDERS - 1] ** 2
+        )
     return PointProgram(
         ca.Function("bounded", [y], [ca.vertcat(*bounded)]),
         np.append([-1.0 if row < 6 * NUM_JOINTS else -0.1 for row in chosen], 0.0),

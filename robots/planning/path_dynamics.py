@@ -22,7 +22,9 @@ DYNAMICS = {"rigid": "rigid", "flexible_joint": "joints", "elastic_structure": "
 ORDERS = 5  # s and four derivatives
 _DAMPING = 0.05  # of the turns that make up for the structure, where the arm is nearly singular
 _ROTATION = 0.12  # what a radian weighs beside the reach, as in the feedforward
-_BLUNT = 3.0  # times the width of the friction's sign change, which an optimiser would not resolve
+_SCALE = np.append(np.tile(np.repeat([1e3, 1e-3], 6), 3), np.ones(3))  # N m, rad; m
+_ACCURATE = 1e-5  # of that
+_BLUNT = 15.0  # times the width of the friction's sign change, which an optimiser would not resolve
 
 
 @dataclass(frozen=True)
@@ -76,7 +78,9 @@ class PathDynamics:
         self.path = path
         self._robot = robot
         arm = _Arm(robot, payload, dynamics)
-        self._curve = smooth_curve(lambda s: arm.coefficients(path, s), "the load of the gears")
+        self._curve = smooth_curve(
+            lambda s: arm.coefficients(path, s), "the load of the gears", _SCALE, _ACCURATE
+        )
         self.function = self._function()
         self._mapped: dict[int, ca.Function] = {}
 
@@ -89,6 +93,16 @@ class PathDynamics:
         found = self.rows(rates).T
         of_joints = np.split(found[:, : 6 * NUM_JOINTS], 6, axis=1)
         return Demand(*of_joints, *np.sqrt(np.maximum(found[:, 6 * NUM_JOINTS :], 0.0)).T)
+
+    def motors(self, rates: np.ndarray) -> np.ndarray:
+        """Where the motors are, seen behind the gear, in rad, at s and its derivatives (5, n); (n, 6)."""
+        return self.path.at(rates[0]) + np.array(self._ahead.map(rates.shape[1])(rates)).T
+
+    def torque(self, rates: np.ndarray) -> np.ndarray:
+        """Torques of the motors in N m with friction as sharp as it is, at (5, n); shape (n, 6)."""
+        demand, robot = self.demand(rates), self._robot
+        sharp, blunt = (np.tanh(demand.speed / (factor * robot.coulomb_velocity)) for factor in (1.0, _BLUNT))
+        return demand.motor_torque + robot.joint_coulomb_friction * (sharp - blunt)
 
     def rows(self, rates: np.ndarray) -> np.ndarray:
         """The values of ``function`` at s and its derivatives (5, n); shape (38, n)."""
@@ -104,12 +118,12 @@ class PathDynamics:
         def rate(expression: ca.SX) -> ca.SX:
             return ca.jtimes(expression, s[: ORDERS - 1], s[1:])
 
-        values = _clenshaw(self._curve.coefficients, s[0])
-        g, a, b = (ca.vertcat(*values[12 * i : 12 * i + 12]) for i in range(3))
+        values = _sum(self._curve.coefficients, s[0])
+        g, a, b, tool = ca.vertsplit(values, [0, 12, 24, 36, 39])
         yields = g + a * s[2] + b * s[1] ** 2
         load, ahead = yields[:6], yields[6:]
-        tool = ca.vertcat(*values[36:])
-        q = ca.vertcat(*_clenshaw(self.path.coefficients, s[0]))
+        q = _sum(self.path.coefficients, s[0])
+        self._ahead = ca.Function("ahead", [s], [ahead])
         velocity = rate(q)
         acceleration = rate(velocity)
         theta_rate = velocity + rate(ahead)
@@ -194,13 +208,10 @@ class _Arm:
         return ahead
 
 
-def _clenshaw(coefficients: np.ndarray, s: ca.SX) -> list[ca.SX]:
+def _sum(coefficients: np.ndarray, s: ca.SX) -> ca.SX:
     """A sum of Chebyshev polynomials of 2 s - 1 for each column of coefficients, (degree + 1, k)."""
     x = 2.0 * s - 1.0
-    values = []
-    for column in coefficients.T:
-        later = last = ca.SX(0.0)
-        for coefficient in column[:0:-1]:
-            later, last = float(coefficient) + 2.0 * x * later - last, later
-        values.append(float(column[0]) + x * later - last)
-    return values
+    polynomials = [ca.SX(1.0), x]
+    while len(polynomials) < len(coefficients):
+        polynomials.append(2.0 * x * polynomials[-1] - polynomials[-2])
+    return ca.DM(coefficients.T) @ ca.vertcat(*polynomials[: len(coefficients)])

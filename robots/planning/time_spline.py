@@ -8,7 +8,7 @@ from scipy.interpolate import BSpline
 
 DEGREE = 7
 AT_REST = 6  # coefficients at each end: value and five derivatives there are those of rest
-_GRADING = 0.8  # 0 for equal intervals; towards 1 they are shorter at the ends, where a motion starts
+_GRADING = 0.75  # 0 for equal intervals; towards 1 they are shorter at the ends, where a motion starts
 _PER_INTERVAL = 5  # points at which limits are kept
 
 

@@ -1,0 +1,109 @@
+"""``truetip plan``: the quickest or most frugal motion within the limits of drives and gears."""
+
+from contextlib import ExitStack
+from pathlib import Path
+from typing import Annotated
+
+import typer
+from rich import box
+from rich.markup import escape
+from rich.table import Table
+
+from diagrams.scenario.scenario import StationConfig
+from experiments.cli.console import print_files, progress_bar, refusing
+from experiments.cli.json_output import human_console, json_output
+from experiments.cli.options import JsonOption, PayloadOption, StudiedRobotOption
+from experiments.cli.staging import PAGE, TABLE, staged_file
+from experiments.plan.plots import TABLE_HEAD, table_rows, verdict, write_plan_page
+from experiments.plan.study import OBJECTIVES, LegResult, Plan, joint_table, plan_json, study_plan
+from experiments.report.files import write_text
+from robots.description.model import RobotModel, load_robot
+from robots.kinematics.forward import Kinematics
+from robots.planning.limits import DUTY, motion_limits
+from robots.planning.path_dynamics import DYNAMICS
+from systems.reference.planned_file import planned_text
+
+
+def plan_command(
+    path: Annotated[
+        str,
+        typer.Option(
+            "--path",
+            metavar="rectangle|joints|FILE",
+            help="A level rectangle; 20 degrees of axes 1 to 3 from the stretched arm; or a table, RAPID or "
+            "KRL, with a rest at each target.",
+        ),
+    ] = "rectangle",
+    objective: Annotated[
+        str,
+        typer.Option(
+            metavar="|".join(OBJECTIVES),
+            help="Least time, least energy in the time of the usual timing, or energies for several times.",
+        ),
+    ] = "time",
+    dynamics: Annotated[
+        str, typer.Option(metavar="|".join(DYNAMICS), help="What the planner knows to yield.")
+    ] = "elastic_structure",
+    robot: StudiedRobotOption = "kr16",
+    payload: PayloadOption = None,
+    plant: Annotated[
+        str | None,
+        typer.Option(
+            metavar="NAME|FILE", help="What the motion is tried on.", show_default="the robot itself"
+        ),
+    ] = None,
+    recuperation: Annotated[
+        bool, typer.Option("--recuperation", help="Motors that brake give energy back to the others.")
+    ] = False,
+    tool_speed: Annotated[float, typer.Option(metavar="M/S", help="Largest speed of the tool.")] = float(
+        "inf"
+    ),
+    tool_acceleration: Annotated[
+        float, typer.Option(metavar="M/S^2", help="Largest acceleration of the tool.")
+    ] = float("inf"),
+    duty: Annotated[
+        float, typer.Option(metavar="SHARE", help="Of a cycle that is motion, for the heat of the motors.")
+    ] = DUTY,
+    write: Annotated[
+        str | None, typer.Option(metavar="FILE.csv", help="The motion, for reference.path=!Planned.")
+    ] = None,
+    report: Annotated[Path, typer.Option("--report", metavar="FILE.html", help="The picture.")] = Path(
+        "out/plan.html"
+    ),
+    json_file: JsonOption = None,
+) -> None:
+    """Plan the quickest or most frugal motion within limits of drives and gears, and try it in the plant."""
+    human = human_console(json_file)
+    with json_output(json_file) as output, refusing(ValueError, OSError), ExitStack() as stack:
+        model = load_robot(robot)
+        mass = model.payload.largest_mass if payload is None else payload
+        limits = motion_limits(model, tool_speed, tool_acceleration, duty)
+        true = None if plant is None else load_robot(plant)
+        plan = Plan(model, mass, path, objective, dynamics, limits, recuperation, true)
+        page = stack.enter_context(staged_file(report, *PAGE))
+        table = stack.enter_context(staged_file(write, *TABLE)) if write else None
+        stack.enter_context(output.staged())
+        with progress_bar(f"{objective}, {dynamics}") as progress:
+            results = study_plan(plan, progress)
+        write_plan_page(page, plan, results)
+        if table:
+            write_text(table, _motion_text(model, results))
+        output.write(plan_json(plan, results))
+    human.print(_table(plan, results))
+    human.print(escape(verdict(plan, results)))
+    print_files(human, report, write)
+
+
+def _motion_text(robot: RobotModel, results: list[LegResult]) -> str:
+    times, q = joint_table(results, 0.5 * StationConfig().period)
+    return planned_text(times, Kinematics(robot).forward(q), q)
+
+
+def _table(plan: Plan, results: list[LegResult]) -> Table:
+    title = f"{plan.robot.name}, {plan.payload:g} kg: {plan.path}, least {plan.objective}"
+    table = Table(box=box.SIMPLE_HEAD, title=escape(title), title_justify="left", title_style="italic")
+    for name in TABLE_HEAD[:-1]:
+        table.add_column(name, justify="left" if name == TABLE_HEAD[0] else "right", no_wrap=True)
+    for row in table_rows(plan, results):
+        table.add_row(*map(escape, row[:-1]))
+    return table

@@ -1,0 +1,207 @@
+"""Plans motions, drives them in the plant, and does the same with the timing that they replace."""
+
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+from itertools import product
+from typing import Any
+
+import numpy as np
+
+from experiments.plan.legs import Leg, legs_of
+from experiments.plan.plant_run import PlantDriver
+from experiments.plan.timings import SineSquared, Timing, quickest
+from experiments.plan.within_limits import Kept, kept_in_plant
+from robots.description.model import RobotModel
+from robots.planning.jerk_profile import best_jerk_profile
+from robots.planning.joint_path import PathError
+from robots.planning.limits import MotionLimits
+from robots.planning.optimum import ITERATIONS, Optimum, optimum
+from robots.planning.path_dynamics import PathDynamics
+from robots.planning.rigid_start import rigid_start
+from robots.planning.time_spline import TimeSpline, fitted
+from robots.planning.use import energy, require_standing
+
+OBJECTIVES = ("time", "energy", "front")
+COEFFICIENTS = 36  # of the spline: about one for each tick of some 12 ms of a quick motion
+_SMOOTHER = 10.0  # motions where the optimiser has not converged
+_FRONT = (1.0, 1.05, 1.1, 1.2, 1.35, 1.5)  # of the shortest duration
+
+
+@dataclass(frozen=True)
+class Plan:
+    """What is asked for.
+
+    Attributes:
+        robot: as the planner and the controller know it.
+        payload: kg.
+        path: see `legs_of`.
+        objective: of `OBJECTIVES`.
+        dynamics: of `robots.planning.path_dynamics.DYNAMICS`.
+        limits: that are kept.
+        recuperation: whether braking gives energy back.
+        plant: what stands in the station, None for the same robot.
+    """
+
+    robot: RobotModel
+    payload: float
+    path: str
+    objective: str
+    dynamics: str
+    limits: MotionLimits
+    recuperation: bool = False
+    plant: RobotModel | None = None
+
+
+@dataclass(frozen=True)
+class LegResult:
+    """One leg, planned and with the timing that it replaces."""
+
+    leg: Leg
+    dynamics: PathDynamics  # of the robot with an elastic structure
+    planned: Kept[TimeSpline]
+    baseline: Kept[Timing]
+    found: Optimum  # the last one
+    seconds: float  # that one plan took
+    front: list[tuple[float, float]]  # s and J as the planner believes; empty unless it is asked for
+
+
+def study_plan(plan: Plan, progress: Callable[[float], None] | None = None) -> list[LegResult]:
+    """Plans every leg.
+
+    Args:
+        plan: what is asked for.
+        progress: is called now and then with the share that is done, 0 to 1.
+
+    Raises:
+        ValueError: if something that is asked for does not exist, or a leg is impossible; with the place.
+    """
+    if plan.objective not in OBJECTIVES:
+        raise ValueError(f"--objective must be one of {', '.join(OBJECTIVES)}, got '{plan.objective}'")
+    legs, results = legs_of(plan.robot, plan.path), []
+    for number, leg in enumerate(legs, 1):
+        try:
+            results.append(_planned(plan, leg))
+        except PathError as error:
+            raise PathError(f"{leg.name}: {error}") from error
+        if progress:
+            progress(number / len(legs))
+    return results
+
+
+def _planned(plan: Plan, leg: Leg) -> LegResult:
+    dynamics = PathDynamics(plan.robot, plan.payload, leg.path, plan.dynamics)
+    elastic = PathDynamics(plan.robot, plan.payload, leg.path, "elastic_structure")
+    require_standing(dynamics, plan.limits)
+    driver = PlantDriver(plan.robot, plan.payload, elastic, plan.plant)
+
+    def baseline(limits: MotionLimits) -> Timing:
+        return (
+            quickest(SineSquared, elastic, limits) if leg.is_straight else best_jerk_profile(elastic, limits)
+        )
+
+    usual = kept_in_plant(baseline, driver, plan.limits)
+    last: list[tuple[Optimum, float]] = []
+
+    def optimal(limits: MotionLimits) -> TimeSpline:
+        began = time.perf_counter()
+        # Where it does not converge from the rigid robot's motion, it begins with the usual one.
+        starts = [
+            rigid_start(plan.robot, plan.payload, leg.path, limits, COEFFICIENTS),
+            as_spline(usual.timing),
+        ]
+        found = _optimal(plan, dynamics, limits, starts, usual.timing.duration)
+        last.append((found, time.perf_counter() - began))
+        return found.motion
+
+    kept = kept_in_plant(optimal, driver, plan.limits)
+    front = _front(plan, dynamics, kept) if plan.objective == "front" else []
+    return LegResult(leg, elastic, kept, usual, last[-1][0], max(each for _, each in last), front)
+
+
+def as_spline(timing: Timing) -> TimeSpline:
+    """The spline next to a timing."""
+    return fitted(
+        timing.times / timing.duration, timing.rates(timing.times)[0], timing.duration, COEFFICIENTS
+    )
+
+
+def _optimal(
+    plan: Plan, dynamics: PathDynamics, limits: MotionLimits, starts: list[TimeSpline], usual: float
+) -> Optimum:
+    for start, smoother in product(starts, (1.0, _SMOOTHER)):
+        is_frugal = plan.objective == "energy"
+        found = optimum(
+            dynamics,
+            limits,
+            start,
+            "energy" if is_frugal else "time",
+            plan.recuperation,
+            usual if is_frugal else None,
+            smoother,
+        )
+        if found.is_solved:
+            return found
+    raise PathError(f"the optimiser has not converged within {ITERATIONS} iterations")
+
+
+def _front(plan: Plan, dynamics: PathDynamics, kept: Kept[TimeSpline]) -> list[tuple[float, float]]:
+    points = []
+    motion = kept.timing
+    for share in _FRONT:
+        duration = share * kept.timing.duration
+        motion = optimum(dynamics, kept.margins, motion, "energy", plan.recuperation, duration).motion
+        demand = dynamics.demand(motion.rates(motion.times))
+        points.append((duration, energy(demand, motion.times, plan.recuperation)))
+    return points
+
+
+def plan_json(plan: Plan, results: list[LegResult]) -> dict[str, Any]:
+    """The numbers: sums over the legs, the worst of criterion, iterations and seconds."""
+    binding = sorted({name for each in results for name in each.planned.run.use(plan.limits).binding})
+    return {
+        "robot": plan.robot.name,
+        "payload_kg": plan.payload,
+        "path": plan.path,
+        "objective": plan.objective,
+        "dynamics": plan.dynamics,
+        "time_s": sum(each.planned.timing.duration for each in results),
+        "baseline_s": sum(each.baseline.timing.duration for each in results),
+        "energy_j": sum(each.planned.run.energy(plan.recuperation) for each in results),
+        "baseline_energy_j": sum(each.baseline.run.energy(plan.recuperation) for each in results),
+        "criterion": max(each.planned.run.criterion for each in results),
+        "baseline_criterion": max(each.baseline.run.criterion for each in results),
+        "limits_kept": all(each.planned.keeps for each in results),
+        "baseline_limits_kept": all(each.baseline.keeps for each in results),
+        "binding": binding,
+        "iterations": max(each.found.iterations for each in results),
+        "seconds": max(each.seconds for each in results),
+        "front": [[{"time_s": t, "energy_j": e} for t, e in each.front] for each in results if each.front],
+        "legs": [
+            {
+                "name": each.leg.name,
+                "time_s": each.planned.timing.duration,
+                "baseline_s": each.baseline.timing.duration,
+                "energy_j": each.planned.run.energy(plan.recuperation),
+                "baseline_energy_j": each.baseline.run.energy(plan.recuperation),
+                "criterion": each.planned.run.criterion,
+                "baseline_criterion": each.baseline.run.criterion,
+            }
+            for each in results
+        ],
+    }
+
+
+def joint_table(results: list[LegResult], period: float) -> tuple[np.ndarray, np.ndarray]:
+    """All legs one after the other: times in s, shape (n,), and joint positions in rad, shape (n, 6)."""
+    times, rows, begin = [], [], 0.0
+    for each in results:
+        duration = each.planned.timing.duration
+        t = np.arange(0.0, duration, period)
+        s = each.planned.timing.rates(t)[0]
+        times.append(begin + t)
+        rows.append(each.leg.path.at(s))
+        begin += np.ceil(duration / period) * period
+    times.append(np.array([begin]))
+    rows.append(results[-1].leg.path.at(np.array([1.0])))
+    return np.concatenate(times), np.concatenate(rows)
