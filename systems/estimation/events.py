@@ -19,13 +19,15 @@ _FIRST = 15  # samples, whose median is what the next ones are compared with
 _MARGIN = np.repeat([3e-3, 1e-3], 3)  # rad and m, what the first linearisations may be wrong by
 _RECENT = 24  # samples, among which a change is looked for that came from one to the next
 _AFTER = 3  # of them at least have to be behind it
-_SUDDEN = 40.0  # by which chi squared is smaller with a step than with a parabola: e to the 20 to one
+_SUDDEN = 60.0  # by which chi squared is smaller with a step than with a parabola: e to the 30 to one
+_FOREIGN = 8.0  # sigmas of what robots of this kind may be off by
 _PAUSE = 50  # samples after an event before the next one
 _EXPLAINED = 0.15  # what a cause leaves of the mean error if it is the cause
 
 
 TOOL_DISPLACED, LOAD_CHANGED = "tool displaced", "load changed"
 DEAD_TIME_CHANGED, CLOCK_DRIFTS = "dead time changed", "clock drifts"
+FOREIGN_FRAME = "camera frame is another"
 
 
 class Verdict(NamedTuple):
@@ -41,8 +43,8 @@ class Verdict(NamedTuple):
 class Event(NamedTuple):
     """What happened to the robot."""
 
-    kind: str  # "tool displaced", "load changed", "dead time changed" or "clock drifts"
-    size: float  # m, kg, s or s/s
+    kind: str  # one of those above
+    size: float  # m, kg, s, s/s or rad
     error: float  # m, of the tip where it is known
 
 
@@ -50,7 +52,7 @@ class EventLog:
     """The last events with their times, for whoever asks what happened."""
 
     _LENGTH = 8
-    _KINDS = TOOL_DISPLACED, LOAD_CHANGED, DEAD_TIME_CHANGED, CLOCK_DRIFTS
+    _KINDS = TOOL_DISPLACED, LOAD_CHANGED, DEAD_TIME_CHANGED, CLOCK_DRIFTS, FOREIGN_FRAME
 
     def __init__(self) -> None:
         """Lays out the memory."""
@@ -93,10 +95,12 @@ class Innovations:
             error=(6,),
             spread=(6,),  # what the estimate could be wrong by when these errors were seen, in sigmas
             outliers=(1,),
+            left_out=(6,),  # the last large error
             pause=(1,),
             seen=(1,),
             first=(_FIRST, 6),
             recent=(_RECENT, 6),  # the newest one last
+            by_model=(_RECENT, 6),  # what the estimate could be wrong by then, in variances of the camera
             held=(1,),  # how many of them there are
             doubtful=(1,),  # samples in a row
         )
@@ -126,6 +130,18 @@ class Innovations:
         memory.outliers[0] += 1.0
         return True
 
+    def foreign(self, memory: SimpleNamespace, H: np.ndarray) -> Event | None:
+        """That the camera speaks of another frame: no robot of this kind is off by what it says.
+
+        Args:
+            memory: of the layout.
+            H: columns of the tip in units of the spreads before anything was measured, (6, n).
+        """
+        r = np.median(memory.first, axis=0)
+        if int(memory.seen[0]) < _FIRST or (np.abs(r) < _FOREIGN * np.sqrt((H * H).sum(axis=1))).all():
+            return None
+        return Event(FOREIGN_FRAME, float(np.linalg.norm(r[:3])), float(np.linalg.norm(r[3:])))
+
     def judge(
         self, memory: SimpleNamespace, r: np.ndarray, H: np.ndarray, solve: Callable[[], np.ndarray]
     ) -> Verdict:
@@ -145,10 +161,14 @@ class Innovations:
             z = z / np.sqrt(1.0 + by_model)
         memory.pause[0] = max(0.0, memory.pause[0] - 1.0)
         is_large = z.max() > _OUTLIER
-        if is_large and memory.outliers[0] < _LONGEST_OUTLIER:
+        # Reflections lie anywhere; a tool that was displaced is seen at the same place again.
+        is_again = is_large and np.abs((r - memory.left_out) / known).max() < _OUTLIER
+        if is_large:
+            memory.left_out[:] = r
+        if is_large and memory.outliers[0] < _LONGEST_OUTLIER and not is_again:
             memory.outliers[0] += 1.0
             return Verdict(is_outlier=True)
-        # Samples that were left out count as soon as there are too many of them in a row to be outliers.
+        # Samples that were left out count as soon as they agree, or are too many in a row to be outliers.
         number = 1 + int(memory.outliers[0]) * int(is_large)
         share = 1.0 - (1.0 - 1.0 / _WINDOW) ** number
         memory.error += share * (r - memory.error)
@@ -156,20 +176,23 @@ class Innovations:
         memory.outliers[0] = 0.0
         memory.recent[:-number] = memory.recent[number:]
         memory.recent[-number:] = r
+        memory.by_model[:-number] = memory.by_model[number:]
+        memory.by_model[-number:] = 0.0 if by_model is None else by_model
         memory.held[0] += number
         mean = np.abs(memory.error) / known
         size = mean.max() * _AVERAGING
         if size > _CALM:
             if by_model is None:
                 by_model = np.einsum("ij,ji->i", H, solve()) / self._variances
+            memory.by_model[-1] = by_model
             by_model = np.maximum(by_model, memory.spread**2)
             size = (mean / np.sqrt(_AVERAGING**-2 + _MODEL_SHARE**2 * by_model)).max()
+        if size > _CALM and memory.pause[0] == 0.0 and self._is_sudden(memory):
+            return Verdict(has_jumped=True)
         if size <= _JUMP or memory.pause[0] > 0.0:
             memory.doubtful[0] = 0.0
             return Verdict(is_calm=bool(size < _CALM))
         memory.doubtful[0] += 1.0
-        if self._is_sudden(memory):
-            return Verdict(has_jumped=True)
         is_long = memory.doubtful[0] > _RECENT // 2
         return Verdict(has_drifted=bool(is_long), is_doubtful=not is_long)
 
@@ -177,14 +200,14 @@ class Innovations:
         """Whether a step explains the last samples better than a parabola does."""
         if memory.held[0] < _RECENT:
             return False
-        y = memory.recent / np.sqrt(self._variances)
-        total = float((y * y).sum())
-        smooth = total - float(((self._parabolas.T @ y) ** 2).sum())
-        sums = np.cumsum(y, axis=0)
-        before = np.arange(1, _RECENT)[:, None]
-        explained = sums[:-1] ** 2 / before + (sums[-1] - sums[:-1]) ** 2 / (_RECENT - before)
-        step = total - float(explained.sum(axis=1)[: _RECENT - _AFTER].max())
-        return smooth - step > _SUDDEN
+        y = self._in_sigmas(memory)
+        smooth = float((y * y).sum() - ((self._parabolas.T @ y) ** 2).sum())
+        return smooth - float(_with_step(y).min()) > _SUDDEN
+
+    def _in_sigmas(self, memory: SimpleNamespace) -> np.ndarray:
+        """The last samples in units of what both camera and estimate may be wrong by."""
+        by_model = np.maximum(memory.by_model, memory.by_model[-1])
+        return memory.recent / np.sqrt(self._variances * (1.0 + by_model))
 
     def forget(self, memory: SimpleNamespace) -> None:
         """Begins the mean anew."""
@@ -192,15 +215,23 @@ class Innovations:
         memory.outliers[0], memory.held[0], memory.doubtful[0] = 0.0, 0.0, 0.0
 
     def explain(self, memory: SimpleNamespace, H: np.ndarray, model: TipModel) -> Event:
-        """Says what the mean error looks like, and begins anew."""
-        error, whitened = memory.error.copy(), memory.error / np.sqrt(self._variances)
+        """Says what the step among the last samples looks like, and begins anew."""
+        before = 1 + int(_with_step(self._in_sigmas(memory)).argmin())
+        error = memory.recent[before:].mean(axis=0) - memory.recent[:before].mean(axis=0)
+        whitened = error / np.sqrt(self._variances)
         by_load = H[:, model.M] / np.sqrt(self._variances)[:, None]
         change = np.linalg.lstsq(by_load[:, :1], whitened, rcond=None)[0]
         left = whitened - by_load[:, :1] @ change
         self.forget(memory)
         memory.pause[0] = _PAUSE
-        # The running mean has seen the change for a part of its window only.
         size = float(np.linalg.norm(error[3:]))
         if left @ left < _EXPLAINED * (whitened @ whitened):
             return Event(LOAD_CHANGED, float(change[0] * model.sigma[model.M][0]), size)
         return Event(TOOL_DISPLACED, size, size)
+
+
+def _with_step(y: np.ndarray) -> np.ndarray:
+    """What a step leaves of the squares of rows (n, 6), for each number of rows before it, from one on."""
+    sums, before = np.cumsum(y, axis=0), np.arange(1, len(y))[:, None]
+    explained = sums[:-1] ** 2 / before + (sums[-1] - sums[:-1]) ** 2 / (len(y) - before)
+    return (y * y).sum() - explained.sum(axis=1)[: len(y) - _AFTER]

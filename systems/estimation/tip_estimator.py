@@ -77,6 +77,7 @@ class TipEstimator:
             x_geometry=(n,),  # the value that the constants are for
             count=(1,),
             event_at=(1,),  # the count at the last event
+            is_foreign=(1,),  # whether the camera speaks of another frame: then nothing is learnt from it
             was_settled=(1,),  # whether the sum was linear enough when samples agreed with it last
             A_open=(n, n),
             b_open=(n,),
@@ -156,13 +157,15 @@ class TipEstimator:
         if math.isnan(memory.first_time[0]):
             memory.first_time[0] = pair.time
         memory.last_time[0] = pair.time
+        if memory.is_foreign[0]:
+            return None
         found, shapes = self._predict(memory, pair)
         r, H = kernels.poses.pose_errors(pair.X_WE[None], found.X_WE)[0], found.H[0]
         weight = 1.0 / (1.0 + (pair.unrest / config.calm) ** 2)
         event, innovations = None, memory.innovations
         if memory.count[0] <= config.test_after:
             if self._innovations.is_false_start(innovations, r, H, lambda: self._solve_columns(memory, H)):
-                return None
+                return self._look_for_foreign(memory, H)
         else:
             verdict = self._innovations.judge(innovations, r, H, lambda: self._solve_columns(memory, H))
             if verdict.is_outlier:
@@ -192,6 +195,14 @@ class TipEstimator:
         if event is None and memory.count[0] % _DRIFT_EVERY == 0.0:
             event = self._look_for_drift(memory)
         self._solve(memory)
+        return event
+
+    def _look_for_foreign(self, memory: SimpleNamespace, H: np.ndarray) -> Event | None:
+        """Finds out early that a camera of another frame teaches nothing."""
+        if memory.count[0] > 0.0:
+            return None
+        event = self._innovations.foreign(memory.innovations, H)
+        memory.is_foreign[0] = event is not None
         return event
 
     def _look_for_drift(self, memory: SimpleNamespace) -> Event | None:

@@ -97,6 +97,8 @@ def test_a_displaced_tool_is_seen_and_learnt(shift):
 
     session.learn(12 * PERIOD, change=displaced)
     assert [event.kind for event in session.events] == ["tool displaced"]
+    # The first samples are learnt from before it is clear what they are.
+    assert 0.6 * shift < session.events[0].size < 1.2 * shift
     session.learn(0.6, change=displaced)
     assert len(session.events) == 1
     pair = displaced(session.arm.pair(session.time, noise=0.0))
@@ -113,6 +115,16 @@ def test_a_load_that_is_picked_up_is_named():
     assert [event.kind for event in session.events] == ["load changed"]
     session.learn(1.5)
     assert session.error(seen=True) < 60e-6
+
+
+def test_a_camera_frame_that_is_turned_around_is_named_and_teaches_nothing():
+    session, believed = Session(5), Session(5)
+    turned = np.diag([-1.0, -1.0, 1.0, 1.0])  # half a turn about z
+    session.learn(0.5, change=lambda pair: pair._replace(X_WE=turned @ pair.X_WE))
+    (event,) = session.events
+    assert event.kind == "camera frame is another"
+    assert event.size == pytest.approx(np.pi, abs=0.1)
+    assert session.error() == pytest.approx(believed.error(), rel=1e-9)
 
 
 def test_one_reflection_in_five_is_left_out():
