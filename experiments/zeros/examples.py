@@ -16,7 +16,7 @@ from experiments.zeros.linear_arm import (
     virtual_outputs,
 )
 from experiments.zeros.linear_arm import TIMES as ARM_TIMES
-from experiments.zeros.plots import beam_figure, locus_figure, plane_figure, time_figure
+from experiments.zeros.plots import arm_locus_figure, beam_figure, locus_figure, plane_figure, time_figure
 from experiments.zeros.study import BEAM_MODES, one_json, two_joint_arm_limit, two_joint_arm_zeros
 from robots.dynamics.modal_beam import BOUNDARIES, ModalBeam
 from robots.dynamics.transmission_zeros import Zeros
@@ -43,7 +43,12 @@ def two_joint_arm() -> Example:
         f"the inverse is stable up to {limit:.4f} m."
     )
     numbers = {**one_json(zeros), "x_l_m": 0.5, "largest_stable_x_l_m": limit}
-    return Example(numbers, verdict, [Section("Zeros, x_l = 0.5 m", "", plane_figure(zeros))])
+    note = "Reiner (2010), figure 3.9: a pair goes to infinity and comes back on the real axis."
+    sections = [
+        Section("Zeros, x_l = 0.5 m", "", plane_figure(zeros)),
+        Section("Zeros by the place of the output", note, arm_locus_figure(two_joint_arm_zeros), 420),
+    ]
+    return Example(numbers, verdict, sections)
 
 
 def beam() -> Example:

@@ -1,6 +1,6 @@
 """Pictures of zeros: the slowest unstable one over axes 2 and 3, zeros in the plane, outputs along a beam."""
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 
 import numpy as np
 import plotly.graph_objects as go
@@ -61,15 +61,24 @@ def beam_figure(num_modes: int, boundary: str = "clamped") -> go.Figure:
 def locus_figure(num_modes: int) -> go.Figure:
     """Where the zeros are in the plane as the output moves along the beam; Reiner (2010), figs. 3.4, 3.5."""
     beam = ModalBeam(num_modes=num_modes)
-    places = np.linspace(0.02, 1.0, 99)
-    points = [(value, xi) for xi in places for value in beam.zeros(xi).values]
-    values, xi = (np.array(column) for column in zip(*points, strict=True))
-    marker = {"size": 5, "color": xi, "colorscale": "Jet", "colorbar": {"title": "place"}}
+    return _locus(beam.zeros, np.linspace(0.02, 1.0, 99), "place", "sqrt(E I / (m l<sup>3</sup>))", 200.0)
+
+
+def arm_locus_figure(zeros_at: Callable[[float], Zeros]) -> go.Figure:
+    """The same of the two-joint arm over x_l from 0 to 0.5 m; Reiner (2010), figure 3.9."""
+    return _locus(zeros_at, np.linspace(0.0, 0.5, 101), "x_l in m", "1/s", 1000.0)
+
+
+def _locus(
+    zeros_at: Callable[[float], Zeros], places: np.ndarray, label: str, unit: str, limit: float
+) -> go.Figure:
+    points = [(value, place) for place in places for value in zeros_at(place).values]
+    values, at = (np.array(column) for column in zip(*points, strict=True))
+    marker = {"size": 5, "color": np.real(at), "colorscale": "Jet", "colorbar": {"title": label}}
     figure = go.Figure(go.Scatter(x=np.real(values), y=np.imag(values), mode="markers", marker=marker))
-    rate = "sqrt(E I / (m l<sup>3</sup>))"
     return figure.update_layout(
-        xaxis={"title": f"real part in {rate}", "range": [-200, 200]},
-        yaxis={"title": f"imaginary part in {rate}", "range": [-200, 200]},
+        xaxis={"title": f"real part in {unit}", "range": [-limit, limit]},
+        yaxis={"title": f"imaginary part in {unit}", "range": [-limit, limit]},
     )
 
 
