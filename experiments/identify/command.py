@@ -20,6 +20,7 @@ from experiments.identify.cases import MotionCases, default_cases, load_cases
 from experiments.identify.plots import table_head, table_rows, verdict, write_identify_page
 from experiments.identify.recording_file import Recording, read_recording, write_recording
 from experiments.identify.simulated import places, simulated
+from experiments.identify.slow import identify_slow_recording, with_slow_motion
 from experiments.identify.study import IdentifyStudy, identify_json, study_identification, with_rectangle
 from experiments.report.files import write_text
 from robots.description.model import RobotModel, load_robot
@@ -39,6 +40,10 @@ def identify_command(
     columns: Annotated[
         Path | None,
         typer.Option(metavar="FILE", help="What its columns are (YAML).", show_default="beside the table"),
+    ] = None,
+    slow: Annotated[
+        Path | None,
+        typer.Option(metavar="FILE", help="Slow motions with torques (CSV), for load and friction."),
     ] = None,
     plant: Annotated[
         str | None,
@@ -79,6 +84,8 @@ def identify_command(
         at_least("--seed", 0, seed)
         if recording is not None and (cases is not None or write_table is not None):
             raise ValueError("--recording is what was recorded: it takes no --cases and no --write-recording")
+        if recording is None and slow is not None:
+            raise ValueError("--slow says more of what was recorded, and there is no --recording")
         if recording is None and columns is not None:
             raise ValueError("--columns says what a --recording has, and there is none")
         model = load_robot(robot)
@@ -96,9 +103,12 @@ def identify_command(
             if table:
                 write_recording(table, recorded)
         payload = model.payload.largest_mass if recorded.payload is None else recorded.payload
+        of_slow = identify_slow_recording(slow, model) if slow else None
+        if of_slow:
+            model, payload = with_slow_motion(model, of_slow), of_slow.payload
         with progress_bar(f"identification from {count(len(recorded.cases), 'motion')}") as progress:
             study = study_identification(
-                model, truth, payload, recorded.cases, recorded.sensors, gear_parts, progress
+                model, truth, payload, recorded.cases, recorded.sensors, gear_parts, progress, of_slow
             )
         if rectangle and truth is not None:
             with progress_bar("rectangle") as progress:
@@ -127,11 +137,9 @@ def _simulated(
 
 
 def _print(human: Console, study: IdentifyStudy) -> None:
-    table = Table(box=box.SIMPLE_HEAD)
+    table = Table(box=box.SIMPLE_HEAD, padding=(0, 1, 0, 0))
     for name in table_head(study):
-        table.add_column(
-            name, justify="left" if name in ("parameter", "unit") else "right", no_wrap=name == "parameter"
-        )
+        table.add_column(name, justify="left" if name in ("parameter", "unit") else "right", no_wrap=True)
     for row in table_rows(study):
         table.add_row(*map(escape, row))
     human.print(table)

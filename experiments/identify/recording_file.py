@@ -65,12 +65,13 @@ class Recording:
     sensors: list[SensorPlace]
 
 
-def read_recording(path: Path, columns: Path | None = None) -> Recording:
+def read_recording(path: Path, columns: Path | None = None, needs_sensors: bool = True) -> Recording:
     """Reads a table and its map.
 
     Args:
         path: of the table.
         columns: of the map; None for the file with the suffix .yaml beside it.
+        needs_sensors: whether motors alone are too little.
 
     Raises:
         ConfigurationError: if the map is missing or wrong.
@@ -80,7 +81,7 @@ def read_recording(path: Path, columns: Path | None = None) -> Recording:
     mapped = columns or path.with_suffix(".yaml")
     node = read_nodes(mapped, f"column map {mapped}")
     plan = typed(node, RecordingMap)
-    _check(plan, node)
+    _check(plan, node, needs_sensors)
     table = parse_fields(read_text(path), str(path), has_head=True)
     values = _Columns(table)
     names = values.texts(plan.case) if plan.case else ["1"] * (len(table.rows) - 1)
@@ -89,7 +90,9 @@ def read_recording(path: Path, columns: Path | None = None) -> Recording:
     theta = plan.angle_factor * values.numbers(plan.position)
     rate = plan.angle_factor * values.numbers(plan.speed) if plan.speed else None
     torque = values.numbers(plan.torque) if plan.torque else None
-    readings = np.stack([s.factor * values.numbers(s.columns) for s in plan.sensors], axis=1)
+    readings = np.zeros((len(time), len(plan.sensors), 3))
+    for i, sensor in enumerate(plan.sensors):
+        readings[:, i] = sensor.factor * values.numbers(sensor.columns)
     cases = []
     for name in dict.fromkeys(names):
         rows = np.flatnonzero(np.array(names) == name)
@@ -183,7 +186,7 @@ class _Columns:
         return found
 
 
-def _check(plan: RecordingMap, node: Node) -> None:
+def _check(plan: RecordingMap, node: Node, needs_sensors: bool) -> None:
     for name, wanted in (
         ("position", (NUM_JOINTS,)),
         ("speed", (0, NUM_JOINTS)),
@@ -192,7 +195,7 @@ def _check(plan: RecordingMap, node: Node) -> None:
         columns = getattr(plan, name)
         if len(columns) not in wanted:
             raise node.at([name]).refuse(f"{name} must be {NUM_JOINTS} columns, got {len(columns)}")
-    if not plan.sensors:
+    if not plan.sensors and needs_sensors:
         raise node.refuse("sensors: needs one or more, each with name, kind, body and three columns")
     for i, sensor in enumerate(plan.sensors):
         if len(sensor.columns) != 3:

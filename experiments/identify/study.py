@@ -9,11 +9,13 @@ import numpy as np
 
 from experiments.cli.workers import Progress, SimulationError, in_processes
 from experiments.feedforward.rectangle import RectangleTrial
+from experiments.identify.slow import slow_json
 from robots.description.model import RobotModel
 from robots.identification.arm_identification import ArmIdentification, identify_arm
 from robots.identification.identified_robot import FoundParameter, found_parameters, identified_robot
 from robots.identification.motion import SensorPlace
 from robots.identification.recording import RecordedCase
+from robots.identification.slow_motion import SlowIdentification
 from systems.feedforward import FeedforwardConfig
 
 _STIFFNESS, _DAMPING = "stiffness_", "damping_"
@@ -30,6 +32,7 @@ class IdentifyStudy:
     parameters: list[FoundParameter]
     identified: RobotModel
     seconds: float  # from the recording to the parameters
+    slow: SlowIdentification | None  # of slow motions, where there were some
     rectangle_ratio: dict[str, float] | None  # deviation with `elastic_structure` over that with `rigid`
 
     def errors(self, kind: str) -> np.ndarray:
@@ -59,6 +62,7 @@ def study_identification(
     sensors: list[SensorPlace],
     gear_parts: bool = True,
     progress: Callable[[float], None] | None = None,
+    slow: SlowIdentification | None = None,
 ) -> IdentifyStudy:
     """Identifies a robot; without the rectangle.
 
@@ -70,6 +74,7 @@ def study_identification(
         sensors: in the order of their readings.
         gear_parts: whether gears may have play, hysteresis and ripple.
         progress: is called now and then with the share that is done, 0 to 1.
+        slow: what slow motions have said before, for the study to keep.
 
     Raises:
         RecordingError: if the recording cannot be used.
@@ -80,7 +85,7 @@ def study_identification(
     parameters = found_parameters(robot, found.fit, plant)
     identified = identified_robot(robot, found.fit)
     seconds = time.perf_counter() - started
-    return IdentifyStudy(robot, plant, payload, found, parameters, identified, seconds, None)
+    return IdentifyStudy(robot, plant, payload, found, parameters, identified, seconds, slow, None)
 
 
 def with_rectangle(
@@ -136,6 +141,8 @@ def identify_json(study: IdentifyStudy) -> dict[str, Any]:
             errors = np.abs(study.errors(kind))
             numbers[f"worst_{label}_error"] = float(errors.max()) if len(errors) else None
             numbers[f"median_{label}_error"] = float(np.median(errors)) if len(errors) else None
+    if study.slow is not None:
+        numbers["slow_motion"] = slow_json(study.slow)
     if study.rectangle_ratio is not None:
         numbers["rectangle_ratio"] = study.rectangle_ratio
     return numbers

@@ -57,7 +57,7 @@ def found_parameters(robot: RobotModel, fit: ArmFit, plant: RobotModel | None = 
         rows.append(
             FoundParameter(
                 spring.name,
-                "N m^2" if "beam" in spring.name else "N m / rad",
+                "Nm^2" if "beam" in spring.name else "Nm/rad",
                 value,
                 value * relative,
                 relative < STIFFNESS_KNOWN,
@@ -65,7 +65,7 @@ def found_parameters(robot: RobotModel, fit: ArmFit, plant: RobotModel | None = 
             )
         )
     rows += _times(fit, true)
-    for kind, unit, size in (("play", "rad", PLAY), ("hysteresis", "of the spring", 1.0)):
+    for kind, unit, size in (("play", "rad", PLAY), ("hysteresis", "share", 1.0)):
         for joint, place in enumerate(parameters.of_kind(kind)):
             value, sigma = size * float(fit.values[place]), size * float(fit.sigma[place])
             of_plant = None if true is None else float(getattr(true, kind)[joint])

@@ -8,11 +8,18 @@ import pytest
 from typer.testing import Result
 
 from experiments.identify.recording_file import Recording, read_recording, write_recording
+from experiments.identify.slow import identify_slow_recording, slow_json, with_slow_motion
 from robots.description.model import load_robot
 from robots.identification.motion import SensorPlace
 from robots.identification.recording import RecordedCase
 from tests.experiments.browser import open_page
 from tests.experiments.commands import files, refusal, truetip
+from tests.robots.identification.test_slow_motion import (
+    BELIEVED_LOAD,
+    PRELOAD,
+    TRUE_LOAD,
+    slow_motion,
+)
 
 GYRO = SensorPlace("hand", "gyro", "link_5", np.array([0.1, 0.0, 0.0]), np.eye(3), 200.0, 2e-3)
 ROWS = 80
@@ -90,12 +97,49 @@ def test_wrong_column_maps_are_refused(tmp_path: Path):
     assert "has no body 'link_9'" in refusal(run(tmp_path, f"--recording={path}"))
 
 
+def test_slow_motions_of_a_recording_give_load_spring_and_friction(tmp_path: Path):
+    robot = load_robot("kr210")
+    motion = slow_motion(robot)
+    time = motion.period * np.arange(len(motion.theta))
+    cases = [
+        RecordedCase(
+            name,
+            time[rows],
+            motion.theta[rows],
+            motion.rate[rows],
+            motion.torque[rows],
+            time[rows],
+            np.zeros((len(time[rows]), 0, 3)),
+        )
+        for name, rows in (("before the rest", slice(0, 700)), ("behind it", slice(760, None)))
+    ]
+    path = tmp_path / "slow.csv"
+    write_recording(path, Recording(BELIEVED_LOAD, cases, []))
+    found = identify_slow_recording(path, robot)
+    assert found.payload == pytest.approx(TRUE_LOAD, rel=0.01)
+    better = with_slow_motion(robot, found)
+    assert better.counterbalance is not None
+    assert better.counterbalance.preload == pytest.approx(PRELOAD, rel=0.02)
+    assert better.joints[0].drive_train.friction is not None
+    assert slow_json(found)["friction"][0][0]["kind"] == "Stribeck"
+
+
+def test_slow_motions_without_torques_are_refused(tmp_path: Path):
+    path = resting(tmp_path)
+    text = path.with_suffix(".yaml").read_text().splitlines()
+    kept = [line for line in text if not line.startswith("torque")]
+    path.with_suffix(".yaml").write_text("\n".join(kept))
+    result = run(tmp_path, f"--recording={path}", f"--slow={path}")
+    assert "slow motions need the torques of the motors" in refusal(result)
+
+
 REFUSED = {
     "robot": (["--robot=kr211"], "robot 'kr211': no file"),
     "plant": (["--robot=irb140"], "robot 'irb140-realistic': no file"),
     "recording": (["--recording=none.csv"], "column map none.yaml"),
     "both": (["--recording=none.csv", "--cases=mine.yaml"], "takes no --cases"),
     "columns": (["--columns=mine.yaml"], "--columns says what a --recording has"),
+    "slow": (["--slow=slow.csv"], "--slow says more of what was recorded"),
     "cases": (["--cases=mine.yaml"], "cases mine.yaml"),
     "report": (["--report=identify.txt"], "its name must end in .html"),
     "jobs": (["--jobs=0"], "--jobs must be at least 1, got 0"),

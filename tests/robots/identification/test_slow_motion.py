@@ -34,6 +34,10 @@ def robot() -> RobotModel:
 
 @pytest.fixture(scope="module")
 def motion(robot: RobotModel) -> SlowMotion:
+    return slow_motion(robot)
+
+
+def slow_motion(robot: RobotModel) -> SlowMotion:
     """Sines of different periods, and a rest in which the motors hold any torque."""
     t = PERIOD * np.arange(1500)
     middle = np.deg2rad([0.0, -70.0, 30.0, 20.0, 40.0, 0.0])
