@@ -160,6 +160,11 @@ def _contradiction(scenario: Scenario) -> tuple[list[str | int], str] | None:
     for name, value in (("kind", scenario.station.kind), ("interface", scenario.station.interface)):
         if value in LINK_NAMES and value != link:
             return ["station", name], f"station.{name}={value} contradicts station.link, which is {link}"
+    if scenario.station.overview.enabled and scenario.station.kind != "simulated":
+        return ["station", "kind"], (
+            f"station.overview.enabled needs station.kind=simulated, got {scenario.station.kind}: nothing "
+            "brings whole images from a real station yet, and nobody would be seen"
+        )
     try:
         scenario.station.link.check()
     except ValueError as error:

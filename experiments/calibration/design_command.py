@@ -22,6 +22,7 @@ from experiments.report.plot_page import Section, write_plot_page
 from experiments.report.robot_plot import joints_figure, tips_figure
 from robots.description.model import RobotModel, load_robot
 from robots.measurement_design.candidate_grid import AxisRange, own_ranges
+from robots.measurement_design.clear_ways import ClearWays
 from robots.measurement_design.constraints import AdmissibleConfig, AdmissibleConfigurations, View
 from robots.measurement_design.criteria import NAMES
 from robots.measurement_design.design import MeasurementDesign, design_measurements
@@ -140,12 +141,31 @@ def design_command(
         }
         if table:
             write_text(table, configuration_text(design))
-        written = run.write(run_stage, design.configurations, position_only)
+        vias: list[np.ndarray] = []
+        if program and not anywhere:
+            free = AdmissibleConfig(obstacles=config.obstacles)
+            vias = _ways(model, free, design.configurations)
+            result["ways_with_via_points"] = sum(len(via) > 0 for via in vias)
+        written = run.write(run_stage, design.configurations, position_only, vias)
         output.write(result)
         write_design_page(page, model, design)
     human.print(escape(design_verdict(design)))
     human.print(f"{seconds:.1f} s, {result['peak_mb']:.0f} MB beside the program itself")
     print_files(human, report, out, *written)
+
+
+def _ways(robot: RobotModel, config: AdmissibleConfig, q: np.ndarray) -> list[np.ndarray]:
+    """The via points to each configuration (n, 6) in rad, from all joints at zero if the robot can be there.
+
+    Raises:
+        ValueError: if there is no way to one.
+    """
+    check = AdmissibleConfigurations(robot, config)
+    start = np.zeros((1, q.shape[1]))
+    ways = ClearWays(robot, check, config.clearance)
+    if check(start).all():
+        return ways.through(np.vstack([start, q]))
+    return [np.zeros_like(start[:0]), *ways.through(q)]
 
 
 def _place(text: str) -> tuple[float, float, float]:

@@ -1,6 +1,7 @@
 """``truetip design --program``: the measurement run as a robot program, and the table that it will fill."""
 
 import re
+from collections.abc import Sequence
 from contextlib import ExitStack
 from pathlib import Path
 
@@ -46,11 +47,17 @@ class ProgramFiles:
         """The folder to write to. Raises OSError."""
         return None if self._language is None else stack.enter_context(staged_folder(self._folder))
 
-    def write(self, stage: Path | None, q: np.ndarray, position_only: bool) -> list[Path]:
-        """Writes program and table for configurations (n, 6) in rad; gives where they will be."""
+    def write(
+        self, stage: Path | None, q: np.ndarray, position_only: bool, vias: Sequence[np.ndarray] = ()
+    ) -> list[Path]:
+        """Writes program and table for configurations (n, 6) in rad; gives where they will be.
+
+        ``vias`` are points on the way to each in rad, (k, 6); without them all ways are straight.
+        """
         if stage is None:
             return []
-        files = self._files(MeasurementRun(q, self._settle, self._trigger, self._name), position_only)
+        run = MeasurementRun(q, self._settle, self._trigger, self._name, tuple(vias))
+        files = self._files(run, position_only)
         for name, text in files.items():
             write_text(stage / name, text)
         return [self._folder / name for name in files]

@@ -23,13 +23,22 @@ class MeasurementRun:
     settle: float = 0.5  # s before the trigger
     trigger: str = ""  # digital output: a name in RAPID, a number in KRL; empty for the default
     name: str = "measure"  # of the module and of the files that it writes
+    # via points on the way to each configuration in rad, (k, 6) each; empty: all ways are straight
+    vias: tuple[np.ndarray, ...] = ()
 
     def __post_init__(self) -> None:
         """Checks the numbers. Raises ValueError."""
         if self.q.ndim != 2 or self.q.shape[1:] != (6,) or not np.isfinite(self.q).all():
             raise ValueError(f"a measurement run takes joint positions (n, 6), got {self.q.shape}")
+        if self.vias and len(self.vias) != len(self.q):
+            raise ValueError(f"{len(self.q)} configurations need as many ways, got {len(self.vias)}")
         if not 0.0 <= self.settle <= 60.0:
             raise ValueError(f"the settling time must be between 0 and 60 s, got {self.settle:g} s")
+
+    @property
+    def ways(self) -> list[np.ndarray]:
+        """The via points to each configuration in rad, (k, 6) each."""
+        return list(self.vias) or [np.zeros((0, 6))] * len(self.q)
 
 
 def rapid_run(run: MeasurementRun) -> dict[str, str]:
@@ -48,12 +57,16 @@ def rapid_run(run: MeasurementRun) -> dict[str, str]:
     ]
     for number, q in enumerate(np.rad2deg(run.q), 1):
         lines.append(f"    CONST jointtarget m{number} := [[{_numbers(q)}],{_EXTERNAL}];")
+    for number, way in enumerate(run.ways, 1):
+        for k, q in enumerate(np.rad2deg(way), 1):
+            lines.append(f"    CONST jointtarget v{number}_{k} := [[{_numbers(q)}],{_EXTERNAL}];")
     lines += [
         f"    PROC {run.name}_run()",
         f'        Open "HOME:"\\File:="{run.name}_joints.csv", table\\Write;',
         f'        Write table, "{head}";',
     ]
-    for number in range(1, len(run.q) + 1):
+    for number, way in enumerate(run.ways, 1):
+        lines += [f"        MoveAbsJ v{number}_{k}, v200, z10, tool0;" for k in range(1, len(way) + 1)]
         lines += [f"        MoveAbsJ m{number}, v200, fine, tool0;", "        take;"]
     lines += [
         "        Close table;",
@@ -75,15 +88,16 @@ def krl_run(run: MeasurementRun) -> dict[str, str]:
     output = run.trigger or "1"
     if not output.isdigit():
         raise ValueError(f"the trigger must be the number of a digital output in KRL, got '{run.trigger}'")
-    count = len(run.q)
+    count, has_vias = len(run.q), any(len(way) for way in run.ways)
     source = [
         f"DEF {run.name}()",
         f"; Measurement run of {count} configurations: move, settle, pulse output {output}, note the joints.",
         f"; The joint positions stand in Q[] of {run.name}.dat afterwards.",
-        "DECL INT i",
+        "DECL INT i,k" if has_vias else "DECL INT i",
         "BAS(#INITMOV,0)",
         "BAS(#VEL_PTP,20)",
         f"FOR i=1 TO {count}",
+        *(["  FOR k=F[i] TO F[i+1]-1", "    PTP V[k]", "  ENDFOR"] if has_vias else []),
         "  PTP M[i]",
         f"  WAIT SEC {run.settle:g}",
         f"  PULSE($OUT[{output}],TRUE,{_PULSE:g})",
@@ -94,9 +108,13 @@ def krl_run(run: MeasurementRun) -> dict[str, str]:
         "",
     ]
     data = [f"DEFDAT {run.name}", f"DECL E6AXIS Q[{count}]", f"DECL E6AXIS M[{count}]"]
-    for number, q in enumerate(np.rad2deg(run.q), 1):
-        axes = ",".join(f"A{joint} {_number(value)}" for joint, value in enumerate(q, 1))
-        data.append(f"M[{number}]={{{axes},E1 0.0,E2 0.0,E3 0.0,E4 0.0,E5 0.0,E6 0.0}}")
+    vias = np.concatenate(run.ways)
+    if has_vias:  # those to configuration i stand from F[i] on
+        data += [f"DECL E6AXIS V[{len(vias)}]", f"DECL INT F[{count + 1}]"]
+        first = 1 + np.cumsum([0, *(len(way) for way in run.ways)])
+        data += [f"F[{number}]={k}" for number, k in enumerate(first, 1)]
+    for name, rows in (("M", run.q), ("V", vias)):
+        data += [f"{name}[{number}]={_axes(q)}" for number, q in enumerate(np.rad2deg(rows), 1)]
     return {f"{run.name}.src": "\n".join(source), f"{run.name}.dat": "\n".join([*data, "ENDDAT", ""])}
 
 
@@ -110,6 +128,12 @@ def table_to_fill(run: MeasurementRun, position_only: bool = False) -> str:
 
 
 RUNS = {"rapid": rapid_run, "krl": krl_run}
+
+
+def _axes(q: np.ndarray) -> str:
+    """Joint positions in degrees as KRL writes them."""
+    axes = ",".join(f"A{joint} {_number(value)}" for joint, value in enumerate(q, 1))
+    return f"{{{axes},E1 0.0,E2 0.0,E3 0.0,E4 0.0,E5 0.0,E6 0.0}}"
 
 
 def _numbers(values: np.ndarray) -> str:

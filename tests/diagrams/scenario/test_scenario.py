@@ -231,6 +231,12 @@ def test_numbers_that_contradict_each_other_are_both_named(tmp_path: Path):
     assert refusal(name) == f"scenario {name}, line 3: {message}"
 
 
+def test_people_are_not_looked_for_where_no_images_come_from():
+    message = "station.overview.enabled needs station.kind=simulated, got egm"
+    with pytest.raises(ScenarioError, match=message):
+        load_scenario("watched", ["station.kind=egm"])
+
+
 def test_events_are_written_as_they_are_read(tmp_path: Path):
     text = "[!PayloadChange {at: 8, payload: 7}, !ToolShift {at: 9, shift_mm: [0.5, 0, 0]}]"
     scenario = load_scenario("misaligned", [f"station.events={text}"])

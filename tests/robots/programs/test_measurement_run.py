@@ -37,6 +37,22 @@ def test_after_every_move_the_robot_settles_before_the_trigger_and_notes_its_joi
     assert "FOR i=1 TO 7" in source
 
 
+def test_via_points_stand_before_the_moves_that_they_belong_to():
+    none = np.zeros((0, 6))
+    ways = (none, Q[4:6], *[none] * 4, Q[:1])
+    (module,) = rapid_run(MeasurementRun(Q, vias=ways)).values()
+    moves = re.findall(r"MoveAbsJ (\w+), v200, (\w+), tool0;", module)
+    between = [("v2_1", "z10"), ("v2_2", "z10")], [("v7_1", "z10")]
+    stops = [(f"m{k}", "fine") for k in range(1, 8)]
+    assert moves == [stops[0], *between[0], *stops[1:6], *between[1], stops[6]]
+    files = krl_run(MeasurementRun(Q, vias=ways))
+    first = [int(k) for k in re.findall(r"^F\[\d+\]=(\d+)$", files["measure.dat"], re.MULTILINE)]
+    assert first == [1, 1, 3, 3, 3, 3, 3, 4]
+    assert files["measure.dat"].count("V[") == 1 + 3
+    source = files["measure.src"]
+    assert source.index("PTP V[k]") < source.index("PTP M[i]")
+
+
 @pytest.mark.parametrize("position_only", [False, True])
 def test_the_table_is_refused_while_it_is_empty_and_read_when_it_is_filled(position_only: bool):
     text = table_to_fill(MeasurementRun(Q), position_only)
@@ -56,6 +72,7 @@ def test_the_table_is_refused_while_it_is_empty_and_read_when_it_is_filled(posit
         (rapid_run, {"trigger": "1"}, "name of a digital output in RAPID"),
         (krl_run, {"trigger": "doTrigger"}, "number of a digital output in KRL"),
         (rapid_run, {"settle": -1.0}, "between 0 and 60 s, got -1 s"),
+        (krl_run, {"vias": (Q[:1],)}, "7 configurations need as many ways, got 1"),
     ],
 )
 def test_what_no_controller_could_run_is_refused(make, changes: dict, message: str):
