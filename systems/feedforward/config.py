@@ -10,8 +10,8 @@ from systems.feedforward.prefilter import PrefilterConfig
 class CorrectionConfig:
     """How the joints make up for a structure that yields."""
 
-    # Geometric: with axes 1 to 3 and for the position of the tip alone
-    method: str = choice("least_squares", ("least_squares", "geometric"))
+    # Geometric and direct: with axes 1 to 3, for the position of the tip alone; direct is exact, not damped
+    method: str = choice("least_squares", ("least_squares", "geometric", "direct"))
     limit_deg: float = quantity(3.0, 0.0, 90.0, "deg", is_open=True)  # of each joint's correction
 
 

@@ -48,6 +48,21 @@ def test_geometry_puts_back_the_position_alone():
     assert not turn[3:].any()
 
 
+def test_the_direct_solution_puts_back_the_position_exactly_in_one_tick():
+    turn, error = corrected("direct", WORKING, 1)
+    assert np.linalg.norm(error[3:]) < 1e-10
+    assert np.abs(turn[:3]).max() > 1e-4
+    assert not turn[3:].any()
+
+
+def test_where_there_is_no_direct_solution_the_last_one_stays():
+    """A metre beyond the reach."""
+    model, last = CORRECTIONS["direct"](ROBOT, ARM), np.array([1e-3, 2e-3, -1e-3, 0.0, 0.0, 0.0])
+    far = ARM.pose(stretched(ROBOT), np.zeros(ARM.size)).copy()
+    far[:, 3] *= 1.5
+    np.testing.assert_array_equal(model.correction(stretched(ROBOT), DEFLECTION, far, last), last)
+
+
 @pytest.mark.parametrize("method", CORRECTIONS)
 @pytest.mark.parametrize(
     "q", [stretched(ROBOT), UPRIGHT, OVER_AXIS_1], ids=["stretched", "upright", "wrist over axis 1"]

@@ -145,7 +145,7 @@ def test_the_correction_of_a_joint_is_limited():
     [
         (
             CorrectionConfig("newton"),
-            "correction.method must be one of least_squares, geometric, got 'newton'",
+            "correction.method must be one of least_squares, geometric, direct, got 'newton'",
         ),
         (CorrectionConfig(limit_deg=0.0), "correction.limit_deg must be positive, got 0.0 deg"),
     ],
