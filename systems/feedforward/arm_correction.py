@@ -143,8 +143,8 @@ class DirectCorrection:
     """Axes 1, 2 and 3 put the tip exactly in its place, without damping; Reiner (2010) section 3.6.1.
 
     The equations of the deformed arm, solved by Newton's method from the last correction. Where there is no
-    solution, or only one that turns a joint far, the last correction stays, and jumps when there is one again. The
-    orientation is left as it is.
+    solution, or only one that turns a joint far, the last correction stays, and it jumps when there is one
+    again: for paths that keep away from such poses. The orientation is left as it is.
     """
 
     def __init__(self, robot: RobotModel, arm: DeformedArm) -> None:
