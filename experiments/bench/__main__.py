@@ -27,6 +27,7 @@ from experiments.bench.cameras import cameras
 from experiments.bench.exact import EXACT
 from experiments.bench.feedforward import feedforward
 from experiments.bench.images import images
+from experiments.bench.learning import learning
 from experiments.bench.tracking import tracking
 from experiments.bench.wire import wire
 from experiments.comparison.compare import compared_laws
@@ -99,6 +100,7 @@ def benchmarks() -> Iterator[Row]:
     yield from tracking()
     yield from images()
     yield from cameras()
+    yield from learning()
     for law in compared_laws():
         yield convergence(law, robot)
 
