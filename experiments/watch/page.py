@@ -31,7 +31,12 @@ def write_run_page(
         ground: what stands in the cell.
     """
     sections = [
-        Section("Distance and speed", "Distances in m; the speed is that of the path.", _timeline(run), 520),
+        Section(
+            "Distance and speed",
+            "Distances in m, held from image to image; the speed is that of the path.",
+            _timeline(run),
+            520,
+        ),
         Section(
             "Plan of the cell",
             "The way of the nearest person, and the zones about the base.",
@@ -87,7 +92,11 @@ def run_verdict(run: WatchRun) -> str:
     """A run in a sentence or two."""
     numbers = run.as_dict()
     nearest = numbers["smallest_distance_m"]
-    seen = "nobody was seen" if nearest is None else f"the nearest was seen {nearest:.2f} m from the robot"
+    seen = (
+        "nobody was seen"
+        if nearest is None
+        else f"the nearest was seen {max(nearest, 0.0):.2f} m from the robot"
+    )
     return (
         f"In {numbers['duration_s']:.1f} s {seen}; {numbers['stops']} stops, "
         f"slowed for {numbers['slowed_s']:.1f} s, "
@@ -133,7 +142,14 @@ def _timeline(run: WatchRun) -> go.Figure:
     return figure.update_layout(
         xaxis={"title": "time in s"},
         yaxis={"title": "m", "rangemode": "tozero"},
-        yaxis2={"title": "share of the speed", "overlaying": "y", "side": "right", "range": [0, 1.05]},
+        yaxis2={
+            "title": "share of the speed",
+            "overlaying": "y",
+            "side": "right",
+            "range": [0, 1.05],
+            "tickmode": "linear",
+            "dtick": 0.2,
+        },
         legend={"orientation": "h", "y": 1.1},
     )
 
