@@ -23,7 +23,7 @@ from experiments.identify.simulated import places, simulated
 from experiments.identify.slow import identify_slow_recording, with_slow_motion
 from experiments.identify.study import IdentifyStudy, identify_json, study_identification, with_rectangle
 from experiments.report.files import write_text
-from robots.description.model import RobotModel, load_robot
+from robots.description.model import RobotFileError, RobotModel, load_robot
 from robots.description.robot_file import robot_text
 
 
@@ -124,7 +124,15 @@ def identify_command(
 def _plant(robot: str, plant: str | None, is_recorded: bool) -> RobotModel | None:
     if plant is not None:
         return load_robot(plant)
-    return None if is_recorded else realistic_robot(robot)
+    if is_recorded:
+        return None
+    try:
+        return realistic_robot(robot)
+    except RobotFileError as error:
+        raise RobotFileError(
+            f"robot '{robot}' has no variant named {robot}-realistic: say what moves by --plant NAME|FILE, "
+            "or give a --recording"
+        ) from error
 
 
 def _simulated(

@@ -135,7 +135,7 @@ def test_slow_motions_without_torques_are_refused(tmp_path: Path):
 
 REFUSED = {
     "robot": (["--robot=kr211"], "robot 'kr211': no file"),
-    "plant": (["--robot=irb140"], "robot 'irb140-realistic': no file"),
+    "plant": (["--robot=irb140"], "has no variant named irb140-realistic: say what moves by --plant"),
     "recording": (["--recording=none.csv"], "column map none.yaml"),
     "both": (["--recording=none.csv", "--cases=mine.yaml"], "takes no --cases"),
     "columns": (["--columns=mine.yaml"], "--columns says what a --recording has"),
