@@ -12,6 +12,7 @@ from robots.planning.limits import MotionLimits, motion_limits
 from robots.planning.optimum import optimum
 from robots.planning.path_dynamics import PathDynamics
 from robots.planning.rigid_start import quickest_rigid, rigid_start
+from robots.planning.time_spline import TimeSpline, at_rest
 from robots.planning.use import energy, use_of
 
 ANGLE = np.deg2rad(40.0)
@@ -74,6 +75,24 @@ def test_with_limited_torque_alone_it_comes_near_bang_bang(robot):
     assert s[len(s) // 2] == pytest.approx(0.5, abs=0.01)
     found = optimum(dynamics, kept, rigid_start(robot, 16.0, dynamics.path, kept, 46), smoother=_ROUGH)
     assert wanted < found.motion.duration < wanted * 1.03
+
+
+@pytest.mark.parametrize("recuperation", [False, True])
+def test_more_time_takes_less_energy(robot, recuperation):
+    dynamics, kept = axis_1(robot), motion_limits(robot)
+    start = rigid_start(robot, 16.0, dynamics.path, kept, 30)
+    works = []
+    for share in (1.1, 1.5, 2.0):
+        found = optimum(dynamics, kept, start, "energy", recuperation, share * start.duration)
+        demand = dynamics.demand(found.motion.rates(found.motion.times))
+        works.append(energy(demand, found.motion.times, recuperation))
+        assert found.motion.duration == pytest.approx(share * start.duration)
+    assert works[0] > works[1] > works[2] > 0.0
+
+
+def test_the_least_energy_needs_a_duration(robot):
+    with pytest.raises(ValueError, match="needs a duration"):
+        optimum(axis_1(robot), motion_limits(robot), TimeSpline(at_rest(30), 1.0), "energy")
 
 
 @pytest.mark.slow
