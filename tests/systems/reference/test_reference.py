@@ -101,7 +101,7 @@ def test_another_time_after_ticks_is_as_quick(monkeypatch):
     asked.clear()
     delay = 0.0353
     moments = [path.moment(0.004 * tick + delay, delay) for tick in range(100)]
-    assert len(asked) == 1
+    assert len(asked) <= 2
     np.testing.assert_allclose(
         [moment.X_WE for moment in moments],
         reference.path.sample(0.004 * np.arange(100) + delay)[0][:, :3],
