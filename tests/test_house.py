@@ -25,7 +25,7 @@ DATA_FILES = sorted(
     path
     for floor in FLOORS
     for path in (ROOT / floor).rglob("*.*")
-    if path.suffix in {".yaml", ".yml", ".html", ".css", ".js"}
+    if path.suffix in {".yaml", ".yml", ".html", ".css", ".js", ".typed"}
 )
 FOLDERS = sorted({path.parent for path in [*SOURCES, *TESTS, *DATA_FILES]})
 ROOT_FILES = [path for path in ROOT.iterdir() if path.suffix in {".md", ".toml"} or path.name == "Makefile"]
@@ -150,6 +150,18 @@ def test_the_wheel_holds_every_source_and_data_file(tmp_path: Path):
     (wheel,) = tmp_path.glob("truetip-*.whl")
     members = {m for m in zipfile.ZipFile(wheel).namelist() if ".dist-info/" not in m}
     assert members == {name(path) for path in [*SOURCES, *DATA_FILES]}
+    # What is installed works from any directory, here beside the packages that this environment has.
+    installed, elsewhere = tmp_path / "installed", tmp_path / "elsewhere"
+    zipfile.ZipFile(wheel).extractall(installed)
+    elsewhere.mkdir()
+    code = "import experiments.main as m, sys; print(m.__file__); sys.argv[1:] = ['scenarios']; m.main()"
+    environment = {**os.environ, "PYTHONPATH": str(installed)}
+    command = [sys.executable, "-c", code]
+    run = subprocess.run(command, cwd=elsewhere, env=environment, capture_output=True, text=True)
+    assert run.returncode == 0, run.stderr
+    assert run.stdout.startswith(str(installed))
+    assert "misaligned" in run.stdout
+    assert not list(elsewhere.iterdir())
 
 
 def test_the_changelog_has_an_entry_for_this_version():

@@ -14,7 +14,12 @@ from robots.calibration.identification import IdentificationConfig
 from robots.calibration.identified import Identified
 from robots.calibration.measurements import MeasurementNoise, Measurements
 from robots.calibration.solver.problem import COMPLIANCE_NAMES
-from robots.calibration.validation import ErrorStatistics, prediction_errors, statistics
+from robots.calibration.validation import (
+    ErrorStatistics,
+    plausible_rows,
+    prediction_errors,
+    statistics,
+)
 from robots.description.model import NUM_JOINTS, RobotModel
 from robots.kinematics.error_kinematics import ErrorKinematics
 from robots.kinematics.forward import Kinematics
@@ -150,6 +155,35 @@ def validated(
     return statistics(
         prediction_errors(robot, measurements.without_rotation() if position_only else measurements)
     )
+
+
+@dataclass(frozen=True)
+class Validation:
+    """What fresh configurations say of a calibrated robot."""
+
+    measurements: Measurements | None  # those without gross errors; None without a table
+    left_out: tuple[int, ...]  # the numbers of the other rows
+    before: ErrorStatistics | None  # of the nominal robot
+    after: ErrorStatistics | None
+
+
+def validate(identified: Identified, calibrated: RobotModel, fresh: Measurements | None) -> Validation:
+    """Compares nominal and calibrated robot at configurations that were not used to identify it.
+
+    Raises:
+        ValueError: if the calibrated robot is worse there.
+    """
+    position_only = identified.measurements.rotation is None
+    left_out: tuple[int, ...] = ()
+    if fresh is not None:
+        fresh = fresh.without_rotation() if position_only else fresh
+        plausible = plausible_rows(identified, fresh)
+        left_out = tuple(map(int, fresh.rows[~plausible]))
+        fresh = fresh.select(plausible)
+    before = validated(identified.robot, fresh, position_only)
+    after = validated(calibrated, fresh, position_only)
+    refuse_the_harmful(before, after)
+    return Validation(fresh, left_out, before, after)
 
 
 def refuse_the_harmful(before: ErrorStatistics | None, after: ErrorStatistics | None) -> None:

@@ -18,8 +18,8 @@ from experiments.calibration.calibrate import (
     identification_config,
     measure_sets,
     path_runs,
-    refuse_the_harmful,
     true_values,
+    validate,
     validated,
     validation_configurations,
 )
@@ -39,7 +39,6 @@ from experiments.report.files import write_text
 from robots.calibration.identification import identify
 from robots.calibration.instruments.observation_file import names_targets
 from robots.calibration.measurement_file import RowProblem, measurement_text, read_measurements
-from robots.calibration.validation import plausible_rows
 from robots.description.joint_errors import names_of
 from robots.description.robot_file import robot_text
 from robots.description.urdf import urdf_text
@@ -283,28 +282,20 @@ def _study(prepared: Prepared, wanted: _Wanted, measured: _Measured) -> Calibrat
     if wanted.compliance:
         rigid = identify(robot, table, replace(config, compliance=False)).calibrated_robot()
     is_simulated = measured.design is not None
-    validation, bad = sets.validation, ()
-    if validation is not None:
-        validation = validation.without_rotation() if position_only else validation
-        plausible = plausible_rows(identified, validation)
-        bad = tuple(map(int, validation.rows[~plausible]))
-        validation = validation.select(plausible)
-    before = validated(identified.robot, validation, position_only)
-    after = validated(calibrated, validation, position_only)
-    refuse_the_harmful(before, after)
+    checked = validate(identified, calibrated, sets.validation)
     return CalibrationStudy(
         nominal=identified.robot,
         calibrated=calibrated,
         design=measured.design,
         design_seconds=measured.design_seconds,
-        sets=replace(sets, validation=validation),
+        sets=replace(sets, validation=checked.measurements),
         identified=identified,
         truth=true_values(prepared.scenario, robot, identified) if is_simulated else None,
-        before=before,
-        after=after,
-        geometry_only=validated(rigid, validation, position_only) if rigid else None,
+        before=checked.before,
+        after=checked.after,
+        geometry_only=validated(rigid, checked.measurements, position_only) if rigid else None,
         after_noise_free=validated(calibrated, sets.validation_truth, position_only),
-        validation_outliers=bad,
+        validation_outliers=checked.left_out,
     )
 
 

@@ -7,8 +7,8 @@ import pytest
 
 from experiments.main import app
 from experiments.manual.commands import commands
+from tests.experiments.cli.wrong_inputs import FILES, REFUSED
 from tests.experiments.commands import files, refusal, truetip
-from tests.experiments.wrong_inputs import FILES, REFUSED
 
 COMMANDS = dict(commands(app))
 

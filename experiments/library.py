@@ -1,0 +1,196 @@
+"""What the commands do, for Python: arrays and tables in place of files, and nothing on the console."""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+from diagrams.record.log import RunLog
+from diagrams.runs.simulation import run
+from diagrams.scenario.scenario import Scenario, load_scenario
+from experiments.calibration.calibrate import validate
+from experiments.cli.workers import Executor
+from experiments.comparison.compare import compare as run_laws
+from experiments.comparison.compare import compared_laws
+from experiments.metrics.run_metrics import best_law, judged_by, summary
+from experiments.report.report import verdict
+from robots.calibration.identification import IdentificationConfig, identify
+from robots.calibration.identified import Identified
+from robots.calibration.measurements import Measurements
+from robots.calibration.validation import ErrorStatistics
+from robots.description.model import RobotModel, load_robot
+from robots.measurement_design.design import MeasurementDesign, design_measurements
+from systems.servo import LAWS
+
+Progress = Callable[[float], None]
+
+
+@dataclass(frozen=True)
+class Comparison:
+    """Laws on one scenario.
+
+    Attributes:
+        scenario: what was done.
+        logs: law -> one log per cycle; errors are those of the first cycle.
+    """
+
+    scenario: Scenario
+    logs: Mapping[str, Sequence[RunLog]]
+
+    @cached_property
+    def summary(self) -> dict[str, Any]:
+        """All numbers, as in ``summary.json``: lengths in mm, angles in degrees."""
+        return summary(self.scenario.description, self.logs)
+
+    @property
+    def judged_by(self) -> str:
+        """``"true"``, or ``"measured"`` where nobody knows the truth."""
+        return judged_by(self.summary)
+
+    @property
+    def best(self) -> str:
+        """The law whose largest distance is smallest; the open loop only if it is alone."""
+        return best_law(self.summary)
+
+    @property
+    def verdict(self) -> str:
+        """The result in one or two sentences."""
+        return verdict(self.summary)
+
+    def figure(self, name: str) -> dict[str, float]:
+        """One number of each law.
+
+        Args:
+            name: ``"max_norm_mm"``, ``"rms_norm_mm"`` or ``"max_angle_deg"``.
+
+        Raises:
+            KeyError: if there is no such number.
+        """
+        return {law: each[self.judged_by][name] for law, each in self.summary["runs"].items()}
+
+
+@dataclass(frozen=True)
+class Calibration:
+    """A robot as it was found, and what fresh measurements say of it.
+
+    Attributes:
+        robot: the calibrated robot, for the controller and for `robots.description.robot_file.robot_text`.
+        identified: parameters, covariance, residuals, rows left out.
+        before: errors of the nominal robot at the fresh configurations; None without any.
+        after: those of the calibrated one.
+    """
+
+    robot: RobotModel
+    identified: Identified
+    before: ErrorStatistics | None
+    after: ErrorStatistics | None
+
+
+def simulate(
+    scenario: Scenario | str,
+    law: str | None = None,
+    robot: RobotModel | str | None = None,
+    seed: int | None = None,
+    progress: Progress | None = None,
+) -> RunLog:
+    """Runs one law once.
+
+    Args:
+        scenario: a scenario, a shipped one's name, or the path of a file.
+        law: a shipped law's name or ``FILE.py:CLASS``; None for the scenario's.
+        robot: as the controller knows it; a robot, a shipped one's name or the path of a file. None for the
+            scenario's.
+        seed: of the camera's noise; None for the scenario's.
+        progress: is called now and then with the share that is done, 0 to 1.
+
+    Returns:
+        Times, poses (desired, true, measured), joints and commands, n samples each.
+
+    Raises:
+        ValueError: if something is missing, unknown, out of range or out of reach; one line.
+        RuntimeError: if the integration fails.
+    """
+    scenario = _scenario(scenario)
+    known = None if robot is None else _robot(robot)
+    return run(scenario, law or scenario.law, known, seed, progress)
+
+
+def compare(
+    scenario: Scenario | str,
+    laws: Sequence[str] | None = None,
+    robot: RobotModel | str | None = None,
+    cycles: int = 1,
+    executor: Executor | None = None,
+    progress: Progress | None = None,
+) -> Comparison:
+    """Runs laws side by side, one process per core unless an executor is given.
+
+    In a script it belongs below ``if __name__ == "__main__":``, because the processes import it.
+
+    Args:
+        scenario: as of `simulate`.
+        laws: by name; None for the open loop and the three that Probst (2024) compares.
+        robot: as of `simulate`.
+        cycles: runs of each law, with the scenario's seed and the ones after it.
+        executor: where they run, such as ``LocalProcesses(1)`` of `experiments.cli.workers`.
+        progress: as of `simulate`.
+
+    Raises:
+        ValueError: as of `simulate`, and if there are no cycles or a law is named twice.
+        experiments.cli.workers.SimulationError: if a run broke off.
+    """
+    scenario = _scenario(scenario)
+    chosen = list(laws) if laws is not None else compared_laws()
+    if cycles < 1 or not chosen or len(set(chosen)) < len(chosen):
+        raise ValueError(f"compare: needs laws that differ and at least one cycle, got {chosen} and {cycles}")
+    for law in chosen:
+        LAWS.find(law)
+    known = _robot(scenario.robot if robot is None else robot)
+    return Comparison(scenario, run_laws(scenario, known, chosen, cycles, executor, progress))
+
+
+def design(robot: RobotModel | str, count: int = 75, **options: Any) -> MeasurementDesign:
+    """Chooses the configurations at which measurements determine a robot's errors best.
+
+    Args:
+        robot: the nominal robot, a shipped one's name or the path of a file.
+        count: how many configurations.
+        options: as of `robots.measurement_design.design.design_measurements`.
+
+    Raises:
+        ValueError: if the count is too small to see all parameters, or too few candidates are admissible.
+    """
+    return design_measurements(_robot(robot), count, **options)
+
+
+def calibrate(
+    robot: RobotModel | str,
+    measurements: Measurements,
+    fresh: Measurements | None = None,
+    config: IdentificationConfig | None = None,
+) -> Calibration:
+    """Finds the errors of a robot, and tries the calibrated one at configurations that it has not seen.
+
+    Args:
+        robot: the nominal robot, a shipped one's name or the path of a file.
+        measurements: such as `robots.calibration.measurement_file.read_measurements` reads.
+        fresh: further ones for validation.
+        config: what to identify; geometry alone unless it says more.
+
+    Raises:
+        ValueError: if the measurements are too few or too alike, nothing explains them, or the calibrated
+            robot is worse at the fresh configurations; one line.
+    """
+    model = _robot(robot)
+    identified = identify(model, measurements, config)
+    calibrated = identified.calibrated_robot(robot if isinstance(robot, str) else model.name)
+    checked = validate(identified, calibrated, fresh)
+    return Calibration(calibrated, identified, checked.before, checked.after)
+
+
+def _scenario(scenario: Scenario | str) -> Scenario:
+    return load_scenario(scenario) if isinstance(scenario, str) else scenario
+
+
+def _robot(robot: RobotModel | str) -> RobotModel:
+    return load_robot(robot) if isinstance(robot, str) else robot
