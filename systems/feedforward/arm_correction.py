@@ -72,15 +72,16 @@ class LeastSquaresCorrection:
 
     Axes 1 and 3 have a damping of their own, by how far the wrist is from axis 1 and by how far the elbow is
     bent. Robots move their wrist past axis 1 and stretch their arm, and what these levers ask for when they
-    are short would turn about within a few ticks. Damping begins where the wrist is still far from axis 1: a
-    correction that fades out within some hundredths of a second shakes the arm more than it helps.
+    are short would turn about within a few ticks. A correction that fades out within some hundredths of a
+    second still shakes the arm: where a fast motion takes the wrist past axis 1, none at all may ring less.
+    To fade out further from that axis costs the motions beside it more.
     """
 
     def __init__(self, robot: RobotModel, arm: DeformedArm) -> None:
         """Sets the weights by the size of the robot."""
         self._arm, self._reach = arm, reach(robot)
         self._damping = SigmoidDamping(0.04, 1e-5, (0.012, 0.045))
-        self._shoulder_damping = SigmoidDamping(1.0, 1e-5, (0.3, 0.8))
+        self._shoulder_damping = SigmoidDamping(0.15, 1e-5, (0.14, 0.5))
         self._elbow_damping = SigmoidDamping(0.05, 1e-5, (0.15, 0.5))
         self._weights = np.repeat([_ROTATION_WEIGHT, 1.0 / self._reach], 3)
 
