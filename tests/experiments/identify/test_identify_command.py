@@ -10,6 +10,7 @@ from typer.testing import Result
 from experiments.identify.recording_file import Recording, read_recording, write_recording
 from experiments.identify.slow import identify_slow_recording, slow_json, with_slow_motion
 from robots.description.model import load_robot
+from robots.identification.identified_robot import STIFFNESS_KNOWN
 from robots.identification.motion import SensorPlace
 from robots.identification.recording import RecordedCase
 from tests.experiments.browser import open_page
@@ -181,7 +182,8 @@ def test_springs_that_are_a_fifth_softer_than_believed_are_found(tmp_path: Path)
     for name in ("stiffness_gear_1", "stiffness_gear_2", "stiffness_gear_3", "stiffness_beam_2_y"):
         found = numbers["parameters"][name]
         assert abs(found["value"] / found["true"] - 1.0) < 0.03, name
-    assert numbers["worst_stiffness_error"] < 0.03
+    # Three standard deviations of what is called known.
+    assert numbers["worst_stiffness_error"] < 3.0 * STIFFNESS_KNOWN
     assert load_robot(str(robot)).joints[1].drive_train.stiffness == pytest.approx(
         0.8 * base.joints[1].drive_train.stiffness, rel=0.03
     )
