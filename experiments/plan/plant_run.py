@@ -10,9 +10,9 @@ from experiments.feedforward.trial import RINGING, SETTLE, WristWatch, at_rest, 
 from experiments.plan.timings import Timing, held
 from robots.description.model import NUM_JOINTS, RobotModel
 from robots.dynamics.plant import add_robot
+from robots.planning.limit_use import Use, energy, use_of
 from robots.planning.limits import MotionLimits
 from robots.planning.path_dynamics import Demand, PathDynamics
-from robots.planning.use import Use, energy, use_of
 
 
 @dataclass(frozen=True)

@@ -8,7 +8,7 @@ from plotly.subplots import make_subplots
 
 from experiments.plan.study import LegResult, Plan, plan_json
 from experiments.report.plot_page import Section, html_table, write_plot_page
-from robots.planning.use import BINDING, Use
+from robots.planning.limit_use import BINDING, Use
 
 TABLE_HEAD = ("leg", "s", "usual", "%", "J", "usual", "%", "C", "usual", "limits")
 _PLANNED, _USUAL = "#0f7cc0", "#c0392b"

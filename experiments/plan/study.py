@@ -15,12 +15,12 @@ from experiments.plan.within_limits import Kept, kept_in_plant
 from robots.description.model import RobotModel
 from robots.planning.jerk_profile import best_jerk_profile
 from robots.planning.joint_path import PathError
+from robots.planning.limit_use import energy, require_standing
 from robots.planning.limits import MotionLimits
 from robots.planning.optimum import ITERATIONS, Optimum, optimum
 from robots.planning.path_dynamics import PathDynamics
 from robots.planning.rigid_start import rigid_start
 from robots.planning.time_spline import TimeSpline, fitted
-from robots.planning.use import energy, require_standing
 
 OBJECTIVES = ("time", "energy", "front")
 COEFFICIENTS = 36  # of the spline: about one for each tick of some 12 ms of a quick motion

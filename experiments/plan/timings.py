@@ -6,9 +6,9 @@ from typing import Protocol
 import numpy as np
 
 from robots.planning.joint_path import PathError
+from robots.planning.limit_use import use_of
 from robots.planning.limits import MotionLimits
 from robots.planning.path_dynamics import ORDERS, PathDynamics
-from robots.planning.use import use_of
 from systems.reference.timing import SineSquaredProfile
 
 _SAMPLES = 200

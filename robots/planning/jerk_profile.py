@@ -10,9 +10,9 @@ import numpy as np
 import ruckig
 from scipy.optimize import minimize_scalar
 
+from robots.planning.limit_use import use_of
 from robots.planning.limits import MotionLimits
 from robots.planning.path_dynamics import PathDynamics
-from robots.planning.use import use_of
 
 _SAMPLES = 160
 _RATIOS = np.geomspace(8.0, 200.0, 6)  # jerk over acceleration, in 1/s

@@ -7,11 +7,11 @@ import numpy as np
 
 from robots.description.model import NUM_JOINTS
 from robots.planning.joint_path import PathError
+from robots.planning.limit_use import OVER_TIME, energy
 from robots.planning.limits import MotionLimits
 from robots.planning.path_dynamics import ORDERS, PathDynamics
 from robots.planning.spline_program import PointProgram, Solution, solve
 from robots.planning.time_spline import AT_REST, TimeSpline, at_rest, bases, points, weights
-from robots.planning.use import OVER_TIME, energy
 
 OBJECTIVES = ("time", "energy")
 ITERATIONS = 60  # of IPOPT, at most

@@ -8,12 +8,12 @@ import pytest
 from robots.description.model import load_robot
 from robots.planning.jerk_profile import JerkProfile, best_jerk_profile
 from robots.planning.joint_path import straight_joint_path
+from robots.planning.limit_use import energy, use_of
 from robots.planning.limits import MotionLimits, motion_limits
 from robots.planning.optimum import optimum
 from robots.planning.path_dynamics import PathDynamics
 from robots.planning.rigid_start import quickest_rigid, rigid_start
 from robots.planning.time_spline import TimeSpline, at_rest
-from robots.planning.use import energy, use_of
 
 ANGLE = np.deg2rad(40.0)
 FREE = np.full(6, np.inf)

@@ -11,10 +11,10 @@ from pydrake.multibody.tree import MultibodyForces_
 from robots.description.model import load_robot
 from robots.dynamics.plant import add_robot
 from robots.planning.joint_path import PathError, smooth_curve, straight_joint_path
+from robots.planning.limit_use import require_standing
 from robots.planning.limits import motion_limits
 from robots.planning.path_dynamics import PathDynamics
 from robots.planning.time_spline import TimeSpline, at_rest
-from robots.planning.use import require_standing
 
 PAYLOAD = 16.0
 START, GOAL = (
