@@ -78,11 +78,13 @@ def test_a_structure_in_the_model_takes_what_elastic_joints_leave():
     assert gaps["elastic_structure"] < 0.1 * gaps["flexible_joint"] < 0.1 * gaps["rigid"]
 
 
+@pytest.mark.slow
 def test_the_geometric_correction_keeps_the_position_nearly_as_well():
     settings = ["servo.feedforward.kind=elastic_structure", "servo.feedforward.correction.method=geometric"]
     assert largest_gap_mm(*settings) < 0.1
 
 
+@pytest.mark.slow
 def test_behind_a_prefilter_the_tip_is_on_its_path_late_by_the_delay():
     """Previewed by that delay it is on time, but for what a filter smooths away."""
     config = PrefilterConfig("bessel", 4, 40.0)

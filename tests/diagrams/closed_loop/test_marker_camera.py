@@ -23,6 +23,7 @@ def log(kind: str, settings: list[str], seed: int = 0) -> RunLog:
     return run(scenario, "numerical_ik", seed=seed)
 
 
+@pytest.mark.slow
 def test_a_misaligned_robot_comes_to_rest_where_it_should():
     """The requirement with 0.1 px of noise is 0.05 mm and 0.02 degrees; the open loop is 30 mm off."""
     errors = error_metrics(log("features", SETTLED), "true")

@@ -45,7 +45,7 @@ def largest_and_static(log, e: np.ndarray) -> tuple[float, float]:
     ("law", "settings"),
     [
         ("numerical_ik", []),
-        ("pbvs", ["reference.override=[{at: 2.2, share: 0.7}]"]),
+        pytest.param("pbvs", ["reference.override=[{at: 2.2, share: 0.7}]"], marks=pytest.mark.slow),
         pytest.param("position_level", [], marks=pytest.mark.slow),
         pytest.param("open_loop", [], marks=pytest.mark.slow),
     ],
@@ -78,6 +78,7 @@ def test_loss_doubling_overtaking_and_jitter_cost_nothing_at_rest_and_are_all_co
     assert counters["undecodable"] == counters["foreign"] == 0
 
 
+@pytest.mark.slow
 def test_garbage_and_strangers_change_nothing():
     """The same run with and without them, tick by tick: the robot does not notice."""
     faults = ["station.faults.garbage=0.3", "station.faults.wrong_sender=0.3"]
@@ -98,7 +99,7 @@ def motion(wire: Lockstep) -> tuple[np.ndarray, np.ndarray]:
     return velocity, np.diff(velocity, axis=0) / PERIOD
 
 
-@pytest.mark.parametrize("fault", ["stall_at=5", "stop_at=5"])
+@pytest.mark.parametrize("fault", ["stall_at=5", pytest.param("stop_at=5", marks=pytest.mark.slow)])
 def test_when_the_controller_goes_the_run_ends_and_the_robot_stops_smoothly(fault: str):
     record, _, wire = guided(quick(f"station.faults.{fault}"))
     assert (
@@ -117,7 +118,7 @@ def test_when_the_controller_goes_the_run_ends_and_the_robot_stops_smoothly(faul
     ("fault", "law"),
     [
         ("stop_at=5", "numerical_ik"),
-        ("stall_at=5", "pbvs"),
+        pytest.param("stall_at=5", "pbvs", marks=pytest.mark.slow),
         pytest.param("stall_at=5", "numerical_ik", marks=pytest.mark.slow),
         pytest.param("stop_at=5", "pbvs", marks=pytest.mark.slow),
     ],
@@ -135,6 +136,7 @@ def test_a_run_may_go_on_where_it_was_interrupted(fault: str, law: str):
     assert np.abs(acceleration[SETTLED:]).max() < HARSH
 
 
+@pytest.mark.slow
 def test_a_controller_that_does_not_come_back_ends_the_run():
     link = ("resume_within=1", "run.restart_after=-1")
     settings = ["station.faults.stop_at=5", "servo.guard.resume=true"]
@@ -157,6 +159,7 @@ def test_a_station_that_is_not_there_or_another_one_is_named_before_anything_mov
         )
 
 
+@pytest.mark.slow
 def test_the_guard_of_the_simulation_is_the_guard_of_the_wire():
     record, _, _ = guided(quick("servo.guard.speed_share=0.02"))
     assert record.log.guard_counts["velocity_limit"] > 100

@@ -1,6 +1,7 @@
 """Analytic inverse kinematics: round trips with the forward kinematics, turns, limits, reach, structure."""
 
 from collections.abc import Callable
+from functools import cache
 from itertools import product
 
 import numpy as np
@@ -102,12 +103,17 @@ def test_nearest_is_the_nearest_of_all_branches_and_turns():
         assert np.linalg.norm(inverse.nearest(X, q_near) - q_near) == pytest.approx(shortest, abs=1e-9)
 
 
+@cache
+def with_tool_solved() -> tuple[RobotModel, Kinematics, InverseKinematics]:
+    robot = with_base_and_tool()
+    return robot, Kinematics(robot), InverseKinematics(robot)
+
+
 @given(st.lists(st.floats(0.0, 1.0), min_size=6, max_size=6))
 def test_nearest_reproduces_every_pose_within_the_limits_singular_or_not(shares: list[float]):
-    robot = with_base_and_tool()
+    robot, kinematics, inverse = with_tool_solved()
     q = robot.lower + np.array(shares) * (robot.upper - robot.lower)
-    kinematics = Kinematics(robot)
-    found = InverseKinematics(robot).nearest(kinematics.forward(q), q)
+    found = inverse.nearest(kinematics.forward(q), q)
     assert np.all((found >= robot.lower) & (found <= robot.upper))
     # An angle beyond its limit by less than 1e-9 rad is put on it.
     assert kinematics.forward(found) == pytest.approx(kinematics.forward(q), abs=3e-9)

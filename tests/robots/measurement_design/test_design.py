@@ -81,7 +81,7 @@ def test_a_gradient_bounds_its_criterion_everywhere(name: str, seed: int):
         assert np.sum((M @ root) * root) == pytest.approx(goal.value(M), rel=1e-6)
 
 
-@pytest.mark.parametrize("name", ["d", "i"])
+@pytest.mark.parametrize("name", ["d", pytest.param("i", marks=pytest.mark.slow)])
 def test_other_criteria_come_close_to_their_bounds_too(name: str):
     design = design_measurements(ROBOT, 40, name, ranges=COARSE)
     assert 0.97 * design.bound < design.value <= design.bound
@@ -93,6 +93,7 @@ def test_a_position_only_design_sees_what_positions_can_show():
     assert 0.95 * design.bound < design.value <= design.bound
 
 
+@pytest.mark.slow
 def test_no_direction_is_lost_on_the_way():
     """On the full grid one candidate may serve one parameter alone; dropped, the rest would see nothing."""
     design = design_measurements(ROBOT, 40, position_only=True)
