@@ -139,7 +139,7 @@ class Experiment:
             if until is None:
                 self._advance_to_path_end(ticks, progress)
             else:
-                self._advance(until, ticks, progress)
+                self._advance(until, ticks, progress and (lambda: progress(self.context.get_time() / until)))
         finally:
             if collecting:
                 gc.enable()
@@ -148,16 +148,20 @@ class Experiment:
     def _advance_to_path_end(self, ticks: int, progress: Callable[[float], None] | None) -> None:
         """Advances until the time on the path is over, or has not gone on for long."""
         end, moved_at = self.path.duration, 0.0
+
+        def report() -> None:
+            if progress:
+                progress(min(1.0, self.servo.path_time(self.context) / end))
+
         remaining = end - self.servo.path_time(self.context)
         while remaining > 1e-9 and self.context.get_time() < moved_at + _LONGEST_HOLD:
-            self._advance(
-                self.context.get_time() + max(remaining, self.scenario.station.period), ticks, progress
-            )
+            wait = max(remaining, self.scenario.station.period)
+            self._advance(self.context.get_time() + wait, ticks, report)
             last, remaining = remaining, end - self.servo.path_time(self.context)
             if remaining < last:
                 moved_at = self.context.get_time()
 
-    def _advance(self, end: float, ticks: int, progress: Callable[[float], None] | None) -> None:
+    def _advance(self, end: float, ticks: int, report: Callable[[], None] | None) -> None:
         done = round(self.context.get_time() / self.scenario.station.period)
         while self.context.get_time() < end:
             done += ticks
@@ -165,8 +169,8 @@ class Experiment:
             prediction = predicted_tip(self.servo, self.context)
             if prediction is not None:
                 self._predictions.append(prediction)
-            if progress:
-                progress(min(1.0, self.servo.path_time(self.context) / self.path.duration))
+            if report:
+                report()
 
     def watched(self) -> tuple[np.ndarray, dict[str, np.ndarray]]:
         """What the separation monitor said, and the joints: times (n,) in s, and values (n, size) by port."""

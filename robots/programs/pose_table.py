@@ -135,7 +135,8 @@ def _literal(start: int, text: str, unit: float, separator: str) -> Literal | No
 
 def _fields(text: str, start: int, separator: str) -> list[tuple[int, str]]:
     """Fields of a line with the character at which each begins; quotes hold separators."""
-    pattern = re.compile(rf'\s*"(?:[^"]|"")*"\s*|[^{re.escape(separator)}]*')
+    # Blanks beside quotes, but no tab: that may be the separator.
+    pattern = re.compile(rf' *"(?:[^"]|"")*" *|[^{re.escape(separator)}]*')
     fields, at = [], 0
     while True:
         match = pattern.match(text, at)

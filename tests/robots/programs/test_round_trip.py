@@ -79,3 +79,11 @@ def test_anything_is_read_or_refused_in_words(name: str):
         assert edited(program.text, []) == damaged
 
     check()
+
+
+def test_a_quoted_name_may_end_before_or_with_a_tab_between_tabs():
+    header = "\t".join(["name", "x_mm", "y_mm", "z_mm", "qw", "qx", "qy", "qz"])
+    for name in ('"p"', '"p\t"'):
+        text = f"{header}\n{name}\t1\t2\t3\t1\t0\t0\t0"
+        (target,) = parse_program(Source("m.csv", text)).targets
+        assert [number.value for number in target.numbers[:3]] == [1.0, 2.0, 3.0]
