@@ -30,8 +30,8 @@ class IntegratorConfig:
 
     # Or any name of Drake's GetIntegrationSchemes
     scheme: str = choice("auto", lambda: ("auto", *GetIntegrationSchemes()))
-    accuracy: float | None = quantity(None, 1e-12, 1e-1)
-    max_step: float | None = quantity(None, 1e-6, 0.1, "s")
+    accuracy: float | None = quantity(None, 1e-12, 1e-1)  # relative, of each step; empty: chosen
+    max_step: float | None = quantity(None, 1e-6, 0.1, "s")  # the largest step; empty: chosen
 
 
 @dataclass(frozen=True)

@@ -39,7 +39,7 @@ class Mismatch:
     stiffness: float = quantity(0.0, 0.0, 0.9)  # of every spring: gears, bearings, beams
     payload: float = quantity(0.0, 0.0, 0.9)  # of its mass
     friction: float = quantity(0.0, 0.0, 0.9)  # of every joint
-    seed: int = quantity(0, 0, 2**32 - 1)
+    seed: int = quantity(0, 0, 2**32 - 1)  # of the random draw
 
 
 @dataclass
@@ -47,9 +47,9 @@ class ControllerModelConfig:
     """What the controller believes, as a scenario says it; what is left empty is as in the station."""
 
     robot: str = ""  # a shipped robot or the path of a robot file
-    payload: float | None = quantity(None, 0.0, 1000.0, "kg")
+    payload: float | None = quantity(None, 0.0, 1000.0, "kg")  # at the flange
     payload_centre_mm: list[float] = numbers((), (0, 3), unit="mm")  # three, in the frame of the flange
-    camera_delay: float | None = quantity(None, 0.0, 1.0, "s")
+    camera_delay: float | None = quantity(None, 0.0, 1.0, "s")  # from an exposure to the arrival of its pose
     command_delay: float | None = quantity(None, 0.0, 1.0, "s")  # transport and dead time
     stiffness: list[float] = numbers((), (0, 1, 6), 0.01, 100.0)  # of the gears: one factor, or six
     structure: float | None = quantity(None, 0.01, 100.0)  # one factor of all bearings and beams

@@ -39,7 +39,7 @@ class Variation:
 
     stiffness: float = quantity(0.0, 0.0, 0.9)  # of each gear, bearing and beam
     friction: float = quantity(0.0, 0.0, 0.9)  # viscous and Coulomb, of each joint
-    seed: int = quantity(0, 0, 2**32 - 1)
+    seed: int = quantity(0, 0, 2**32 - 1)  # of the random draw
 
 
 @dataclass
@@ -58,9 +58,11 @@ class StationConfig:
     encoder: EncoderConfig = field(default_factory=EncoderConfig)
     errors: GeometricErrors = field(default_factory=GeometricErrors)
     drive: DriveConfig = field(default_factory=DriveConfig)
+    # What gives the poses of the tool: a whole camera system, or poses with noise
     camera: CameraConfig = field(default_factory=PoseCameraConfig)
     # From command to drives: direct, or as the controller of ``link`` plans
     interface: str = choice("direct", ("direct", *LINK_NAMES))
+    # How a real or virtual controller is reached: ABB's EGM or KUKA's RSI
     link: RobotLinkConfig = field(default_factory=default_link)
     faults: FaultConfig = field(default_factory=FaultConfig)
     events: list[StationEvent] = field(default_factory=list)  # of runs along a path
@@ -83,7 +85,7 @@ class ServoConfig:
 class Scenario:
     """Everything that an experiment needs to know."""
 
-    description: str = ""
+    description: str = ""  # one line, for lists and reports
     robot: str = "irb1200"  # a shipped robot or the path of a robot file
     law: str = "numerical_ik"  # the law that `truetip run` runs
     seed: int = quantity(0, 0, 2**32 - 1)  # of the camera's noise

@@ -40,7 +40,7 @@ class Beam:
     stiffness: np.ndarray = field(default_factory=lambda: np.zeros(3))
     retardation_time: float = 0.0  # s, damping over stiffness of every hinge
     degrees_of_freedom: int = 5  # or 3
-    source: str = ""
+    source: str = ""  # where the numbers come from, or ``assumed``
 
 
 @dataclass(frozen=True)

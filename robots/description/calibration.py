@@ -22,13 +22,13 @@ class Calibration:
 
     of: str = ""  # the robot that was calibrated: what stood in its scenario
     compliance: list[float] = numbers([0.0] * _JOINTS, (_JOINTS,), unit="rad / (N m)")  # of gravity
-    source: str = ""
+    source: str = ""  # the measurement; empty for a nominal robot
     names: list[str] = field(default_factory=list)  # of all parameters that were estimated
     values: list[float] = field(default_factory=list)  # m, rad, rad / (N m)
     covariance: list[list[float]] = field(default_factory=list)  # lower triangle, row by row
     # World of the robot in the frame of the instrument, where the base is displaced: m and degrees
     frame_translation: list[float] = numbers([0.0] * 3, (3,), unit="m")
-    frame_zyx_deg: list[float] = numbers([0.0] * 3, (3,), unit="deg")
+    frame_zyx_deg: list[float] = numbers([0.0] * 3, (3,), unit="deg")  # of that world: alpha, beta, gamma
     joint_errors: dict[str, float] = field(default_factory=dict)  # as `robots.description.joint_errors`
 
     @property

@@ -21,7 +21,7 @@ class CounterbalanceSpring:
     damping: float = 0.0  # N s / m
     base_pivot: np.ndarray = field(default_factory=lambda: np.zeros(3))  # m, in the frame of link 1
     arm_pivot: np.ndarray = field(default_factory=lambda: np.zeros(3))  # m, in the frame of link 2
-    source: str = ""
+    source: str = ""  # where the numbers come from, or ``assumed``
 
     def about_axis(self, axis: np.ndarray, X_1S: RigidTransform) -> Counterbalance:
         """The torque that the spring of a rigid robot exerts about axis 2.

@@ -128,7 +128,7 @@ class FourierRatio:
 
     amplitudes: list[float] = field(default_factory=list)  # rad, by which the output is off
     per_motor_turn: list[float] = field(default_factory=list)  # how often in a turn of the motor
-    phases_deg: list[float] = field(default_factory=list)
+    phases_deg: list[float] = field(default_factory=list)  # of each sine, at joint angle 0
 
     def part(self, ratio: float) -> RatioSeries:
         """The series of a gear with a mean ratio. Raises ValueError if its numbers are impossible."""

@@ -40,7 +40,7 @@ class DriveTrain:
     says is on the side of the link and comes on top of them.
     """
 
-    ratio: float = 1.0
+    ratio: float = 1.0  # turns of the motor per turn of the joint
     rotor_inertia: float = 0.0  # kg m^2, about the motor's axis
     stiffness: float = 0.0  # N m / rad, joint side, at rest
     stiffening: Stiffening | Cubic | Exponential | Limited | None = None  # under load
@@ -49,12 +49,13 @@ class DriveTrain:
     coulomb_friction: float = 0.0  # N m, motor side
     coulomb_velocity: float = 0.01  # rad/s on the joint side, width of the tanh transition
     motor_lag: float = 0.0  # s, T of Reiner (2010) eq. (2.2)
+    # Of the joint, on the side of the link, on top of the coefficients of the motor side
     friction: Sigmoid | Tanh | Stribeck | Polynomial | StickSlip | None = None
-    ratio_error: FourierRatio | None = None
-    efficiency: Efficiency | None = None
-    backlash: Backlash | ViscoElastic | None = None
-    hysteresis: Dahl | None = None
-    source: str = ""
+    ratio_error: FourierRatio | None = None  # the gear runs unevenly; left out: evenly
+    efficiency: Efficiency | None = None  # losses in proportion to the load; left out: none
+    backlash: Backlash | ViscoElastic | None = None  # a gap, or its visco-elastic substitute; left out: none
+    hysteresis: Dahl | None = None  # the torque depends on past deflections; left out: no
+    source: str = ""  # where the numbers come from, or ``assumed``
 
     @property
     def has_parts(self) -> bool:
@@ -109,7 +110,7 @@ class DriveLimits:
     continuous_torque: float | None = positive(None, "N m")
     gear_torque: float | None = positive(None, "N m")  # joint side, that the gear carries
     gear_torque_rate: float | None = positive(None, "N m/s")  # joint side: jolts wear gears
-    source: str = ""
+    source: str = ""  # where the numbers come from, or ``assumed``
 
 
 def drive_trains(trains: Sequence[DriveTrain]) -> DriveTrains | None:

@@ -23,7 +23,7 @@ from robots.description.model import NUM_JOINTS, RobotModel
 class RandomErrors:
     """Errors drawn uniformly within bounds, the same ones for the same seed; zero bounds draw none."""
 
-    seed: int = 0
+    seed: int = 0  # of the random draw
     translation_mm: float = 0.0  # largest translation, of a frame or the tool, along each axis
     rotation_deg: float = 0.0  # largest rotation, of a joint, body or the tool, about each axis
 
@@ -54,12 +54,17 @@ class GeometricErrors:
     joint's own axis must be zero, because that is the joint's offset. Random errors come on top.
     """
 
+    # True angle minus measured one, six
     joint_offset_deg: np.ndarray = field(default_factory=lambda: np.zeros(NUM_JOINTS))
+    # Added to the tool's, along the axes of the flange
     tool_translation_mm: np.ndarray = field(default_factory=lambda: np.zeros(3))
+    # Alpha, beta, gamma, added to the tool's
     tool_zyx_deg: np.ndarray = field(default_factory=lambda: np.zeros(3))
+    # Displacements along the axes of the parent, by frame: pl_I0 the base, pl_01 to pl_56 the joints
     frame_translation_mm: dict[str, np.ndarray] = field(
         default_factory=lambda: {f"pl_{frame}": np.zeros(3) for frame in FRAMES[:TOOL]}
     )
+    # Small turns about x, y and z, by body: body_0 the base, body_1 to body_6 the links
     body_rotation_deg: dict[str, np.ndarray] = field(
         default_factory=lambda: {f"body_{body}": np.zeros(3) for body in range(TOOL)}
     )

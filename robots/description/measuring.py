@@ -11,9 +11,9 @@ _JOINTS = 6
 class MeasuringRange:
     """Where the joints stand when the robot is measured; empty lists for their whole ranges."""
 
-    lower_deg: list[float] = numbers((), (0, _JOINTS), unit="deg")
-    upper_deg: list[float] = numbers((), (0, _JOINTS), unit="deg")
-    source: str = ""
+    lower_deg: list[float] = numbers((), (0, _JOINTS), unit="deg")  # six; empty: the limits of the joints
+    upper_deg: list[float] = numbers((), (0, _JOINTS), unit="deg")  # six; empty: the limits of the joints
+    source: str = ""  # where the numbers come from, or ``assumed``
 
     def problem(self) -> str:
         """Why there are no such ranges, or an empty string."""

@@ -45,10 +45,10 @@ class RobotFileError(ConfigurationError):
 class JointLimits:
     """Range, largest speed and largest acceleration of one joint."""
 
-    lower_deg: float = 0.0
-    upper_deg: float = 0.0
-    speed_deg_s: float = positive(0.0, "deg/s")
-    source: str = ""
+    lower_deg: float = 0.0  # smallest angle
+    upper_deg: float = 0.0  # largest angle
+    speed_deg_s: float = positive(0.0, "deg/s")  # largest speed, in both directions
+    source: str = ""  # where the numbers come from, or ``assumed``
     # Of a command; 0 where it is not known: the largest speed is then reached within `SPEED_UP`
     acceleration_deg_s2: float = quantity(0.0, 0.0, unit="deg/s^2")
     jerk_deg_s3: float = quantity(0.0, 0.0, unit="deg/s^3")  # of a planned motion; 0 for no limit
@@ -62,9 +62,9 @@ class Tilting:
     they are z and x.
     """
 
-    stiffness: list[float] = numbers((), (2,), 0.0, unit="N m / rad", is_open=True)
-    damping: list[float] = numbers((), (2,), 0.0, unit="N m s / rad")
-    source: str = ""
+    stiffness: list[float] = numbers((), (2,), 0.0, unit="N m / rad", is_open=True)  # of the two springs
+    damping: list[float] = numbers((), (2,), 0.0, unit="N m s / rad")  # of the two springs
+    source: str = ""  # where the numbers come from, or ``assumed``
 
 
 @dataclass
@@ -74,27 +74,28 @@ class Joint:
     Without ``drive_limits`` only its speed and its acceleration limit a planned motion.
     """
 
+    # Its direction in the link's frame
     axis: np.ndarray = field(default_factory=lambda: np.array([0.0, 0.0, 1.0]))
     placement: Placement = field(default_factory=Placement)
     limits: JointLimits = field(default_factory=JointLimits)
     drive_train: DriveTrain = field(default_factory=DriveTrain)
-    tilting: Tilting | None = None
-    drive_limits: DriveLimits | None = None
+    tilting: Tilting | None = None  # how the bearing yields; left out: stiff
+    drive_limits: DriveLimits | None = None  # of motor and gear, for planned motions
 
 
 @dataclass
 class Link:
     """A body, rigid without a ``beam``; its inertia is that about the centre of mass."""
 
-    mass: float = positive(0.0, "kg")
+    mass: float = positive(0.0, "kg")  # of the link alone
     inertia: np.ndarray = field(default_factory=lambda: np.zeros(3))  # kg m^2, about x, y, z
     products: np.ndarray = field(default_factory=lambda: np.zeros(3))  # kg m^2, entries xy, xz, yz
-    source: str = ""
+    source: str = ""  # where mass and inertia come from, or ``assumed``
     center_of_mass: np.ndarray = field(default_factory=lambda: np.zeros(3))  # m, in the link frame
-    center_of_mass_source: str = ""
+    center_of_mass_source: str = ""  # where it comes from, or ``assumed``
     radius: float = positive(0.05, "m")  # of the capsules that picture the link
-    radius_source: str = ""
-    beam: Beam | None = None
+    radius_source: str = ""  # where the radius comes from, or ``assumed``
+    beam: Beam | None = None  # how the link bends and twists; left out: rigid
     pictures: list[Picture] = field(default_factory=list)  # in place of the capsule
 
     @property
@@ -111,27 +112,28 @@ class PayloadLimits:
     The inertia of a smaller payload is taken in proportion to its mass.
     """
 
-    largest_mass: float = quantity(0.0, 0.0, unit="kg")
+    largest_mass: float = quantity(0.0, 0.0, unit="kg")  # that the robot may carry at its flange
     inertia: np.ndarray = field(default_factory=lambda: np.zeros(3))  # kg m^2, about its centre
-    source: str = ""
+    source: str = ""  # where mass and inertia come from, or ``assumed``
     center_of_mass: np.ndarray = field(default_factory=lambda: np.zeros(3))  # m, in the flange frame
-    center_of_mass_source: str = ""
+    center_of_mass_source: str = ""  # where it comes from, or ``assumed``
 
 
 @dataclass
 class RobotModel:
     """A six-axis serial robot. Load one with `load_robot`."""
 
-    name: str = ""
+    name: str = ""  # as reports call the robot
     base: Placement = field(default_factory=Placement)
-    joints: list[Joint] = field(default_factory=list)
+    joints: list[Joint] = field(default_factory=list)  # six, from the base to the flange
     tool: Placement = field(default_factory=Placement)
     base_link: Link = field(default_factory=Link)
-    links: list[Link] = field(default_factory=list)
+    links: list[Link] = field(default_factory=list)  # six; each is moved by the joint of its number
     payload: PayloadLimits = field(default_factory=PayloadLimits)
     home_deg: list[float] = numbers((), (0, NUM_JOINTS), unit="deg")  # where it works best; empty: found
     measuring: MeasuringRange = field(default_factory=MeasuringRange)
     calibration: Calibration = field(default_factory=Calibration)
+    # A spring that carries the weight of the arm; left out: none
     counterbalance: CounterbalanceSpring | None = None
 
     @property

@@ -15,9 +15,11 @@ SHAPES = {"mesh": 3, "box": 3, "cylinder": 2, "sphere": 1}  # and how many numbe
 class Placement:
     """A frame in its parent: translation in m, ZYX Euler angles (alpha, beta, gamma) in degrees."""
 
+    # m, of the origin, along the axes of the parent
     translation: np.ndarray = field(default_factory=lambda: np.zeros(3))
+    # Alpha, beta, gamma: turned about z, then the new y, then the new x
     zyx_deg: np.ndarray = field(default_factory=lambda: np.zeros(3))
-    source: str = ""
+    source: str = ""  # where the numbers come from, or ``assumed``
 
     def pose(self) -> RigidTransform:
         """The placement as a transform, child in parent."""
@@ -29,7 +31,7 @@ class Placement:
 class Picture:
     """A shape that a viewer shows for a link, in place of a capsule."""
 
-    shape: str = choice("mesh", SHAPES)
+    shape: str = choice("mesh", SHAPES)  # what is drawn
     file: str = ""  # of a mesh: .obj, .gltf, .glb, .dae or .stl
     # m: edges of a box, radius and length of a cylinder, radius of a sphere; factors of a mesh along x, y, z
     size: list[float] = numbers([1.0, 1.0, 1.0], (1, 2, 3))

@@ -19,7 +19,7 @@ class Stiffening:
     gamma: float = 0.0  # 1 / rad^2, of an exponential spring 1 / rad
     c_max: float = 0.0  # N m / rad
     sharpness: float = 0.0  # rad / (N m)
-    source: str = ""
+    source: str = ""  # where the numbers come from, or ``assumed``
 
     def scaled(self, factor: float) -> "Stiffening":
         """For a gear ``factor`` times as stiff at every deflection, see `GearSpring.scaled`."""

@@ -38,7 +38,7 @@ class PiGains:
 class CascadeGains:
     """Position controller around a PI velocity controller, as industrial drives have it."""
 
-    position: float = positive(25.0, "1/s")
+    position: float = positive(25.0, "1/s")  # speed per position error
     velocity: float = positive(100.0, "1/s")  # joint torque per velocity error and joint inertia
     integral: float = quantity(10.0, 0.0, unit="1/s")  # the inverse of the integral action time
 

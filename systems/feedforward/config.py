@@ -20,8 +20,9 @@ class FeedforwardConfig:
     """Which inverse model runs beside the law; read from a scenario file."""
 
     kind: str = "none"  # none, one of `systems.feedforward.FEEDFORWARDS` or FILE.py:CLASS
-    # By which shares stiffness and damping, and masses and inertias, of the model are above the robot's.
+    # By which share stiffness and damping of the model are above the robot's
     stiffness_error: float = quantity(0.0, -0.9, 10.0)
+    # By which share masses and inertias of the model are above the robot's
     inertia_error: float = quantity(0.0, -0.9, 10.0)
     # Of the stable inverse: which point is exact, the tip or where axes 4, 5 and 6 meet
     point: str = choice("tip", ("tip", "wrist"))

@@ -61,7 +61,7 @@ class GuardConfig:
     on_correction_limit: str = choice("limit", ("limit", "stop"))
     # From the path: a sample further away is taken for a false detection
     largest_deviation: float = quantity(0.2, 1e-4, 2.0, "m")
-    largest_deviation_deg: float = quantity(40.0, 0.01, 180.0, "deg")
+    largest_deviation_deg: float = quantity(40.0, 0.01, 180.0, "deg")  # as the distance, of the orientation
 
 
 class CommandGuard(LeafSystem):

@@ -29,6 +29,7 @@ class LinkConfig:
     # With servo.guard.resume, a run goes on if the controller is back within this time; else it ends
     resume_within: float = quantity(10.0, 0.1, 3600.0, "s")
     signal_port: int = quantity(0, 0, 65535)  # of this machine, where test signals arrive; 0 for none
+    # Whether there is a camera server to connect to; without one, no poses arrive
     has_camera: bool = True
     camera: Qualisys = field(default_factory=Qualisys)
     camera_frame: Placement = field(default_factory=Placement)  # of the camera system in the world

@@ -24,15 +24,15 @@ _CLOSED = 1e-9  # m and rad, the ends of a path that is closed are that near to 
 class SpeedOverride:
     """From a time on the path is run at a share of its planned speed: a controller's override."""
 
-    at: float = quantity(0.0, 0.0, 1e6, "s")
-    share: float = quantity(1.0, 0.0, 1.0)
+    at: float = quantity(0.0, 0.0, 1e6, "s")  # since the start of the run
+    share: float = quantity(1.0, 0.0, 1.0)  # of the planned speed, from then on; 0 holds the tool
 
 
 @dataclass
 class ReferenceConfig:
     """Which path the tool shall take, and when; read from a scenario file."""
 
-    path: Shape = field(default_factory=Rectangle)
+    path: Shape = field(default_factory=Rectangle)  # the shape, or a planned motion
     # k_a, peak acceleration in segments (or turns) per s^2
     acceleration: float = quantity(0.7, 1e-3, 100.0, "1/s^2")
     # sine_squared has three continuous derivatives, polynomial five, as an elastic structure needs them
@@ -43,6 +43,7 @@ class ReferenceConfig:
     laps: int = quantity(1, 1, 10000)
     preview: float = quantity(0.0, 0.0, 1.0, "s")  # that the preview ports of the Reference look ahead
     slowing: float = quantity(0.5, 0.05, 10.0, "s")  # from one speed to another
+    # Changes of speed during the run; empty for the planned speed
     override: list[SpeedOverride] = field(default_factory=list)
 
 

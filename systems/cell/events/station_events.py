@@ -51,6 +51,7 @@ class JointZeroShift:
     """Links slip against the encoders of their joints."""
 
     at: float = 0.0  # s
+    # Six, by which the true angles then exceed the measured ones
     shift_deg: np.ndarray = field(default_factory=lambda: np.zeros(NUM_JOINTS))
 
 

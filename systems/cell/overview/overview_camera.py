@@ -25,9 +25,9 @@ class LightConfig:
 
     noise: float = quantity(3.0, 0.0, 100.0)  # of 255, standard deviation of a colour of a pixel
     swing: float = quantity(0.0, 0.0, 0.9)  # share by which the light swings up and down
-    swing_period: float = quantity(60.0, 0.0, unit="s", is_open=True)
+    swing_period: float = quantity(60.0, 0.0, unit="s", is_open=True)  # of one swing up and down
     step: float = quantity(0.0, -0.9, 10.0)  # share by which it changes at ``step_at``
-    step_at: float = quantity(0.0, unit="s")
+    step_at: float = quantity(0.0, unit="s")  # since the start of the run
 
     def gain(self, time: float) -> float:
         """The brightness at a time in s; 1 as it was when the empty cell was learnt."""
@@ -42,7 +42,7 @@ class OverviewConfig:
     enabled: bool = False  # whether the station has them and the robot is slowed for people
     cell: str = "probst"  # the cameras, a shipped cell or a file
     surroundings: str = "probst"  # what stands still about the robot, likewise
-    people: list[PersonConfig] = field(default_factory=list)
+    people: list[PersonConfig] = field(default_factory=list)  # who walks through the cell
     width: int = quantity(640, 64, 8192, "px")  # of a whole image
     period: float = quantity(0.05, 1e-3, 10.0, "s")  # between two sets of images
     delay: float = quantity(0.03, 0.0, 1.0, "s")  # from exposure to arrival

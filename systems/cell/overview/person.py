@@ -25,7 +25,7 @@ class WayPoint:
     """A point of a way, and how long the person stands there."""
 
     place: np.ndarray = vector((0.0, 0.0), unit="m")  # x and y in the world
-    rest: float = quantity(0.0, 0.0, unit="s")
+    rest: float = quantity(0.0, 0.0, unit="s")  # standing there before going on
 
 
 @dataclass
@@ -33,7 +33,7 @@ class PersonConfig:
     """Where a person walks; read from a scenario file."""
 
     way: list[WayPoint] = field(default_factory=list)  # a single point is where the person stands
-    speed: float = quantity(1.2, 0.0, 5.0, "m/s", is_open=True)
+    speed: float = quantity(1.2, 0.0, 5.0, "m/s", is_open=True)  # of walking from point to point
     start: float = quantity(0.0, 0.0, unit="s")  # when it enters the cell at the first point
     facing_deg: float = quantity(0.0, unit="deg")  # where it looks at a single point
 

@@ -41,7 +41,7 @@ class MocapConfig:
 
     body: str = "tool"  # name of the rigid body, as the server knows it
     address: str = "127.0.0.1"  # of the server
-    port: int = PORT
+    port: int = PORT  # of the server; 22223 is the one on which it speaks little-endian
     transport: str = "udp"  # or "tcp"
     udp_port: int = 0  # own port for the frames, for a firewall that wants a certain one; 0: any free one
     component: str = "6DRes"  # or "6D": without the residual

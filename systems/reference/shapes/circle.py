@@ -16,11 +16,11 @@ class Circle:
 
     kind: ClassVar[str] = "circle"
     rests: ClassVar[bool] = False
-    center_mm: np.ndarray = vector((450.0, 0.0, 400.0), unit="mm")
-    radius_mm: float = positive(100.0, "mm")
+    center_mm: np.ndarray = vector((450.0, 0.0, 400.0), unit="mm")  # in the world
+    radius_mm: float = positive(100.0, "mm")  # of the circle
     plane_zyx_deg: np.ndarray = vector((0.0, 0.0, 0.0), unit="deg")  # of the frame of the plane
     zyx_deg: np.ndarray = vector((90.0, 0.0, 90.0), unit="deg")  # of the tool, constant
-    turns: int = quantity(1, 1, 100000)
+    turns: int = quantity(1, 1, 100000)  # without a rest between them
 
     @property
     def length(self) -> float:

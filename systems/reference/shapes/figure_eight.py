@@ -19,12 +19,12 @@ class FigureEight:
 
     kind: ClassVar[str] = "figure_eight"
     rests: ClassVar[bool] = False
-    center_mm: np.ndarray = vector((450.0, 0.0, 400.0), unit="mm")
+    center_mm: np.ndarray = vector((450.0, 0.0, 400.0), unit="mm")  # the crossing, in the world
     length_mm: float = positive(200.0, "mm")  # from end to end, along x of the plane
     width_mm: float = positive(100.0, "mm")  # of one loop, along y of the plane
     plane_zyx_deg: np.ndarray = vector((90.0, 0.0, 0.0), unit="deg")  # of the frame of the plane
     zyx_deg: np.ndarray = vector((90.0, 0.0, 90.0), unit="deg")  # of the tool, constant
-    turns: int = quantity(1, 1, 100000)
+    turns: int = quantity(1, 1, 100000)  # without a rest between them
 
     @property
     def length(self) -> float:

@@ -11,7 +11,7 @@ class Planned:
     """The motion in a file of ``truetip plan --write``; acceleration and timing do not count."""
 
     kind: ClassVar[str] = "planned"
-    file: str = ""
+    file: str = ""  # as ``truetip plan --write`` makes it
 
     def motion(self) -> PlannedMotion:
         """What the file holds. Raises ValueError if there is none, or it is not readable."""

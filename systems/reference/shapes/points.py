@@ -13,7 +13,9 @@ from systems.reference.segment import Segment, line, require_vectors, rotation
 class Waypoint:
     """A pose of the tool in the world: translation in mm, ZYX angles (alpha, beta, gamma) in degrees."""
 
+    # Position of the tool in the world
     translation_mm: np.ndarray = field(default_factory=lambda: np.zeros(3))
+    # Alpha, beta, gamma of the tool in the world
     zyx_deg: np.ndarray = field(default_factory=lambda: np.zeros(3))
 
     def pose(self) -> np.ndarray:
@@ -34,6 +36,7 @@ def rectangle_waypoints() -> list[Waypoint]:
 class _ThroughWaypoints:
     kind: ClassVar[str]
     length: ClassVar[float] = 1.0  # of the parameter on every segment
+    # In the order in which the tool passes them
     waypoints: list[Waypoint] = field(default_factory=rectangle_waypoints)
 
     def segments(self) -> list[Segment]:

@@ -33,6 +33,7 @@ class DetectorConfig:
     robot_margin: float = quantity(0.04, 0.0, 0.5, "m")  # about the robot, in which pixels are unknown
     least_trusted: int = quantity(4, 2, 100)  # cameras; with fewer, nobody can be told to be absent
     tool_length: float = quantity(0.35, 0.0, 5.0, "m")  # of what the flange carries; a marker body, assumed
+    # Of what the flange carries, about the axis of the last joint
     tool_radius: float = quantity(0.06, 0.0, 2.0, "m", is_open=True)
 
 
