@@ -86,4 +86,4 @@ def test_a_quoted_name_may_end_before_or_with_a_tab_between_tabs():
     for name in ('"p"', '"p\t"'):
         text = f"{header}\n{name}\t1\t2\t3\t1\t0\t0\t0"
         (target,) = parse_program(Source("m.csv", text)).targets
-        assert [number.value for number in target.numbers[:3]] == [1.0, 2.0, 3.0]
+        assert [number.value for number in target.numbers.values()][:3] == [1.0, 2.0, 3.0]
