@@ -118,14 +118,17 @@ class _Motion:
         self._old, self._new, self.scale = middles[0], middles[1], scale
 
     def point_mm(self, p: np.ndarray) -> np.ndarray:
+        """Where a point goes, (3,) in mm both."""
         moved = self._new[:3, 3] + self.scale * self.turn @ (1e-3 * np.asarray(p) - self._old[:3, 3])
         return np.round(1e3 * moved, 4)
 
     def tool(self, zyx_deg: np.ndarray) -> np.ndarray:
+        """The new orientation of the tool, ZYX angles in degrees, (3,) both."""
         relative = rotation_from_zyx(np.deg2rad(zyx_deg)) @ self._old[:3, :3].T
         return _degrees(self.turn @ relative @ self.turn.T @ self._new[:3, :3])
 
     def plane(self, zyx_deg: np.ndarray) -> np.ndarray:
+        """The new orientation of a plane of the path, ZYX angles in degrees, (3,) both."""
         return _degrees(self.turn @ rotation_from_zyx(np.deg2rad(zyx_deg)))
 
     def of(self, path: Shape) -> Shape:

@@ -113,7 +113,7 @@ class TwoJointArm:
 
 
 def driven_joint(time: float, e: float, e1: float, e2: float) -> np.ndarray:
-    """The driven joint and its two derivatives from (3.37), for a deflection and its two derivatives."""
+    """Angle, speed and acceleration of the driven joint, eq. (3.37), (3,), for those of a deflection."""
     y, rate, acceleration = (float(PATH.deriv(order)(time)) for order in range(3))
     # y = A sin(phi) + B cos(phi) with A = near + far cos(e), B = far sin(e)
     A, B = NEAR + FAR * np.cos(e), FAR * np.sin(e)

@@ -52,7 +52,7 @@ class InvertStudy:
         return np.array([[one.criterion for one in row] for row in self.ringing[kind]])
 
     def found(self, kind: str) -> np.ndarray:
-        """The same in a row, without those for which there was no stable inverse."""
+        """C in m/s in a row, (n,), without those for which there was no stable inverse."""
         values = self.criterion(kind)
         return values[np.isfinite(values)]
 

@@ -91,12 +91,12 @@ class Identified:
 
     @cached_property
     def values(self) -> np.ndarray:
-        """Of the named parameters in m, rad and rad / (N m)."""
+        """Of the named parameters in m, rad and rad / (N m), shape (n,)."""
         return np.concatenate([self.reduction.values, self.compliance[self._visible]])
 
     @cached_property
     def covariance(self) -> np.ndarray:
-        """Of the named parameters."""
+        """Of the named parameters in the units of `values`, shape (n, n)."""
         factor = self._named @ self.free_factor
         return factor @ factor.T
 
@@ -112,17 +112,17 @@ class Identified:
 
     @property
     def sigmas(self) -> np.ndarray:
-        """Standard deviations of the values."""
+        """Standard deviations of the values, in their units, shape (n,)."""
         return np.sqrt(np.diagonal(self.covariance))
 
     @property
     def correlation(self) -> np.ndarray:
-        """Of the values, ones in the diagonal."""
+        """Of the values, ones in the diagonal, shape (n, n)."""
         return self.covariance / np.outer(self.sigmas, self.sigmas)
 
     @cached_property
     def shares(self) -> np.ndarray:
-        """How much of what is known of each value comes from the data, the rest from the prior: 0 to 1."""
+        """Of what is known of each value, the share that is from the data, not the prior: 0 to 1, (n,)."""
         before = self._named**2 @ self.prior_sizes[self.free] ** 2
         return np.clip(1.0 - np.diagonal(self.covariance) / before, 0.0, 1.0)
 

@@ -65,7 +65,7 @@ class ReducibleModel:
         return Theta[:, 3 if self._position_only else 0 :].reshape(-1, len(x)) * self._sizes
 
     def independent(self, x: np.ndarray) -> np.ndarray:
-        """Independent parameters at x: those of the nominal robot, and what x adds, indices in order."""
+        """Rising indices, (k,), of the parameters independent at x: the nominal robot's, and what x adds."""
         return np.sort(independent_columns(self.regressor(x), self._drawn))
 
     def reduce(self, x: np.ndarray, independent: np.ndarray | None = None) -> Reduction:

@@ -33,7 +33,7 @@ class ErrorStatistics:
 
     @property
     def mean_norm_mm(self) -> float:
-        """Length of the mean absolute errors of the position."""
+        """Norm in mm of the vector of mean absolute errors along x, y and z."""
         return float(np.linalg.norm(self.mean_mm))
 
     def as_dict(self) -> dict[str, list[float]]:

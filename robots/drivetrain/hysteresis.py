@@ -18,7 +18,7 @@ _ROUNDING = 1e-12  # of the largest threshold
 
 
 def play(x: np.ndarray | float, before: np.ndarray, threshold: np.ndarray) -> np.ndarray:
-    """One step of the play operator, eq. (2.13): the output moves only when the input pushes it."""
+    """One step of the play operator, eq. (2.13): the output, in the unit of x, moves when x pushes it."""
     return np.maximum(x - threshold, np.minimum(x + threshold, before))
 
 
@@ -131,7 +131,7 @@ class SmoothPrandtlIshlinskii:
         pade_delay(self.delay, self.order)
 
     def play(self, x: np.ndarray, before: np.ndarray, threshold: np.ndarray) -> np.ndarray:
-        """The smooth play operator."""
+        """One step of the smooth play operator: `play` with rounded corners, in the unit of x."""
         psi = self.sharpness
         least = -np.logaddexp(-psi * (x + threshold), -psi * before) / psi
         return np.logaddexp(psi * (x - threshold), psi * least) / psi

@@ -268,6 +268,7 @@ class _Beside(GearSpring):
 
     @property
     def c_0(self) -> np.ndarray:  # type: ignore[override]
+        """Stiffness at rest in N m / rad, that of both."""
         return self.springs.c_0 + self.linear
 
     def torque(self, deflection: np.ndarray) -> np.ndarray:
@@ -277,6 +278,7 @@ class _Beside(GearSpring):
         return self.springs.stiffness(deflection) + self.linear
 
     def scaled(self, factor: float) -> "_Beside":
+        """Both, ``factor`` times as stiff."""
         return _Beside(self.springs.scaled(factor), factor * self.linear)
 
 

@@ -69,11 +69,11 @@ class CompliantKinematics:
         return q + self._errors.added(q, self._values) if len(self._values) else q
 
     def forward(self, q: np.ndarray) -> np.ndarray:
-        """Tool poses at motor positions q."""
+        """Tool poses X_WE at motor positions q in rad, (..., 6) -> (..., 4, 4)."""
         return self._rigid.forward(self.link_positions(q))
 
     def jacobian(self, q: np.ndarray) -> np.ndarray:
-        """Geometric Jacobians at motor positions q."""
+        """Geometric Jacobians by motor positions q in rad, rotation first, (..., 6) -> (..., 6, 6)."""
         return self.forward_and_jacobian(q)[1]
 
     def rows_and_jacobian(self, q: np.ndarray) -> tuple[Rows, np.ndarray]:
@@ -82,7 +82,7 @@ class CompliantKinematics:
         return X[:3].tolist(), J
 
     def forward_and_jacobian(self, q: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Tool poses and geometric Jacobians at motor positions q."""
+        """What `forward` and `jacobian` return, computed together."""
         links = self.link_positions(q)
         X, J = self._rigid.forward_and_jacobian(links)
         if len(self._values):

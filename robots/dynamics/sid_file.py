@@ -40,6 +40,8 @@ def read_sid(path: Path) -> FlexibleBody:
 
 
 class _Reader:
+    """Makes a body of the lines of a file; what is wrong is refused with its line."""
+
     def __init__(self, name: str, lines: list[str]) -> None:
         self._name, self._lines = name, lines
 

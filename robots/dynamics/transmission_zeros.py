@@ -31,7 +31,7 @@ class Zeros:
 
     @property
     def unstable(self) -> np.ndarray:
-        """Those in the right half-plane. The bound keeps out what rounding makes of an undamped pair."""
+        """Those in the right half-plane, (j,) complex in 1/s, without undamped pairs that rounding moves."""
         return self.values[np.real(self.values) > 1e-6 * (1.0 + np.abs(self.values))]
 
     @property

@@ -104,7 +104,7 @@ class ElasticParameters:
         return len(self.names)
 
     def of_kind(self, kind: str) -> np.ndarray:
-        """Where the unknowns of a kind stand, indices."""
+        """Indices at which the unknowns of a kind stand, shape (k,)."""
         return np.array([i for i, each in enumerate(self.kinds) if each == kind], dtype=int)
 
     def numbers(self, p: np.ndarray) -> ArmNumbers:

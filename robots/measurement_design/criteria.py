@@ -46,7 +46,7 @@ class SmallestEigenvalue(Criterion):
         self.sharpness = sharpness  # in units of 1 / B3
 
     def value(self, M: np.ndarray) -> np.ndarray:
-        """The smallest eigenvalues."""
+        """The smallest eigenvalues, (..., n, n) -> (...)."""
         return np.linalg.eigvalsh(M)[..., 0]
 
     def gradient_root(self, M: np.ndarray) -> np.ndarray:
@@ -65,7 +65,7 @@ class Determinant(Criterion):
     label = "D"
 
     def value(self, M: np.ndarray) -> np.ndarray:
-        """The n-th roots of the determinants, zero for singular matrices."""
+        """The n-th roots of the determinants, zero for singular matrices, (..., n, n) -> (...)."""
         _, logarithm = np.linalg.slogdet(M)
         return np.exp(logarithm / M.shape[-1])
 
@@ -94,7 +94,7 @@ class PoseVariance(Criterion):
         self._root = np.linalg.cholesky(self._spread)
 
     def value(self, M: np.ndarray) -> np.ndarray:
-        """1 / tr(spread M^-1)."""
+        """1 / tr(spread M^-1), (..., n, n) -> (...)."""
         return 1.0 / np.einsum("ij,...ji->...", self._spread, np.linalg.inv(M))
 
     def gradient_root(self, M: np.ndarray) -> np.ndarray:

@@ -31,7 +31,7 @@ class Use:
 
     @property
     def largest(self) -> float:
-        """Of all limits at all times."""
+        """The largest share of any limit at any time."""
         return float(max(self.shares.max(), self.mean_torque.max()))
 
     @property

@@ -38,7 +38,7 @@ class TimeSpline:
 
 @lru_cache
 def knots(count: int) -> np.ndarray:
-    """Of a spline over 0 to 1 with this many coefficients."""
+    """Of a spline over 0 to 1 with ``count`` coefficients, shape (count + DEGREE + 1,)."""
     u = np.linspace(0.0, 1.0, count - DEGREE + 1)
     breaks = u - _GRADING * np.sin(2.0 * np.pi * u) / (2.0 * np.pi)
     return np.concatenate([np.zeros(DEGREE), breaks, np.ones(DEGREE)])
@@ -46,7 +46,7 @@ def knots(count: int) -> np.ndarray:
 
 @lru_cache
 def points(count: int, per_interval: int = _PER_INTERVAL) -> np.ndarray:
-    """Points from 0 to 1 that resolve such a spline."""
+    """Points from 0 to 1 that resolve such a spline, rising, shape (m,)."""
     breaks = knots(count)[DEGREE:-DEGREE]
     inside = np.arange(per_interval) / per_interval
     return np.append((breaks[:-1, None] + np.diff(breaks)[:, None] * inside).ravel(), 1.0)
@@ -61,7 +61,7 @@ def bases(count: int) -> list[np.ndarray]:
 
 
 def weights(count: int) -> np.ndarray:
-    """Of the trapezoidal rule over `points`."""
+    """Of the trapezoidal rule over `points`, shape (m,)."""
     x = points(count)
     half = 0.5 * np.diff(x)
     return np.append(half, 0.0) + np.append(0.0, half)
@@ -84,7 +84,7 @@ def fitted(x: np.ndarray, s: np.ndarray, duration: float, count: int) -> TimeSpl
 
 
 def at_rest(count: int) -> np.ndarray:
-    """Coefficients of which only those are set that hold the ends at rest."""
+    """Coefficients, shape (count,), that hold the ends at rest; those between are zero."""
     coefficients = np.zeros(count)
     coefficients[count - AT_REST :] = 1.0
     return coefficients

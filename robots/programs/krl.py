@@ -56,6 +56,7 @@ class _Line:
 
     @property
     def where(self) -> str:
+        """File and line, for messages."""
         return self.source.where(self.number)
 
 

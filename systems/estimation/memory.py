@@ -77,7 +77,7 @@ class History:
         return True
 
     def ordered(self, memory: SimpleNamespace) -> tuple[np.ndarray, np.ndarray]:
-        """Times and rows from the oldest to the newest; copies."""
+        """Times in s, (n,), and rows, (n, width), from the oldest to the newest; copies."""
         count = int(memory.count[0])
         first = count % self.length if count > self.length else 0
         order = (first + np.arange(min(count, self.length))) % self.length

@@ -105,7 +105,7 @@ class TipEstimator:
         self._keyframes.reset(memory.keyframes, self.model.prior, memory.xi)
 
     def x(self, memory: SimpleNamespace) -> np.ndarray:
-        """The unknowns in their units."""
+        """The unknowns in their units, shape (n,)."""
         return self.model.full(memory.xi)
 
     def clock_offset(self, memory: SimpleNamespace, time: float) -> float:
@@ -119,7 +119,7 @@ class TipEstimator:
         return 0.0 if math.isnan(first) else time - first
 
     def covariance(self, memory: SimpleNamespace) -> np.ndarray:
-        """Covariance of the unknowns in units of their spreads."""
+        """Covariance of the unknowns in units of their spreads, shape (n, n)."""
         return np.linalg.inv(memory.keyframes.A + memory.A_open)
 
     def constants(self, memory: SimpleNamespace) -> Constants:

@@ -114,7 +114,7 @@ class TipModel:
         self.prior = np.linalg.inv(P)
 
     def full(self, xi: np.ndarray) -> np.ndarray:
-        """The unknowns in their units from what is in units of their spread."""
+        """The unknowns in their units from those in units of their spreads, shape (n,) both."""
         return self.mean + self.sigma * xi
 
     def geometric_errors(self, x: np.ndarray) -> np.ndarray:

@@ -136,7 +136,7 @@ class Feedforward(LeafSystem):
         self.DeclarePeriodicDiscreteUpdateEvent(period, 0.0, self._tick)
 
     def fresh_memory(self) -> np.ndarray:
-        """The memory before the first tick."""
+        """The memory before the first tick: not a number throughout, shape (m,)."""
         return np.full(self._memory_size, np.nan)
 
     def answer(self, reference: JointReference, memory: np.ndarray) -> Answer:
@@ -276,7 +276,7 @@ class Feedforward(LeafSystem):
         return self._compliance * torque, self._compliance * (moved - torque) / _SMALL_TURN
 
     def link_load(self, reference: JointReference) -> np.ndarray:
-        """Inverse dynamics of the links: inertia, Coriolis and gravity, without rotors and friction."""
+        """Torques of the links in N m, (6,): inertia, Coriolis and gravity, without rotors and friction."""
         self._plant.SetPositionsAndVelocities(
             self._context, np.concatenate([reference.position, reference.velocity])
         )
@@ -291,7 +291,7 @@ class Feedforward(LeafSystem):
         return -self._parts.load(self._context)
 
     def motor_torque(self, velocity: np.ndarray, acceleration: np.ndarray, load: np.ndarray) -> np.ndarray:
-        """Torque of motors that carry a load: rotor inertia, viscous and Coulomb friction (2.63), (2.64)."""
+        """In N m, joint side, (6,): load, rotor inertia, viscous and Coulomb friction, (2.63), (2.64)."""
         if self._trains is not None:
             return self._rotor * acceleration + load + self._trains.losses(load, velocity)
         friction = self._viscous * velocity + self._coulomb * np.tanh(velocity / self._coulomb_velocity)

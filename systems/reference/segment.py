@@ -66,7 +66,7 @@ def weights(angle, s, rate, acceleration, sine, cosine):
 
 
 def rotation(zyx_deg: np.ndarray) -> np.ndarray:
-    """The rotation matrix of ZYX angles in degrees."""
+    """The rotation matrix, (3, 3), of ZYX angles (alpha, beta, gamma) in degrees, (3,)."""
     return rotation_from_zyx(np.deg2rad(zyx_deg))
 
 

@@ -130,7 +130,7 @@ class ServoLaw(LeafSystem):
         """Refuses a path that the law cannot follow. Raises ValueError."""
 
     def initial_state(self, moment: LawInput) -> np.ndarray:
-        """The memory with which the law begins; where a law says nothing else, the measured positions."""
+        """The memory with which the law begins, (memory_size,); by default the measured positions in rad."""
         return moment.position
 
     def step(self, moment: LawInput, memory: np.ndarray) -> LawOutput:

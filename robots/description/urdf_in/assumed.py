@@ -24,7 +24,7 @@ SOURCE = "assumed: in proportion to the inertia that the joint moves"
 
 
 def rounded(value: float) -> float:
-    """Three digits: an assumption has no more."""
+    """The value to three digits: an assumption has no more."""
     return float(f"{value:.3g}")
 
 

@@ -155,7 +155,7 @@ class RobotReport:
 
     @property
     def test_signals(self) -> np.ndarray:
-        """Test signals as they are sent."""
+        """Test signals as they are sent, in the order and the units of the sender, shape (n,)."""
         return np.array(self.message.testSignals.signals)
 
     @property
