@@ -72,10 +72,11 @@ def test_a_tip_that_rings_out_needs_the_time_until_its_amplitude_is_that_of_the_
         return np.outer(1e-3 * np.exp(-since / 0.05) * np.cos(2 * np.pi * 20.0 * since), [0.0, 0.0, 1.0])
 
     found = pose_results(log_of(scenario, ringing), scenario, CYCLE, CYCLES)
-    stabilised = found["stabilisation_s"]
+    stabilised, overshoot = found["stabilisation_s"], found["overshoot_mm"]
     assert stabilised is not None
+    assert overshoot is not None
     assert 0.05 * np.log(10.0) - 0.03 < stabilised < 0.05 * np.log(10.0) + 0.01
-    assert 0.1 < found["overshoot_mm"] < 1.0
+    assert 0.1 < overshoot < 1.0
 
 
 def test_a_tip_that_is_late_is_on_the_path_and_one_beside_it_is_not():
