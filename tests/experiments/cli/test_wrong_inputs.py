@@ -1,6 +1,7 @@
 """Whatever is wrong in an input, a command says so in one line with exit code 2 and leaves nothing behind."""
 
 import shlex
+import sys
 from pathlib import Path
 
 import pytest
@@ -26,6 +27,8 @@ def test_wrong_input_is_refused_in_one_line_and_nothing_is_written(
     line: str, reason: str, folder: Path, monkeypatch: pytest.MonkeyPatch
 ):
     monkeypatch.chdir(folder)
+    # Python keeps what it compiles of a law of one's own beside it; that is not ours.
+    monkeypatch.setattr(sys, "dont_write_bytecode", True)
     said = refusal(truetip(*shlex.split(line)))
     assert reason in said
     assert "Errno" not in said
