@@ -13,7 +13,6 @@ from experiments.bench.faults import Case
     [
         ("client", "kill", "end", "-9"),
         ("camera", "kill", "end", ""),
-        ("cell", "stop 1 s", "resume", "0: its path is over"),
     ],
 )
 def test_the_robot_is_never_surprised(tmp_path: Path, who: str, what: str, then: str, ended: str):
