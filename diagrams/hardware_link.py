@@ -243,14 +243,15 @@ class HardwareLink:
         reported = self.robot_clock.station_time(round(1e6 * last.time))
         return PoseSample(time + sample.time - reported, sample.X_WE, sample.valid, sample.residual)
 
-    def send_command(self, position: np.ndarray, velocity: np.ndarray) -> None:
-        """Replies to the newest report, if it may be answered, with what the limits allow."""
+    def send_command(self, position: np.ndarray, velocity: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Replies to the newest report, if it may be answered, with what the limits allow; returns that."""
         position, velocity = self._guard.judged(position, velocity, self.passed)
         if self._client.send(position, velocity, self._is_speed_only):
             self._sent = self._now()
             self.turn_around.append(self._sent - self.arrived)
         else:
             self._guard.take_back()
+        return position, velocity
 
     @property
     def limited_messages(self) -> int:

@@ -275,11 +275,10 @@ class RealTimeRun:
         if not self._joint_rows:
             self.diagram.ForcedPublish(self._context)  # here, where the log finds samples to begin with
         self._update(self._context)
-        command = self.station.command(self._context)
-        wire.send_command(*command)
+        sent = wire.send_command(*self.station.command(self._context))
         learn(self.servo, self._context)  # nobody waits for it any more
         if self._stream is not None:
-            self._write(self._stream, time, report, wire.effort, command, sample)
+            self._write(self._stream, time, report, wire.effort, sent, sample)
         self._stand_before_next()
         self._joint_rows.append((tick, report.time, report.position, wire.effort))
         if sample.valid and (not self._exposures or sample.time > self._exposures[-1][0]):

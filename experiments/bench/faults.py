@@ -193,7 +193,7 @@ def _shares(robot: RobotModel, time: np.ndarray, q: np.ndarray) -> tuple[float, 
     velocity = np.diff(q, axis=0) / h[:, None]
     # Where messages are missing the speed between is a mean; an acceleration is that of neighbours only.
     near = (h[1:] < 1.5 * _PERIOD) & (h[:-1] < 1.5 * _PERIOD)
-    acceleration = np.diff(velocity, axis=0)[near] / _PERIOD
+    acceleration = np.diff(velocity, axis=0)[near] / (0.5 * (h[1:] + h[:-1]))[near, None]
     return (
         float((np.abs(velocity) / robot.speed).max()),
         float((np.abs(acceleration) / robot.acceleration).max()),
