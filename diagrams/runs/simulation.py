@@ -124,6 +124,7 @@ class Experiment:
         changes = self.station.changes()
         self.integration = Integration(scenario.integrator, scenario.station.period, rate, changes)
         self.integration.initialize(self.simulator)
+        self._events: list[GuardEvent] = []  # what the run itself has to say
         self._wall_time = 0.0
         self._predictions: list[Prediction] = []  # of the tip, one a chunk, by a law that says where it is
 
@@ -160,6 +161,11 @@ class Experiment:
             last, remaining = remaining, end - self.servo.path_time(self.context)
             if remaining < last:
                 moved_at = self.context.get_time()
+        if remaining > 1e-9:
+            why = (
+                f"the path did not go on for {_LONGEST_HOLD:g} s: the run ends {remaining:.1f} s short of it"
+            )
+            self._events.append(GuardEvent(moved_at, "path_held", why))
 
     def _advance(self, end: float, ticks: int, report: Callable[[], None] | None) -> None:
         done = round(self.context.get_time() / self.scenario.station.period)
@@ -201,7 +207,9 @@ class Experiment:
             velocity_command=data["velocity_command"],
             correction=data["correction"],
             guard_counts=dict(zip(KINDS, counts[-1].tolist(), strict=True)),
-            guard_events=guard_events(record.time, counts),
+            guard_events=sorted(
+                [*guard_events(record.time, counts), *self._events], key=lambda event: event.time
+            ),
             **path_marks(path),
             learnt=found,
             calibrated=calibrated(self.servo, self.context, self.scenario.robot),

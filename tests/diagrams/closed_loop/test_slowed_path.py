@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from diagrams.runs import simulation
 from diagrams.runs.simulation import Experiment, run
 from robots.pose import pose_error
 from systems.servo.open_loop import OpenLoop
@@ -20,10 +21,11 @@ HELD = "reference.override=[{at: 2.5, share: 0.0}, {at: 4.0, share: 1.0}]"
 class Cautious(OpenLoop):
     """Asks for half the speed from the first tick on."""
 
+    share = 0.5
+
     def __init__(self, *given) -> None:
         super().__init__(*given)
-        half = self.DeclareDiscreteState([0.5])
-        self.DeclareStateOutputPort("speed_share", half)
+        self.DeclareStateOutputPort("speed_share", self.DeclareDiscreteState([self.share]))
 
 
 def largest(log) -> float:
@@ -59,6 +61,22 @@ def test_a_law_may_slow_the_path():
     fastest = np.abs(np.diff(log.X_WE_desired[:, :3, 3], axis=0)).max() / 0.004
     as_planned = np.abs(planned.sample(log.time)[1][:, 3:]).max()
     assert fastest == pytest.approx(0.5 * as_planned, rel=1e-3)
+
+
+class Halting(Cautious):
+    """Asks for no speed at all."""
+
+    share = 0.0
+
+
+def test_a_path_that_is_held_for_long_ends_the_run_with_an_event(monkeypatch):
+    monkeypatch.setattr(simulation, "_LONGEST_HOLD", 1.0)
+    experiment = Experiment(scenario("nominal", *QUICK, "station.elasticity=rigid"), Halting)
+    experiment.advance()
+    log = experiment.log()
+    assert [event.detail for event in log.guard_events if event.kind == "path_held"] == [
+        f"the path did not go on for 1 s: the run ends {log.path_end - log.time[-1]:.1f} s short of it"
+    ]
 
 
 def test_a_feedforward_that_is_computed_beforehand_refuses_a_slowed_path():
