@@ -10,6 +10,7 @@ from diagrams.scenario.scenario import Scenario, ScenarioError, load_scenario, s
 from diagrams.scenario.scenario_file import read_scenario_nodes, stated_keys
 from robots.description.foreign_sources import foreign_sources_note
 from robots.description.model import RobotModel, load_robot
+from robots.kinematics.error_kinematics import ErrorKinematics
 
 QUICK_SPEEDUP = 4.0  # of the acceleration along the path
 QUICK_SETTLE = 2.0  # s
@@ -28,6 +29,12 @@ class Prepared:
     def nominal_robot(self) -> RobotModel:
         """The robot from which the true one differs by the station's errors."""
         return nominal_robot(self.scenario, self.robot)
+
+    @property
+    def true_robot(self) -> RobotModel:
+        """The robot with the geometry that the simulated one truly has; the nominal one on a real station."""
+        errors, nominal = self.scenario.station.errors, self.nominal_robot
+        return ErrorKinematics(nominal).robot_with_errors(errors.vector(nominal))
 
     @property
     def note(self) -> str:

@@ -39,7 +39,7 @@ def write_results(folder: Path, prepared: Prepared, logs: Mapping[str, Sequence[
     first_cycles = {law: cycles[0] for law, cycles in logs.items()}
     write_json(folder / "summary.json", result)
     write_json(folder / "timing.json", times)
-    write_report(folder / "report.html", prepared.text, result, times, logs)
+    write_report(folder / "report.html", prepared.text, result, times, logs, prepared.true_robot)
     write_replay(
         folder / "replay.html", prepared.nominal_robot, first_cycles, errors=prepared.scenario.station.errors
     )

@@ -2,6 +2,7 @@
 
 from contextlib import ExitStack
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Annotated, Any
 
 import typer
@@ -13,10 +14,12 @@ from diagrams.record.restored import restored
 from experiments.cli.console import print_files, progress_bar, refusing
 from experiments.cli.json_output import human_console, json_output
 from experiments.cli.options import JsonOption, PictureOption
+from experiments.cli.prepare import prepare
 from experiments.cli.staging import PAGE, staged_file
 from experiments.cli.tables import print_summary
 from experiments.metrics.run_metrics import summary
 from experiments.report.report import verdict, write_report
+from robots.description.model import RobotModel
 
 
 def report_command(
@@ -34,7 +37,7 @@ def report_command(
         with progress_bar("reading") as progress:
             text, logs = _read(records, progress)
         result = summary(_title(text, records), logs)
-        write_report(page, text, result, _times(logs), logs)
+        write_report(page, text, result, _times(logs), logs, _true_robot(text))
         output.write(result)
     print_summary(human, result)
     human.print(escape(verdict(result)))
@@ -57,6 +60,17 @@ def _read(records: list[Path], progress: Any) -> tuple[str, dict[str, list[RunLo
         text = text or contents.scenario
         progress((number + 1) / len(records))
     return text, {law: sorted(cycles, key=lambda log: log.seed) for law, cycles in logs.items()}
+
+
+def _true_robot(text: str) -> RobotModel | None:
+    """The robot of a scenario with its true geometry; None if its files are not there any more."""
+    with TemporaryDirectory() as folder:
+        file = Path(folder) / "scenario.yaml"
+        file.write_text(text, encoding="utf-8")
+        try:
+            return prepare(str(file)).true_robot
+        except ValueError:
+            return None
 
 
 def _title(text: str, records: list[Path]) -> str:

@@ -8,12 +8,14 @@ import numpy as np
 
 from diagrams.record.log import RunLog
 from experiments.metrics.run_metrics import Comparison, judged_by, known_poses, path_window, pose_errors
+from experiments.report.curves import coded
 from experiments.report.style import law_colors, law_title
 
 TRUE_SAMPLES = 2500  # per law and axis at most
 MEASURED_SAMPLES = 900
 PATH_SAMPLES = 700
 EVENTS_PER_LAW = 500
+FINE_STEPS = 200000  # of the largest error: a reader zooms in where it is small
 
 
 def plot_data(result: Mapping[str, Any], logs: Comparison) -> dict[str, Any]:
@@ -49,11 +51,11 @@ def _error_traces(log: RunLog, source: str, samples: int) -> dict[str, Any]:
     keep = _thinned(keep, samples)
     e = e[keep]
     return {
-        "t": _short(log.time[keep]),
-        "mm": [_short(1e3 * e[:, 3 + axis]) for axis in range(3)],
-        "deg": [_short(np.rad2deg(e[:, axis])) for axis in range(3)],
-        "norm_mm": _short(1e3 * np.linalg.norm(e[:, 3:], axis=1)),
-        "angle_deg": _short(np.rad2deg(np.linalg.norm(e[:, :3], axis=1))),
+        "t": coded(log.time[keep]),
+        "mm": [coded(1e3 * e[:, 3 + axis], steps=FINE_STEPS) for axis in range(3)],
+        "deg": [coded(np.rad2deg(e[:, axis]), steps=FINE_STEPS) for axis in range(3)],
+        "norm_mm": coded(1e3 * np.linalg.norm(e[:, 3:], axis=1), is_log=True),
+        "angle_deg": coded(np.rad2deg(np.linalg.norm(e[:, :3], axis=1)), is_log=True),
     }
 
 

@@ -6,9 +6,14 @@ from typing import Any
 
 from experiments.metrics.run_metrics import Comparison, best_law, judged_by
 from experiments.report.data import norm, plot_data
+from experiments.report.error_panels import error_panels
 from experiments.report.error_rows import AXES, KINDS, error_row, format_cell, is_best, smallest_of_columns
+from experiments.report.joint_panels import joint_panels
 from experiments.report.page import write_page
+from experiments.report.scenario_differences import scenario_differences
 from experiments.report.style import law_colors, law_title
+from experiments.report.worst_instant import worst_instants
+from robots.description.model import RobotModel
 
 MAGNIFICATIONS = (1, 2, 5, 10, 20, 50, 100, 200, 500)
 MAGNIFIED_SHARE = 0.25  # of the path's extent that the largest deviation may fill when the page opens
@@ -29,6 +34,7 @@ def write_report(
     summary: Mapping[str, Any],
     timing: Mapping[str, Any],
     logs: Comparison,
+    robot: RobotModel | None = None,
 ) -> None:
     """Writes the report as one self-contained HTML file, atomically.
 
@@ -38,12 +44,16 @@ def write_report(
         summary: `metrics.summary` of the logs.
         timing: `metrics.timing` of the logs.
         logs: law -> one log per cycle; the first cycle is drawn.
+        robot: with the geometry that it truly has, for its picture and the limits of its joints; None where
+            nobody knows it.
 
     Raises:
         OSError: if the folder is missing or cannot be written.
         ValueError: if a number of the plots is NaN or infinite.
     """
     data, colors, runs = plot_data(summary, logs), law_colors(logs), summary["runs"]
+    panels = [*error_panels(logs), *joint_panels(logs, robot)]
+    worst = worst_instants(logs, robot) if robot is not None else None
     source = judged_by(summary)
     write_page(
         path,
@@ -69,7 +79,13 @@ def write_report(
         laps=_laps(summary),
         iso={"head": list(ISO_COLUMNS.values()), "note": _iso_note(summary)},
         timing=_timing(timing),
-        data=data,
+        data=data | {"panels": [panel.data() for panel in panels], "worst": worst},
+        worst=worst is not None,
+        panels=[
+            {"id": p.id, "title": p.title, "note": p.note, "height": 760 if len(p.axes) > 3 else 440}
+            for p in panels
+        ],
+        differences=_differences(scenario_text, logs),
     )
 
 
@@ -198,6 +214,17 @@ def _iso_note(summary: Mapping[str, Any]) -> str:
         + ("cycle per law" if cycles == 1 else "cycles per law")
         + ("; repeatability needs at least two." if cycles == 1 else ".")
     )
+
+
+def _differences(text: str, logs: Comparison) -> list[tuple[str, str, str]]:
+    """What the scenario changes, without the gains of laws that did not run."""
+    idle = "servo.laws."
+    return [
+        row
+        for row in scenario_differences(text)
+        if row[0] != "description"
+        and (not row[0].startswith(idle) or row[0].removeprefix(idle).partition(".")[0] in logs)
+    ]
 
 
 def _timing(timing: Mapping[str, Any]) -> Rows:

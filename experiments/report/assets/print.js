@@ -1,11 +1,20 @@
 let printTimer = null, printRun = 0;
+/* A folded section is opened on paper. */
+window.addEventListener("beforeprint", () => {
+  for (const fold of document.querySelectorAll("details:not([open])")) { fold.open = true; fold.dataset.folded = "yes"; }
+});
+window.addEventListener("afterprint", () => {
+  for (const fold of document.querySelectorAll("details[data-folded]")) fold.open = false;
+});
 function preparePrint() { clearTimeout(printTimer); printTimer = setTimeout(drawForPaper, 300); }
 async function drawForPaper() {
   const run = ++printRun, own = window.figuresForPaper ? window.figuresForPaper() : {};
-  for (const plot of document.querySelectorAll(".js-plotly-plot")) {
+  const plots = new Set(document.querySelectorAll(".js-plotly-plot"));
+  for (const id in own) plots.add(document.getElementById(id));
+  for (const plot of plots) {
     const figure = own[plot.id] || {data: plot.data, layout: plot.layout};
     const isDeep = figure.data.some(trace => /3d|surface|gl/.test(trace.type || ""));
-    const options = {format: isDeep ? "png" : "svg", width: 760, height: plot.offsetHeight || 450,
+    const options = {format: isDeep ? "png" : "svg", width: 760, height: plot.offsetHeight || parseInt(plot.style.height) || 450,
       scale: isDeep ? 2 : 1};
     const source = await Plotly.toImage({data: figure.data,
       layout: Object.assign({}, figure.layout, {autosize: false})}, options);

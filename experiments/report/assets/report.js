@@ -1,5 +1,9 @@
 "use strict";
 const data = JSON.parse(document.getElementById("data").textContent);
+for (const law of data.laws) for (const traces of [law.true, law.measured]) {
+  for (const name of ["t", "norm_mm", "angle_deg"]) traces[name] = decoded(traces[name]);
+  for (const name of ["mm", "deg"]) traces[name] = traces[name].map(decoded);
+}
 const hidden = new Set();
 let showMeasured = true, magnification = 1;
 const css = name => getComputedStyle(document.documentElement).getPropertyValue(name).trim();
@@ -139,6 +143,8 @@ function drawEvents() {
     yaxis: axis({type: "category", tickfont: {color: css("--ink"), size: 12}})}), bare);
 }
 
+{% include "panels.js" %}
+
 function drawAll() {
   const xyz = ["x", "y", "z"];
   drawPath();
@@ -151,6 +157,7 @@ function drawAll() {
   drawBars("bars-mm", "mm", 2);
   drawBars("bars-deg", "deg", 2);
   drawEvents();
+  drawFolded();
 }
 function draw() { drawAll(); preparePrint(); }
 
@@ -162,8 +169,8 @@ window.figuresForPaper = () => {
   const figures = onPaper;
   onPaper = null;
   document.documentElement.classList.remove("paper");
-  for (const id of ["path", "distance", "position", "orientation", "events"])
-    if (figures[id]) Object.assign(figures[id].layout, {showlegend: true,
+  for (const id in figures) if (!id.startsWith("bars"))
+    Object.assign(figures[id].layout, {showlegend: true,
       legend: {orientation: "h", x: 0, y: 1.02, yanchor: "bottom"}});
   return figures;
 };
@@ -181,7 +188,8 @@ for (const button of document.querySelectorAll(".chips button")) {
 const select = document.getElementById("magnification");
 magnification = Number(select.value);
 select.addEventListener("change", () => { magnification = Number(select.value); drawPath();
-  preparePrint(); });
+  drawWorst(); preparePrint(); });
 matchMedia("(prefers-color-scheme: dark)").addEventListener("change", draw);
 draw();
+prepareFigures();
 document.body.dataset.drawn = "yes";

@@ -28,12 +28,7 @@ function prepareTables() {
   }
   for (const button of document.querySelectorAll("button.csv")) {
     button.onclick = () => {
-      const link = document.createElement("a");
-      link.href = URL.createObjectURL(new Blob([tableText(document.getElementById(button.dataset.table))],
-        {type: "text/csv"}));
-      link.download = button.dataset.table + ".csv";
-      link.click();
-      URL.revokeObjectURL(link.href);
+      saveText(tableText(document.getElementById(button.dataset.table)), button.dataset.table);
     };
   }
   for (const field of document.querySelectorAll("input.filter")) {

@@ -1,7 +1,19 @@
 /* Unpacks what the page carries compressed, the plotting library first; then runs what waits for it. */
+/* Bytes of base 85: five digits are four bytes; a last group of n + 1 digits is n bytes. */
+const digits85 = "0123456789ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz!#$%&()*+-;<=>?@^_`{|}~";
+function bytesOf(text) {
+  const value = new Uint8Array(128), bytes = new Uint8Array(Math.ceil(text.length / 5) * 4);
+  [...digits85].forEach((digit, i) => { value[digit.charCodeAt(0)] = i; });
+  for (let i = 0, at = 0; i < text.length; i += 5) {
+    let group = 0;
+    for (let k = 0; k < 5; k++) group = group * 85 + (i + k < text.length ? value[text.charCodeAt(i + k)] : 84);
+    for (const shift of [16777216, 65536, 256, 1]) bytes[at++] = Math.floor(group / shift) & 255;
+  }
+  return bytes.subarray(0, bytes.length - (5 - (text.length % 5 || 5)));
+}
 async function unpacked(text) {
   const stream = new DecompressionStream("gzip"), writer = stream.writable.getWriter();
-  writer.write(Uint8Array.from(atob(text), letter => letter.charCodeAt(0)));
+  writer.write(bytesOf(text));
   writer.close();
   const reader = stream.readable.getReader(), decoder = new TextDecoder(), parts = [];
   for (let part = await reader.read(); !part.done; part = await reader.read())

@@ -1,0 +1,44 @@
+/* A button above every figure that saves what it draws as a table: curve, x, y and z. */
+function figureText(plot) {
+  const layout = plot._fullLayout || plot.layout, titles = new Set();
+  const quoted = value => /[",\n]/.test(String(value)) ? `"${String(value).replaceAll('"', '""')}"` : value ?? "";
+  const titleOf = name => (((layout[name] || {}).title || {}).text || "").replace(/<[^>]*>/g, "");
+  const rows = [];
+  for (const trace of plot.data) {
+    const x = trace.x || [], y = trace.y || [], z = trace.z;
+    const key = (axis, short) => (trace[short + "axis"] || short).replace(short, axis);
+    titles.add(titleOf(key("xaxis", "x")));
+    const unit = titleOf(key("yaxis", "y"));
+    for (let i = 0; i < Math.max(x.length, y.length); i++)
+      rows.push([trace.name ?? "", unit, x[i], y[i], ...(z ? [Array.isArray(z[i]) ? z[i].join(" ") : z[i]] : [])]
+        .map(quoted).join(","));
+  }
+  const head = ["curve", "y is", [...titles].filter(Boolean).join(" or ") || "x", "y",
+    ...(plot.data.some(trace => trace.z) ? ["z"] : [])];
+  return [head.map(quoted).join(","), ...rows].join("\n") + "\n";
+}
+function saveText(text, name) {
+  const link = document.createElement("a");
+  link.href = URL.createObjectURL(new Blob([text], {type: "text/csv"}));
+  link.download = name + ".csv";
+  link.click();
+  URL.revokeObjectURL(link.href);
+}
+function prepareFigures() {
+  let number = 0;
+  for (const plot of document.querySelectorAll(".plot, .js-plotly-plot")) {
+    const button = document.createElement("button"), card = plot.closest(".card");
+    const heading = card && card.querySelector("h2") ? card.querySelector("h2").textContent : "figure";
+    const name = /^[a-z]/.test(plot.id) && plot.classList.contains("plot") ? plot.id : `figure-${++number}`;
+    button.type = "button";
+    button.className = "csv of-figure";
+    button.textContent = "CSV";
+    button.setAttribute("aria-label", `CSV: save what “${heading}” draws as a table`);
+    button.onclick = () => saveText(figureText(plot), name);
+    /* A figure that is alone in its card has the button in the corner of the card. */
+    if (card && card.querySelectorAll(".plot, .js-plotly-plot").length === 1) {
+      card.classList.add("has-corner");
+      card.append(button);
+    } else plot.before(button);
+  }
+}
