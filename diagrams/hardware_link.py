@@ -9,7 +9,7 @@ from diagrams.host_lateness import HostLateness
 from diagrams.scenario.scenario import Scenario
 from robots.description.model import RobotModel
 from systems.guard.joint_limits import JointLimits
-from systems.guard.message_guard import MOST_BRIDGED, MessageGuard, PassedTime
+from systems.guard.message_guard import LONGEST_OWED, MOST_BRIDGED, MessageGuard, PassedTime
 from systems.link.clock import ClockConfig, StampClock, steady_time
 from systems.link.protocols import PoseSource, RobotLink, RobotReport
 from systems.reference.joint_mover import smooth_motion
@@ -28,6 +28,7 @@ _CLOSE = 3e-4  # s about the time at which it is due: a frame of the camera woul
 _WATCH = 1e-3  # s after it was due, until which one looks all the time: who sleeps wakes late and cold
 _CYCLE_TOLERANCE = 5e-3  # relative
 _CLOCK_STEP = 0.02  # s by which stamps may run ahead of arrivals: jitter, and a stall before
+_SAME_COUNT = 1000  # messages; four seconds: whose number is further ahead is of another count
 _RESTS = 25  # messages at rest that end a stop
 
 
@@ -86,7 +87,8 @@ class HardwareLink:
         self.gap = 0.0  # s, the same without an upper limit
         self.clock_step = 0.0  # s by which the stamp of the newest report ran ahead of its arrival
         self.host = HostLateness()
-        self._heard = self._sent = 0.0  # s of the steady clock, when the newest report came and was answered
+        self._heard = self._stamp = 0.0  # s of the steady clock and the controller's, of the newest message
+        self._has_rested = True  # whether the robot has stood still since it was commanded, whatever was sent
         self._origin = 0.0  # s of the steady clock: samples exposed before are not of this path
 
     @property
@@ -152,7 +154,8 @@ class HardwareLink:
         while self._now() < deadline and not self._is_asked_to_end():
             report = self.next_report(wait=min(0.2, within))
             if report is not None and report.is_ready:
-                self._guard.forget(report.position)
+                if self._has_rested:
+                    self._guard.forget(report.position)
                 return report
         return None
 
@@ -199,12 +202,18 @@ class HardwareLink:
         """How much time has really passed since the last report, and whether a clock has been set."""
         arrived = self._client.arrived
         if self.last is not None:
-            stamped, here = report.time - self.last.time, arrived - self._heard
+            stamped, here = report.time - self._stamp, arrived - self._heard
             self.gap = max(0.0, min(stamped, here))
+            # Who does not follow stands, who counts anew has been switched on, and to a command that is old
+            # the robot has come, unless it was a speed.
+            counted = (report.seqno - self.last.seqno) % 2**32
+            self._has_rested |= not 0 < counted <= _SAME_COUNT
+            self._has_rested |= self.gap > LONGEST_OWED and not self._is_speed_only
             self.clock_step = stamped - here if stamped - here > _CLOCK_STEP + self._period else 0.0
             if self.clock_step:
                 self.robot_clock.restart()
-        self._heard = arrived
+        self._has_rested |= not report.is_ready
+        self._heard, self._stamp = arrived, report.time
         self.passed = self._time.until(report.time, arrived)
 
     @property
@@ -247,8 +256,8 @@ class HardwareLink:
         """Replies to the newest report, if it may be answered, with what the limits allow; returns that."""
         position, velocity = self._guard.judged(position, velocity, self.passed)
         if self._client.send(position, velocity, self._is_speed_only):
-            self._sent = self._now()
-            self.turn_around.append(self._sent - self.arrived)
+            self.turn_around.append(self._now() - self.arrived)
+            self._has_rested = False
         else:
             self._guard.take_back()
         return position, velocity
@@ -270,10 +279,10 @@ class HardwareLink:
                 if self._client.heard == before:
                     continue
             before = self._client.heard
-            now = self._now()
-            passed = min(self._time.until(None, now), now - self._sent)
+            self._heard, self._stamp = before, self._client.heard_stamp
+            passed = self._time.until(self._stamp, self._now())
             if self._client.stop(*self._guard.braking(passed, self._stop_time), self._is_speed_only):
-                answered = self._sent = self._now()
+                answered = self._now()
                 at_rest += self._guard.is_at_rest
             else:
                 self._guard.take_back()

@@ -6,6 +6,7 @@ from robots.description.model import NUM_JOINTS
 from systems.guard.joint_limits import JointLimits
 
 MOST_BRIDGED = 8  # periods; after a longer gap a robot may stand still, so no motion is owed to it
+LONGEST_OWED = 0.25  # s by which messages may be late altogether, to be followed by as many that seem early
 _NO_TIME = 1e-5  # s, in which nothing may change
 _SLACK = 1.0 + 1e-6
 
@@ -13,33 +14,44 @@ _SLACK = 1.0 + 1e-6
 class PassedTime:
     """The time from message to message: what the sender's stamps say, but never more than has passed here.
 
-    Messages come early and late. What one is late by is left to those that come early after it, up to
-    `MOST_BRIDGED` periods; in sum the time is never ahead of the own clock.
+    Messages come early and late, and after a silence often many at once. What they are late by is left to
+    those that come early after them, up to `LONGEST_OWED`; in sum the time is never ahead of the own clock. A
+    stamp that is not later than the newest one is of a message that was overtaken, or of a clock that was set
+    back: it counts from the stamp before it, and what it was given is taken from the next one that is later.
     """
 
     def __init__(self, period: float) -> None:
         """Starts with the time of one message, ``period`` in s."""
-        self._most, self._credit = MOST_BRIDGED * period, period
-        self._stamp: float | None = None
-        self._now = 0.0
+        self._period, self._most, self._credit = period, MOST_BRIDGED * period, period
+        self._newest: float | None = None
+        self._last = self._aside = self._now = self._advanced = 0.0
 
-    def until(self, stamp: float | None, now: float) -> float:
+    def until(self, stamp: float, now: float) -> float:
         """The time in s since the last call.
 
         Args:
-            stamp: of the message on the sender's clock in s; None if that cannot be believed.
+            stamp: of the message on the sender's clock in s.
             now: the own clock in s.
         """
-        if self._stamp is None and stamp is not None:
-            self._stamp, self._now = stamp, now
+        if self._newest is None:
+            self._newest = self._last = stamp
+            self._now = self._advanced = now
             return self._credit
-        self._credit = min(self._credit + max(0.0, now - self._now), self._most)
-        passed = self._credit
-        if stamp is not None:
-            assert self._stamp is not None
-            passed = min(max(0.0, stamp - self._stamp), passed)
-            self._stamp = stamp
-        self._credit, self._now = self._credit - passed, now
+        self._credit = min(self._credit + max(0.0, now - self._now), LONGEST_OWED)
+        self._now = now
+        ahead, is_newest = stamp - self._last, stamp > self._newest
+        if is_newest:
+            passed = stamp - self._newest - self._aside
+        elif ahead or now - self._advanced <= self._most:
+            passed = ahead
+        else:  # what stands for so long is no clock
+            passed = self._period
+        passed = min(max(0.0, passed), self._most, self._credit)
+        self._aside = 0.0 if is_newest else self._aside + passed
+        self._newest, self._last = max(stamp, self._newest), stamp
+        if ahead > 0.0:
+            self._advanced = now
+        self._credit -= passed
         return passed
 
 

@@ -35,6 +35,11 @@ class GuidedRobot(Generic[Report]):
         return self._client.session.heard
 
     @property
+    def heard_stamp(self) -> float:
+        """What the controller's clock showed in that, in s."""
+        return self._client.session.heard_stamp
+
+    @property
     def trouble(self) -> str:
         """Why the controller's newest messages are refused, or commands had to start anew; else empty."""
         return self._client.session.trouble

@@ -78,6 +78,11 @@ class RobotLink(Protocol):
         ...
 
     @property
+    def heard_stamp(self) -> float:
+        """What the controller's clock showed in that, in s."""
+        ...
+
+    @property
     def trouble(self) -> str:
         """Why its newest messages are refused, or why commands had to start anew, in words; else empty."""
         ...

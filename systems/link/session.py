@@ -121,6 +121,11 @@ class LinkSession(Generic[Report]):
         self._last_reply: tuple[Any, Report, int, float] | None = None
         self._newest: Report | None = None  # also one that was refused
 
+    @property
+    def heard_stamp(self) -> float:
+        """What the controller's clock showed in the message that came last, also if it is refused, in s."""
+        return self._newest.time if self._newest is not None else 0.0
+
     def receive(self, data: bytes, sender: Address, now: float) -> Report | None:
         """Takes a datagram; returns its report if it is the newest of this session, else None."""
         self.check(now)

@@ -6,6 +6,8 @@ so that a run is the same every time and takes as long as it has to.
 
 import heapq
 import itertools
+from contextlib import suppress
+from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any
 
@@ -18,6 +20,7 @@ from systems.link.abb.robot_link import AbbRobotLink
 from systems.link.abb.session import EgmSession
 from systems.link.clock import ClockQuality
 from systems.link.protocols import RobotLink
+from systems.link.session import TelegramError
 from systems.samples import PoseSample
 
 LOOK = 2e-5  # s that it takes to look for a message
@@ -42,6 +45,11 @@ class Lockstep:
         self._on_the_way: list = []  # (time, order, data, sender) to the client
         self._replies: list = []  # (time, order, data) to the controller
         self.sent: list[tuple[float, bytes]] = []  # time and bytes of every command
+        self.stamps: list[float] = []  # s, of the messages that they answer
+        self._heard_stamp = 0.0  # s, of the newest message
+        # When the cell stands still (s of its own time), for how long, and whether it then catches up in a
+        # burst; otherwise it stays behind, as its clock does that stood still too.
+        self.halts: list[tuple[float, float, bool]] = []
         self._frames: list[tuple[float, PoseSample]] = []
         self._is_stopped = False
         self._report()
@@ -60,7 +68,7 @@ class Lockstep:
         """As `systems.link.abb.client.EgmClient.poll`; time passes only here."""
         end = self.time + max(timeout, LOOK)
         while not self._on_the_way or self._on_the_way[0][0] > end:
-            if self.cell.time > end:
+            if self._wall_time > end:
                 self.time = end
                 self.session.check(end)
                 return None
@@ -70,26 +78,31 @@ class Lockstep:
         while self._on_the_way and self._on_the_way[0][0] <= self.time:
             _, _, data, sender = heapq.heappop(self._on_the_way)
             report = self.session.receive(data, sender, self.time)
+            if sender == CELL:
+                with suppress(TelegramError):
+                    self._heard_stamp = self.session.codec.decode(data).time
             if report is not None:
                 newest, self.arrived = report, self.time
         return newest
 
     def answer(self, command: Any) -> bool:
         """As `systems.link.client.LinkClient.answer`."""
-        data = self.session.answer(command, self.time)
-        return data is not None and self._put_on_the_way(data)
+        last = self.session.last
+        return self._put_on_the_way(self.session.answer(command, self.time), last.time if last else 0.0)
 
     def answer_stopping(self, command: Any) -> bool:
         """As `systems.link.client.LinkClient.answer_stopping`."""
-        data = self.session.answer_stopping(command, self.time)
-        return data is not None and self._put_on_the_way(data)
+        return self._put_on_the_way(self.session.answer_stopping(command, self.time), self._heard_stamp)
 
     def reply(self, mode: Mode, command: Command) -> bool:
         """As `systems.link.abb.client.EgmClient.reply`."""
         return self.answer((mode, command))
 
-    def _put_on_the_way(self, data: bytes) -> bool:
+    def _put_on_the_way(self, data: bytes | None, stamp: float) -> bool:
+        if data is None:
+            return False
         self.sent.append((self.time, data))
+        self.stamps.append(stamp)
         for delivery in self.from_client.pass_on(self.time + TURN_AROUND, data):
             if not delivery.is_foreign:
                 heapq.heappush(self._replies, (delivery.time, next(self._order), delivery.data))
@@ -129,24 +142,36 @@ class Lockstep:
         self._frames = self._frames[len(known) :]
         return known
 
+    @property
+    def _wall_time(self) -> float:
+        """When the cell's present cycle begins, in s."""
+        time = self.cell.time
+        for at, seconds, catches_up in self.halts:
+            if self.cell.time >= at:
+                time = max(time, at + seconds) if catches_up else time + seconds
+        return time
+
     def _cycle(self) -> None:
-        now = self.cell.time
+        now = self._wall_time
         while self._replies and self._replies[0][0] <= now:
             data = heapq.heappop(self._replies)[2]
             self.controller.receive(data, self.cell.stamp, self.cell.planned)
-        if 0.0 <= self.faults.stop_at <= now and not self._is_stopped:
+        if 0.0 <= self.faults.stop_at <= self.cell.time and not self._is_stopped:
             self._is_stopped = True
             self.controller.stop(self.cell.stamp)
         self.controller.cycle(self.cell.stamp, self.cell.planned)
+        exposures = self.cell.advance(self.controller)
+        behind = self._wall_time - self.cell.time
         self._frames += [
-            (exposure.published, exposure.sample) for exposure in self.cell.advance(self.controller)
+            (published + behind, replace(sample, time=sample.time + behind))
+            for published, sample in exposures
         ]
         self._report()
 
     def _report(self) -> None:
         joints = self.cell.joints
         data = self.controller.report(self.cell.stamp, joints.position, self.cell.planned, joints.effort)
-        for delivery in self.to_client.pass_on(self.cell.time, data) if data is not None else ():
+        for delivery in self.to_client.pass_on(self._wall_time, data) if data is not None else ():
             sender = STRANGER if delivery.is_foreign else CELL
             heapq.heappush(self._on_the_way, (delivery.time, next(self._order), delivery.data, sender))
 

@@ -58,6 +58,10 @@ class OwnLink:
     def heard(self) -> float:
         return self.arrived
 
+    @property
+    def heard_stamp(self) -> float:
+        return self.cell.stamp
+
     def stop(self, position: np.ndarray, velocity: np.ndarray, is_speed_only: bool = False) -> bool:
         return self.send(position, velocity, is_speed_only)
 

@@ -1,5 +1,7 @@
 """Whatever is to be sent and however messages come, from one to the next no joint exceeds its limits."""
 
+import itertools
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -7,7 +9,7 @@ from hypothesis import strategies as st
 
 from robots.description.model import load_robot
 from systems.guard.joint_limits import JointLimits
-from systems.guard.message_guard import MOST_BRIDGED, MessageGuard, PassedTime
+from systems.guard.message_guard import LONGEST_OWED, MOST_BRIDGED, MessageGuard, PassedTime
 
 ROBOT = load_robot("irb1200")
 LIMITS = JointLimits(ROBOT)
@@ -23,7 +25,9 @@ class Stream:
         self.guard.forget(MIDDLE)
         self.passed = PassedTime(PERIOD)
         self.stamp, self.now = 1000.0, 5.0
+        self.passed.until(self.stamp, self.now)
         self.rows: list[tuple] = [(PERIOD, MIDDLE, np.zeros(6))]
+        self.clocks = [(self.stamp, self.now)]
 
     def send(self, position, velocity, stamp: float = PERIOD, own: float = PERIOD, brakes: bool = False):
         """A message; the clocks have gone on by two times in s."""
@@ -31,6 +35,7 @@ class Stream:
         passed = self.passed.until(self.stamp, self.now)
         sent = self.guard.braking(passed, 0.1) if brakes else self.guard.judged(position, velocity, passed)
         self.rows.append((passed, *(part.copy() for part in sent)))
+        self.clocks.append((self.stamp, self.now))
         return sent
 
     def check(self) -> None:
@@ -47,28 +52,73 @@ class Stream:
         assert (np.abs(np.diff(mean, axis=0)) <= ROBOT.acceleration * spans * slack + 1e-9).all()
         assert ((position >= ROBOT.lower) & (position <= ROBOT.upper)).all()
 
+    def check_clocks(self) -> None:
+        """The time that was counted: between any two messages none that either clock has not seen.
+
+        On the own clock a message may be early by as much as the ones before it were late.
+        """
+        counted = np.cumsum([row[0] for row in self.rows])
+        stamps, now = np.array(self.clocks).T
+        n = len(stamps)
+        first, last = np.triu_indices(n, 1)
+        passed = counted[last] - counted[first]
+        assert (passed <= now[last] - now[first] + LONGEST_OWED + PERIOD + 1e-9).all()
+        # A clock that was set back is another one from there on; one that stands for long is none.
+        steps = np.diff(stamps)
+        rises, stands = np.cumsum(np.maximum(steps, 0.0)), np.cumsum(steps == 0.0)
+        seen = np.concatenate([[0.0], rises]) + PERIOD * np.concatenate([[0.0], stands])
+        assert (passed <= seen[last] - seen[first] + 1e-9).all()
+
 
 times = st.sampled_from([0.0, 1e-4, 1e-3, PERIOD, PERIOD, PERIOD, 2 * PERIOD, 0.05, 1.0, -1.0])
+anything = st.lists(st.floats(-10.0, 10.0), min_size=6, max_size=6).map(np.array)
+brakes = st.sampled_from([False, False, False, True])
 messages = st.lists(
-    st.tuples(
-        st.lists(st.floats(-10.0, 10.0), min_size=6, max_size=6).map(np.array),
-        st.lists(st.floats(-10.0, 10.0), min_size=6, max_size=6).map(np.array),
-        times,
-        times.map(abs),
-        st.sampled_from([False, False, False, True]),
-    ),
+    st.tuples(anything, anything, times, times.map(abs), brakes).map(lambda message: [message]),
     min_size=3,
     max_size=40,
 )
+# A sender that stands still, with its clock or without, and then sends what has piled up at once.
+bursts = st.tuples(
+    anything, anything, st.sampled_from([PERIOD, 0.02, 1.0]), st.integers(1, 60), st.sampled_from([0.0, 2e-4])
+).map(
+    lambda burst: [
+        (burst[0], burst[1], PERIOD, burst[2], False),
+        *((burst[0], burst[1], PERIOD, burst[4], False) for _ in range(burst[3])),
+    ]
+)
+
+
+def check(rows: list[list[tuple]]) -> None:
+    stream = Stream()
+    for message in itertools.chain(*rows):
+        stream.send(*message)
+    stream.check()
+    stream.check_clocks()
 
 
 @settings(max_examples=60)
-@given(messages=messages)
-def test_whatever_is_sent_stays_within_speed_and_acceleration(messages):
-    stream = Stream()
-    for message in messages:
-        stream.send(*message)
-    stream.check()
+@given(rows=messages)
+def test_whatever_is_sent_stays_within_speed_and_acceleration(rows):
+    check(rows)
+
+
+sequences = st.lists(st.one_of(messages, bursts), min_size=1, max_size=8).map(
+    lambda parts: [row if isinstance(row, list) else [row] for part in parts for row in part]
+)
+
+
+@settings(max_examples=40)
+@given(sequence=sequences)
+def test_nor_do_bursts_after_gaps_make_it_faster(sequence):
+    check(sequence)
+
+
+@pytest.mark.slow
+@settings(max_examples=500)
+@given(sequence=sequences)
+def test_nor_does_one_of_many_sequences(sequence):
+    check(sequence)
 
 
 def cruise(stream: Stream, count: int, speed: float = 0.3, start: int = 0) -> None:
