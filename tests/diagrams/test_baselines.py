@@ -21,6 +21,7 @@ def laps_mm(law: str, laps: int, *settings: str) -> list[float]:
     return [lap["max_norm_mm"] for lap in lap_metrics(log, pose_errors(log, "true"))]
 
 
+@pytest.mark.slow
 def test_iterative_learning_gains_from_every_lap():
     first, second, third = laps_mm("iterative_learning", 3, "reference.settle=1.5")
     assert second < 0.5 * first

@@ -28,6 +28,7 @@ def scenario():
     return load_scenario("misaligned", [*SETTINGS, "seed=5"])
 
 
+@pytest.mark.slow
 def test_a_cycle_is_a_run_with_its_own_seed_bit_for_bit(scenario):
     robot, shares, environment = load_robot("irb1200"), [], dict(os.environ)
     logs = compare(
@@ -55,6 +56,7 @@ def test_a_run_that_breaks_off_ends_the_comparison_and_its_processes(scenario):
     assert multiprocessing.active_children() == []
 
 
+@pytest.mark.slow
 def test_an_interruption_ends_all_processes_at_once(scenario):
     long = replace(scenario, reference=replace(scenario.reference, dwell=60.0))
 

@@ -57,6 +57,7 @@ def test_the_printed_law_is_short_and_brings_the_tip_where_the_open_loop_does_no
     assert static[my_law] < 0.5  # five time constants of its gain of 4 /s, 50 um of noise
 
 
+@pytest.mark.slow
 def test_run_and_compare_take_it_beside_the_shipped_ones(my_law: str, tmp_path: Path):
     arguments = [f"--laws=open_loop,{my_law}", "--quick", *SHORT, f"--out={tmp_path / 'out'}"]
     result = truetip("compare", *arguments, "--json=-", "--jobs=1")

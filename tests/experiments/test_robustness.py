@@ -68,6 +68,7 @@ def test_the_command_prints_a_row_of_each_law_and_writes_the_numbers(tmp_path: P
     assert worst > median > 5.0  # millimetres, of robots that are off by some
 
 
+@pytest.mark.slow
 def test_what_is_left_after_an_event_is_told(tmp_path: Path):
     file = tmp_path / "numbers.json"
     settings = [part for setting in ["reference.settle=5.8", *QUICK[1:]] for part in ("--set", setting)]

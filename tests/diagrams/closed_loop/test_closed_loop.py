@@ -20,7 +20,13 @@ def limit_of(law: str) -> float:
     return 0.05 if law == "pbvs" else 0.01
 
 
-@pytest.fixture(scope="module", params=[*LAWS, "open_loop"])
+@pytest.fixture(
+    scope="module",
+    params=[
+        law if law == "numerical_ik" else pytest.param(law, marks=pytest.mark.slow)
+        for law in [*LAWS, "open_loop"]
+    ],
+)
 def misaligned(request) -> tuple[str, RunLog]:
     return request.param, run(scenario("misaligned"), request.param)
 

@@ -71,6 +71,7 @@ def largest_gap_mm(*settings: str, robot: RobotModel | None = None) -> float:
     return 1e3 * float(gap[log.time >= log.path_start].max())
 
 
+@pytest.mark.slow
 def test_a_structure_in_the_model_takes_what_elastic_joints_leave():
     kinds = ("rigid", "flexible_joint", "elastic_structure")
     gaps = {kind: largest_gap_mm(f"servo.feedforward.kind={kind}") for kind in kinds}
@@ -175,6 +176,7 @@ def test_its_commands_are_those_of_an_open_loop_with_its_offsets(prefilter: str)
     assert moving
 
 
+@pytest.mark.slow
 def test_gears_that_stiffen_under_load_are_followed_like_linear_ones(tmp_path: Path):
     """In the plant and in the model; a model with linear springs is off by what the gears do not bend."""
     robot, path = load_robot("irb1200"), str(tmp_path / "robot.yaml")

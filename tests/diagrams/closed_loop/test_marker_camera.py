@@ -31,6 +31,7 @@ def test_a_misaligned_robot_comes_to_rest_where_it_should():
     assert max(errors["static_deg"]) < 0.02
 
 
+@pytest.mark.slow
 def test_the_same_seed_gives_the_same_log():
     once, again, other = (log("features", BRIEF, seed) for seed in (0, 0, 1))
     for name in ("X_WE_true", "X_WE_measured", "position_command"):

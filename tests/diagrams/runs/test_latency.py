@@ -131,6 +131,7 @@ def test_what_cannot_be_moved_is_refused(config: dict, message: str | None):
             measured(**config)
 
 
+@pytest.mark.slow
 def test_the_delays_become_a_scenario(tmp_path):
     found = measured("station.drive.dead_time=0.052")
     path = tmp_path / "found.yaml"

@@ -36,7 +36,7 @@ def test_without_noise_it_writes_down_the_statics():
     np.testing.assert_array_equal(record.measured.payload, 7.0)
 
 
-@pytest.mark.parametrize("period", [0.11, 0.7, 1.0])
+@pytest.mark.parametrize("period", [0.11, 0.7, pytest.param(1.0, marks=pytest.mark.slow)])
 def test_a_slow_camera_shows_the_robot_at_rest_and_not_on_its_way(period: float):
     """An exposure from the motion is off by up to 279 mm.
 
@@ -57,6 +57,7 @@ def test_a_place_that_a_slow_camera_sees_only_once_is_left_out():
         MeasurementRun(scenario).measure(PLACES[:2])
 
 
+@pytest.mark.slow
 def test_the_mean_of_a_window_has_the_noise_of_a_mean():
     """50 samples of 50 um leave 7 um; over 3 places and axes the spread is known to a quarter."""
     scenario = load_scenario("misaligned")
@@ -65,6 +66,7 @@ def test_the_mean_of_a_window_has_the_noise_of_a_mean():
     assert np.sqrt(np.mean(noise**2)) == pytest.approx(50e-6 / np.sqrt(50), rel=0.4)
 
 
+@pytest.mark.slow
 def test_it_can_be_done_again_with_the_same_result_and_another_seed_differs():
     run = MeasurementRun(load_scenario("misaligned"))
     once, again, other = (run.measure(PLACES[:2], seed).measured.position for seed in (3, 3, 4))

@@ -63,6 +63,7 @@ def test_over_the_wire_a_law_is_as_accurate_as_in_simulation(law: str, settings:
     assert record.counters["missing"] == 0
 
 
+@pytest.mark.slow
 def test_loss_doubling_overtaking_and_jitter_cost_nothing_at_rest_and_are_all_counted():
     record, e, wire = guided(quick(*(f"station.faults.{fault}" for fault in NOISE)))
     largest, static = largest_and_static(record.log, e)
@@ -99,6 +100,7 @@ def motion(wire: Lockstep) -> tuple[np.ndarray, np.ndarray]:
     return velocity, np.diff(velocity, axis=0) / PERIOD
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("fault", ["stall_at=5", pytest.param("stop_at=5", marks=pytest.mark.slow)])
 def test_when_the_controller_goes_the_run_ends_and_the_robot_stops_smoothly(fault: str):
     record, _, wire = guided(quick(f"station.faults.{fault}"))
@@ -114,6 +116,7 @@ def test_when_the_controller_goes_the_run_ends_and_the_robot_stops_smoothly(faul
     assert np.abs(acceleration[SETTLED:]).max() < HARSH
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("fault", "law"),
     [

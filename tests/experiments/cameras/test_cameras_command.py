@@ -91,6 +91,7 @@ def test_a_wrong_line_of_a_table_is_named(tmp_path: Path):
     assert "seen.csv, line 3: camera '99' is none of the cell" in refused
 
 
+@pytest.mark.slow
 def test_run_and_compare_take_another_camera(tmp_path: Path):
     options = [*SHORT, "--law=numerical_ik", f"--out={tmp_path}"]
     assert truetip("run", "--camera=features", *options).exit_code == 0

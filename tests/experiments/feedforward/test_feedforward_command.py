@@ -111,6 +111,7 @@ def test_nowhere_in_the_workspace_does_the_wrist_ring_more_with_the_structure_in
     assert max(ratios) <= 1.1
 
 
+@pytest.mark.slow
 def test_a_structure_in_the_model_calms_the_wrist():
     found = [Trial(ROBOT, 16.0, START, np.deg2rad(5.0), FeedforwardConfig(kind)).run() for kind in KINDS]
     assert found == sorted(found, reverse=True)

@@ -19,6 +19,7 @@ def health(folder: Path, *more: str):
     return json.loads((folder / "h.json").read_text())
 
 
+@pytest.mark.slow
 def test_a_camera_that_turns_is_named_and_the_check_is_in_the_history(tmp_path: Path):
     (alarm,) = health(tmp_path, "--change", "camera:04:50")["alarms"]
     assert (alarm["kind"], alarm["what"]) == ("camera", "camera 04")

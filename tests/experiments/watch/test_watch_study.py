@@ -21,6 +21,7 @@ def test_everybody_is_found_hardly_ever_too_far_and_light_and_robot_stop_nothing
     assert numbers["smallest_share"] == 1.0
 
 
+@pytest.mark.slow
 def test_with_images_of_half_the_size_people_are_found_too():
     small = ["station.overview.width=320", "servo.people.hull.edge=0.08"]
     numbers = study(3, 0.1, *small).as_dict()

@@ -108,6 +108,7 @@ def test_narrow_ranges_are_no_reason_to_refuse_a_design():
     assert (design.configurations >= robot.lower).all()
 
 
+@pytest.mark.slow
 def test_the_complete_model_is_taken_where_the_source_s_parameters_miss_something():
     counts = {
         (name, design.is_complete): design.num_parameters

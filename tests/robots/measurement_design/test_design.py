@@ -81,6 +81,7 @@ def test_a_gradient_bounds_its_criterion_everywhere(name: str, seed: int):
         assert np.sum((M @ root) * root) == pytest.approx(goal.value(M), rel=1e-6)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["d", pytest.param("i", marks=pytest.mark.slow)])
 def test_other_criteria_come_close_to_their_bounds_too(name: str):
     design = design_measurements(ROBOT, 40, name, ranges=COARSE)
@@ -100,6 +101,7 @@ def test_no_direction_is_lost_on_the_way():
     assert 0.98 * design.bound < design.value <= design.bound
 
 
+@pytest.mark.slow
 def test_the_same_seed_gives_the_same_design():
     once, again, other = (design_measurements(ROBOT, 20, ranges=COARSE, seed=seed) for seed in (3, 3, 4))
     np.testing.assert_array_equal(once.configurations, again.configurations)
