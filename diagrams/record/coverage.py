@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
-from scipy.stats import chi2
+from scipy.special import chdtri
 
 from robots.pose import pose_error
 
@@ -32,5 +32,5 @@ def coverage(predictions: Sequence[Prediction], times: np.ndarray, X_WE: np.ndar
         if not len(times) or abs(times[row] - time) > _APART:
             continue
         error = pose_error(X_WE[row], predicted)
-        inside.append(error @ np.linalg.solve(covariance, error) < chi2.ppf(_SHARE, 6))
+        inside.append(error @ np.linalg.solve(covariance, error) < chdtri(6, 1.0 - _SHARE))
     return {"share": float(np.mean(inside)) if inside else None, "samples": len(inside)}

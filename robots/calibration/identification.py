@@ -8,7 +8,7 @@ with gross errors are found before they can hide each other.
 from dataclasses import dataclass, field, replace
 
 import numpy as np
-from scipy.stats import chi2
+from scipy.special import chdtri
 
 from robots.calibration.error_model import ErrorModel
 from robots.calibration.identified import Identified
@@ -253,8 +253,8 @@ class _Search:
             return False
         squares = np.sum(np.einsum("nij,nj->ni", noise.whitening(fit.at.J), e) ** 2, axis=1)
         n, k = e.shape
-        total = squares.sum() <= chi2.isf(0.05, max(n * k - _REDUNDANCY_OF_A_POSE, k))
-        return bool(total and squares.max() <= chi2.isf(_RISK / n, k))
+        total = squares.sum() <= chdtri(max(n * k - _REDUNDANCY_OF_A_POSE, k), 0.05)
+        return bool(total and squares.max() <= chdtri(k, _RISK / n))
 
     def _perfect(self, fit: Fit) -> tuple[np.ndarray, np.ndarray] | None:
         """Parameters and variances where all rows fit to rounding: there are no noise and no gross errors."""

@@ -3,7 +3,7 @@
 from dataclasses import asdict, dataclass
 
 import numpy as np
-from scipy.stats import chi2
+from scipy.special import chdtri
 
 from robots.calibration.error_model import ZEROS
 from robots.calibration.identified import Identified
@@ -76,6 +76,6 @@ def plausible_rows(identified: Identified, measurements: Measurements) -> np.nda
     variances = np.repeat([noise.rotation_sigma**2, noise.position_sigma**2], 3)[6 - width :]
     V = noise.joint_sigma**2 * J @ np.swapaxes(J, 1, 2) + np.diag(np.maximum(variances, _ROUNDING**2))
     squared = np.sum(errors * np.linalg.solve(V, errors[..., None])[..., 0], axis=1)
-    spread = max(float(np.median(squared)) / chi2.median(width), 1.0)
-    largest = chi2.isf(_RISK / max(len(squared), 1), width)
+    spread = max(float(np.median(squared)) / chdtri(width, 0.5), 1.0)
+    largest = chdtri(width, _RISK / max(len(squared), 1))
     return squared <= _BENEFIT_OF_DOUBT**2 * spread * largest

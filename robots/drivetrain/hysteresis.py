@@ -10,7 +10,6 @@ from math import comb
 from typing import Any, ClassVar
 
 import numpy as np
-from scipy.signal import cont2discrete, tf2ss
 from scipy.special import expit
 
 _NEWTON_STEPS, _SOLVED = 60, 1e-12
@@ -198,6 +197,8 @@ class SmoothPrandtlIshlinskii:
         """The Pade delay for steps of a time in s."""
         if not 0.0 < step < self.delay:
             raise ValueError(f"SmoothPrandtlIshlinskii: step must be below the delay, got {step} s")
+        from scipy.signal import cont2discrete, tf2ss  # here: half a second that few need
+
         delay: Any = cont2discrete(tf2ss(*pade_delay(self.delay, self.order)), step, method="zoh")
         A, B, C = (np.asarray(matrix) for matrix in delay[:3])
         return A, B, C

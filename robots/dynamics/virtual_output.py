@@ -8,7 +8,6 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.polynomial import Polynomial
-from scipy.signal import ss2tf
 
 _ILL_CONDITIONED = 1e-6  # how far the zeros may be from where they are wanted, relative
 
@@ -54,6 +53,8 @@ def virtual_output(A: np.ndarray, B: np.ndarray, C: np.ndarray, wanted: np.ndarr
         )
     # (3.45): what of the first n - 1 states does not depend on the input; zero at rest.
     rest = A[:-1] - np.outer(B[:-1] / B[-1], A[-1])
+
+    from scipy.signal import ss2tf  # here: half a second that few need
 
     def numerator(row: np.ndarray) -> np.ndarray:
         found, _ = ss2tf(A, B[:, None], row[None], np.zeros((1, 1)))

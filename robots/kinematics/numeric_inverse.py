@@ -10,7 +10,6 @@ import math
 from typing import Protocol
 
 import numpy as np
-from scipy.stats import qmc
 
 from robots.description.model import NUM_JOINTS, RobotModel
 from robots.kinematics.analytic_inverse import JointLimitError, UnreachableError, turned_into
@@ -79,6 +78,8 @@ class NumericInverse:
             Joint positions in (-pi, pi], shape (n, 6) with n up to 16, sorted; of a singular pose, which has
             infinitely many, some of them.
         """
+        from scipy.stats import qmc  # here: half a second that few need
+
         X_WE = np.asarray(X_WE, dtype=float)
         starts = qmc.Halton(NUM_JOINTS, rng=np.random.default_rng(0))
         solutions, counts = np.empty((0, NUM_JOINTS)), np.empty(0, dtype=int)

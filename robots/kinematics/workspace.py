@@ -1,7 +1,6 @@
 """The size of a robot, its front, and positions in the middle of its workspace, whatever its geometry."""
 
 import numpy as np
-from scipy.stats import qmc
 
 from robots.description.model import NUM_JOINTS, RobotModel
 from robots.kinematics.arm_structure import seen_from_base
@@ -64,6 +63,8 @@ def working_positions(robot: RobotModel, count: int = 12) -> np.ndarray:
     Returns:
         Joint positions in rad, shape (n, 6), with n at least 1.
     """
+    from scipy.stats import qmc  # here: half a second that few need
+
     lower, upper = np.maximum(robot.lower, -np.pi), np.minimum(robot.upper, np.pi)
     is_free = lower < upper  # of a range beyond a turn nothing is left
     lower, upper = np.where(is_free, lower, robot.lower), np.where(is_free, upper, robot.upper)

@@ -9,7 +9,6 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.interpolate import CubicSpline
 from scipy.optimize import minimize_scalar
-from scipy.signal import correlate
 
 _LEAST_CORRELATION = 0.5  # of the two signals where they fit best: below, they are not of one motion
 
@@ -53,6 +52,8 @@ def align(first: np.ndarray, second: np.ndarray, period: float, window: float) -
         AlignmentError: if a signal does not change, the best lag is at an end of the window or the signals
             have little in common there.
     """
+    from scipy.signal import correlate  # here: half a second that few need
+
     x, y = (np.asarray(signal, dtype=float).reshape(len(signal), -1) for signal in (first, second))
     if x.shape != y.shape:
         raise AlignmentError(f"signals must have the same shape, got {x.shape} and {y.shape}")

@@ -12,7 +12,7 @@ from pydrake.common import RandomDistribution
 from pydrake.common.value import Value
 from pydrake.math import RigidTransform
 from pydrake.systems.framework import Context, DiscreteValues, LeafSystem
-from scipy.stats import norm
+from scipy.special import ndtri
 
 from robots.description.model import NUM_JOINTS, RobotModel
 from robots.kinematics.arm_capsules import ArmCapsules
@@ -111,7 +111,7 @@ class MarkerCamera(LeafSystem):
         self._images = ImageBlobs(cameras, cell.windows, body, config.images, config.centroids)
         self._tracker = Tracker(known.camera_model(X_WB), body, config.tracker)
         self._arm = ArmCapsules(robot) if robot else None
-        self._lost_below = norm.ppf(config.dropout_probability)
+        self._lost_below = ndtri(config.dropout_probability)
         source = self._features if config.kind == "features" else self._images
         self._per_exposure = source.noise_size + 1  # the last one for a lost exposure
         self._X_WE = self.DeclareAbstractInputPort("X_WE", Value(RigidTransform()))

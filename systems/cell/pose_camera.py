@@ -8,7 +8,7 @@ from pydrake.common import RandomDistribution
 from pydrake.common.value import Value
 from pydrake.math import RigidTransform
 from pydrake.systems.framework import Context, DiscreteValues, LeafSystem, ValueProducer
-from scipy.stats import norm
+from scipy.special import ndtri
 
 from robots.configuration.quantity import quantity
 from robots.description.model import RobotModel
@@ -91,8 +91,8 @@ class PoseCamera(LeafSystem):
         _check(config)
         self._config = config
         self._rotation_sigma = float(np.deg2rad(config.orientation_sigma_deg))
-        self._lost_below = norm.ppf(config.dropout_probability)
-        self._outlier_below = norm.ppf(config.outlier_probability)
+        self._lost_below = ndtri(config.dropout_probability)
+        self._outlier_below = ndtri(config.outlier_probability)
         self._numbers = _PER_EXPOSURE + (_PER_OUTLIER if config.outlier_probability > 0.0 else 0)
         self._X_WE = self.DeclareAbstractInputPort("X_WE", Value(RigidTransform()))
         self._noise = self.DeclareVectorInputPort(

@@ -13,7 +13,6 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.polynomial import Polynomial
 from pydrake.systems.primitives import LinearSystem
-from scipy import signal
 
 from robots.dynamics.transmission_zeros import Zeros
 
@@ -84,14 +83,18 @@ class InverseObserver:
 
     def system(self, channels: int = 1) -> LinearSystem:
         """The same for so many outputs: from wanted less reached outputs of the model to a correction."""
+        from scipy.signal import tf2ss  # here: half a second that few need
+
         numerator, denominator = self.gain()
-        A, B, C, D = signal.tf2ss(numerator.coef[::-1], denominator.coef[::-1])
+        A, B, C, D = tf2ss(numerator.coef[::-1], denominator.coef[::-1])
         each = np.eye(channels)
         return LinearSystem(np.kron(each, A), np.kron(each, B), np.kron(each, C), np.kron(each, D))
 
 
 def bessel_denominator(order: int, hertz: float) -> Polynomial:
     """Of a Bessel low-pass with the numerator 1, in s; it passes 1 / sqrt(2) at so many hertz."""
-    poles = signal.besselap(order, norm="mag")[1] * 2.0 * np.pi * hertz
+    from scipy.signal import besselap  # here: half a second that few need
+
+    poles = besselap(order, norm="mag")[1] * 2.0 * np.pi * hertz
     coefficients = np.poly(poles).real[::-1]
     return Polynomial(coefficients / coefficients[0])

@@ -4,7 +4,6 @@ from dataclasses import dataclass
 
 import numpy as np
 from scipy.linalg import expm
-from scipy.signal import besselap
 
 from robots.configuration.quantity import choice, quantity
 
@@ -55,6 +54,8 @@ class Prefilter:
         self.order = config.order
         cutoff = 2.0 * np.pi * config.cutoff_hz
         if config.kind == "bessel":
+            from scipy.signal import besselap  # here: half a second that few need
+
             poles = besselap(config.order, norm="mag")[1] * cutoff
         else:
             poles = np.full(config.order, -cutoff)

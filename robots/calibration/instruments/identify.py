@@ -3,7 +3,7 @@
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.stats import chi2
+from scipy.special import chdtri
 
 from robots.calibration.error_model import ErrorModel
 from robots.calibration.identification import IdentificationError
@@ -216,7 +216,7 @@ class _Adjustment:
         for _ in range(_SEARCHES):
             size = self._sizes(u, scale)
             typical = self._medians(np.where(used, size, np.nan))[problem.observations.instrument]
-            limit = np.sqrt(chi2.isf(_RISK / len(size), count) / chi2.median(count))
+            limit = np.sqrt(chdtri(count, _RISK / len(size)) / chdtri(count, 0.5))
             now = size <= np.maximum(2.0 * limit * typical, 1e-5 / scale[:, 0])
             problem.active = self._everything & now[:, None]
             if np.array_equal(now, used):

@@ -6,7 +6,7 @@ one after the other as long as the core predicts them.
 """
 
 import numpy as np
-from scipy.stats import f as fisher
+from scipy.special import fdtrc
 
 from robots.calibration.solver.levenberg_marquardt import minimise
 from robots.calibration.solver.noise_model import FLOOR, POSITION, ROTATION, NoiseModel
@@ -160,6 +160,6 @@ class CleanRows:
         inside = np.maximum(total - squared, 0.0) / max(freedom - k, 1.0)
         spread = np.where(clean, inside, total / max(freedom, 1.0))
         ratio = squared / k / np.maximum(spread, 1e-300)
-        chance = fisher.sf(ratio, k, np.where(clean, max(freedom - k, 1.0), max(freedom, 1.0)))
+        chance = fdtrc(k, np.where(clean, max(freedom - k, 1.0), max(freedom, 1.0)), ratio)
         is_small = np.abs(self._e - self._raw @ d).max(axis=1) < _GROSS
         return np.where(is_small, 1.0, chance), is_controlled

@@ -8,8 +8,7 @@ its centre; the ellipse that a sphere off the axis really shows lies a little be
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.special import ndtr
-from scipy.stats import poisson
+from scipy.special import ndtr, pdtr
 
 from robots.kinematics.arm_capsules import Capsules
 from systems.vision.camera_model import Cameras
@@ -52,7 +51,7 @@ class FeatureSource:
         self._cameras, self._windows, self._body, self._config = cameras, windows, body, config
         mean = config.false * len(body)
         # The number of false blobs is as many of these as the chance exceeds.
-        self._false_counts = poisson.cdf(np.arange(FALSE_SLOTS), mean)
+        self._false_counts = pdtr(np.arange(FALSE_SLOTS), mean)  # Poisson
 
     @property
     def noise_size(self) -> int:
