@@ -8,7 +8,7 @@ from diagrams.record.log import RunLog
 from experiments.cli.prepare import Prepared
 from experiments.comparison.figure import write_figure
 from experiments.metrics.run_metrics import summary, timing
-from experiments.replay.replay import write_replay
+from experiments.replay.replay import watchers, write_replay
 from experiments.report.files import write_json
 from experiments.report.report import write_report
 
@@ -40,8 +40,7 @@ def write_results(folder: Path, prepared: Prepared, logs: Mapping[str, Sequence[
     write_json(folder / "summary.json", result)
     write_json(folder / "timing.json", times)
     write_report(folder / "report.html", prepared.text, result, times, logs, prepared.true_robot)
-    write_replay(
-        folder / "replay.html", prepared.nominal_robot, first_cycles, errors=prepared.scenario.station.errors
-    )
+    seen_by = watchers(prepared.scenario.station.camera, prepared.nominal_robot)
+    write_replay(folder / "replay.html", prepared.true_robot, first_cycles, seen_by=seen_by)
     write_figure(folder / "figure.svg", prepared.title, first_cycles)
     return result

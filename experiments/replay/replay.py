@@ -1,47 +1,76 @@
-"""The replay of a comparison: a meshcat recording in one HTML file that plays offline.
+"""The replay of a comparison: one HTML file in which the robot moves, and which plays offline.
 
-The robot moves as its links truly did, with the geometry that it truly had, so that its tool meets the true
-path. Deviations are drawn to scale.
+The robot moves as its links truly did, with the geometry that it truly had. Deviations from the wanted pose
+are a thousandth of what one sees of a robot, so the page magnifies them as arrows and trails.
 """
 
 from collections.abc import Mapping
-from html import escape
+from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Any
 
 import numpy as np
-from pydrake.geometry import MeshcatAnimation, Sphere
-from pydrake.math import RigidTransform, RotationMatrix
+from pydrake.common import FindResourceOrThrow
 
 from diagrams.record.log import RunLog
 from experiments.metrics.run_metrics import known_poses, path_window
-from experiments.replay.scene import FRAME_RATE, RobotPicture, draw_frame, draw_path, open_meshcat, rgba
-from experiments.report.files import write_text
-from experiments.report.style import WANTED_COLOR, law_colors, law_file_name, law_title
-from robots.description.geometric_errors import GeometricErrors
+from experiments.replay.replay_data import replay_data
+from experiments.replay.robot_shapes import robot_shapes
+from experiments.report.curves import rounded
+from experiments.report.packed import packed
+from experiments.report.page import write_page
 from robots.description.model import RobotModel
 from robots.pose import pose_error
+from systems.cell.marker_camera import MarkerCameraConfig
+from systems.vision.camera_rig import load_cell
+from systems.vision.marker_body import load_body
 
-TIP_RADIUS = 0.006  # m
-WANTED_RADIUS = 0.003  # m; the wanted path is a translucent tube, which a true path 3 mm off leaves
-PATH_RADIUS = 0.0015  # m
+
+@dataclass(frozen=True)
+class Watchers:
+    """The cameras around a robot and the markers on its tool.
+
+    Attributes:
+        cameras: their poses in the world, z along the view, shape (n, 4, 4).
+        markers: centres in the tool's frame in m, shape (m, 3).
+        diameter: of a marker in m.
+    """
+
+    cameras: np.ndarray = field(default_factory=lambda: np.empty((0, 4, 4)))
+    markers: np.ndarray = field(default_factory=lambda: np.empty((0, 3)))
+    diameter: float = 0.016
+
+
+def watchers(camera: Any, robot: RobotModel) -> Watchers:
+    """Cameras and markers of a camera's configuration; none for a camera that only gives poses.
+
+    Raises:
+        ValueError: if the files of cell or body are not there any more.
+    """
+    if not isinstance(camera, MarkerCameraConfig):
+        return Watchers()
+    body = load_body(camera.body)
+    cameras = load_cell(camera.cell).camera_model(robot.base.pose())
+    X_WC = np.tile(np.eye(4), (len(cameras.p_WC), 1, 1))
+    X_WC[:, :3, :3], X_WC[:, :3, 3] = cameras.R_WC, cameras.p_WC
+    return Watchers(X_WC, body.p_E, body.diameter)
 
 
 def write_replay(
     path: str | Path,
     robot: RobotModel,
     logs: Mapping[str, RunLog],
-    errors: GeometricErrors | None = None,
     shown_law: str | None = None,
+    seen_by: Watchers | None = None,
 ) -> None:
-    """Writes the recording as one self-contained HTML file, atomically.
-
-    One law's robot moves, with frames at its true tool and at the wanted pose; the other laws show their tips
-    and paths. Everything can be switched off in the scene tree: ``robot``, ``wanted`` and one entry per law.
+    """Writes the replay as one self-contained HTML file, atomically.
 
     Args:
+        path: where to.
+        robot: with the geometry that it truly has.
         logs: law -> log, all on the same path.
-        errors: the true geometry of the robot; None for exact geometry.
-        shown_law: whose robot moves; None takes the law with the smallest largest error.
+        shown_law: whose robot is there at first; None takes the law with the smallest largest error.
+        seen_by: cameras and markers; None for none.
 
     Raises:
         OSError: if the folder is missing or cannot be written.
@@ -50,30 +79,21 @@ def write_replay(
     shown_law = shown_law or _best(logs)
     if shown_law not in logs:
         raise ValueError(f"replay: no log of law '{shown_law}', there are {', '.join(logs)}")
-    shown = logs[shown_law]
-    # Nothing connects to the server, the page is all we want: any port will do.
-    meshcat = open_meshcat(shown.X_WE_desired[:, :3, 3], port=0)
-    times = np.arange(shown.time[0], shown.time[-1] + 0.5 / FRAME_RATE, 1.0 / FRAME_RATE)
-    _record_robot(RobotPicture(meshcat, robot, errors), shown, times)
-    animation = meshcat.get_mutable_recording()
-    colors = law_colors(logs)
-    on_path = path_window(shown)
-    wanted = shown.X_WE_desired[on_path, :3, 3]
-    draw_path(meshcat, "wanted/path", wanted, WANTED_RADIUS, rgba(WANTED_COLOR, 0.5))
-    draw_frame(meshcat, "wanted/frame", length=0.14, radius=0.0018, alpha=0.45)
-    _animate(animation, "wanted/frame", shown.time, shown.X_WE_desired, times)
-    for law, log in logs.items():
-        X_WE = known_poses(log)
-        p_WE, place = X_WE[path_window(log), :3, 3], law_file_name(law)
-        draw_path(meshcat, f"{place}/path", p_WE, PATH_RADIUS, rgba(colors[law]))
-        if law == shown_law:
-            draw_frame(meshcat, f"{place}/tip", length=0.1, radius=0.003, alpha=1.0)
-        else:
-            meshcat.SetObject(f"{place}/tip", Sphere(TIP_RADIUS), rgba(colors[law]))
-        _animate(animation, f"{place}/tip", log.time, X_WE, times)
-    animation.set_loop_mode(MeshcatAnimation.LoopMode.kLoopRepeat)
-    meshcat.PublishRecording()
-    write_text(path, _with_legend(meshcat.StaticHtml(), colors, shown_law))
+    seen_by = seen_by or Watchers()
+    data = replay_data(logs, shown_law) | {
+        "robot": robot_shapes(robot),
+        "cameras": [rounded(X.reshape(-1), 7) for X in seen_by.cameras],
+        "markers": [rounded(p, 7) for p in seen_by.markers],
+        "marker_radius": 0.5 * seen_by.diameter,
+    }
+    write_page(
+        path, "replay.html", library=packed(_viewer()), title="truetip replay", laws=data["laws"], data=data
+    )
+
+
+def _viewer() -> str:
+    """The script of Meshcat, which brings three.js with it."""
+    return Path(FindResourceOrThrow("drake/geometry/meshcat.js")).read_text(encoding="utf-8")
 
 
 def _best(logs: Mapping[str, RunLog]) -> str:
@@ -84,45 +104,3 @@ def _best(logs: Mapping[str, RunLog]) -> str:
         return float(np.linalg.norm(e[:, 3:], axis=1).max(initial=0.0))
 
     return min(laws, key=largest)
-
-
-def _record_robot(picture: RobotPicture, log: RunLog, times: np.ndarray) -> None:
-    """Records the robot at the true link positions; starts the recording that others add to."""
-    positions = np.stack([np.interp(times, log.time, log.link_position[:, i]) for i in range(6)], -1)
-    picture.visualizer.StartRecording(set_transforms_while_recording=True)
-    for time, q in zip(times - times[0], positions, strict=True):
-        picture.show(time, q)
-    picture.visualizer.StopRecording()
-
-
-def _animate(
-    animation: MeshcatAnimation, path: str, log_time: np.ndarray, X: np.ndarray, times: np.ndarray
-) -> None:
-    """Moves an object along sampled poses (n, 4, 4), taking the sample nearest to each frame."""
-    nearest = np.clip(np.searchsorted(log_time, times), 0, len(log_time) - 1)
-    for time, i in zip(times - times[0], nearest, strict=True):
-        R = RotationMatrix.ProjectToRotationMatrix(X[i, :3, :3])
-        pose = RigidTransform(R, X[i, :3, 3])
-        animation.SetTransform(animation.frame(time), path, pose)
-
-
-def _with_legend(html: str, colors: Mapping[str, str], shown_law: str) -> str:
-    """Names the colours in a corner of the page."""
-    entries = {"wanted, 3 mm radius": WANTED_COLOR}
-    entries |= {
-        law_title(law) + (" (robot)" if law == shown_law else ""): color for law, color in colors.items()
-    }
-    lines = "".join(
-        f'<div><span style="display:inline-block;width:18px;height:4px;border-radius:2px;margin-right:8px;'
-        f'vertical-align:middle;background:{color}"></span>{escape(title)}</div>'
-        for title, color in entries.items()
-    )
-    legend = (
-        '<div id="legend" style="position:fixed;left:14px;bottom:14px;padding:10px 14px;border-radius:8px;'
-        "background:rgba(255,255,255,.85);color:#1c2430;font:14px/1.6 system-ui,sans-serif;"
-        'pointer-events:none">'
-        f"{lines}</div>"
-    )
-    html = html.replace("<title>Drake MeshCat</title>", "<title>truetip replay</title>")
-    head, closing, tail = html.rpartition("</body>")
-    return head + legend + closing + tail

@@ -9,6 +9,7 @@ from itertools import pairwise
 from typing import Any
 
 import numpy as np
+import plotly.graph_objects as go
 
 MOST_POINTS = 1500  # of a curve: a plot is about 1100 pixels wide
 TOLERANCE = 1.0 / 3000.0  # of the extent of a curve: a fifth of a pixel
@@ -71,13 +72,42 @@ def _corners(points: np.ndarray) -> np.ndarray:
     return kept
 
 
-def coded(values: np.ndarray, is_log: bool = False, steps: int = STEPS) -> dict[str, Any]:
+def thinned_figure(figure: go.Figure) -> go.Figure:
+    """The same figure with fewer points in its lines and numbers of six digits in its plane traces."""
+    figure = go.Figure(figure)
+    traces: Any = figure.data
+    for trace in traces:
+        if trace.type != "scatter" or trace.x is None or trace.y is None or not len(trace.y):
+            continue
+        x, y = np.asarray(trace.x), np.asarray(trace.y)
+        if len(x) != len(y) or x.dtype.kind not in "fiu" or y.dtype.kind not in "fiu":
+            continue
+        if (trace.mode or "lines") == "lines" and len(y) > MOST_POINTS and trace.text is None:
+            keep = kept_points(_seen(figure, trace.xaxis, "x", x), _seen(figure, trace.yaxis, "y", y))
+            x, y = x[keep], y[keep]
+            if trace.customdata is not None:
+                trace.customdata = np.asarray(trace.customdata)[keep]
+        trace.x, trace.y = rounded(x, 6), rounded(y, 6)
+    return figure
+
+
+def _seen(figure: go.Figure, name: str | None, letter: str, values: np.ndarray) -> np.ndarray:
+    """Where numbers lie on their axis, whose name in a trace is such as ``x2``."""
+    axis: Any = figure.layout[f"{letter}axis{(name or letter)[1:]}"]
+    values = values.astype(float)
+    return np.log10(np.where(values > 0.0, values, np.nan)) if axis.type == "log" else values
+
+
+def coded(
+    values: np.ndarray, is_log: bool = False, steps: int = STEPS, is_whole: bool = False
+) -> dict[str, Any]:
     """Numbers (n,) as steps: ``d`` holds the first one and the differences, ``s`` the size of a step.
 
     Args:
         values: numbers; what is not finite, and not positive on a logarithmic scale, becomes a gap.
         is_log: whether the steps are those of the decimal logarithm.
         steps: into which the largest number is divided, if they are not.
+        is_whole: whether the numbers are whole ones, whose step is one.
 
     Returns:
         With ``s``, ``d`` (None for a gap) and ``log``.
@@ -86,8 +116,8 @@ def coded(values: np.ndarray, is_log: bool = False, steps: int = STEPS) -> dict[
     if is_log:
         values = np.log10(np.where(values > 0.0, values, np.nan))
     known = np.isfinite(values)
-    step = LOG_STEP
-    if not is_log:
+    step = 1.0 if is_whole else LOG_STEP
+    if not (is_log or is_whole):
         largest = float(np.abs(values[known]).max()) if known.any() else 0.0
         step = float(f"{largest / steps:.3g}") or 1.0
     whole = np.round(np.where(known, values, 0.0) / step).astype(int)

@@ -7,6 +7,7 @@ from pathlib import Path
 import plotly.graph_objects as go
 from markupsafe import Markup, escape
 
+from experiments.report.curves import thinned_figure
 from experiments.report.packed import later
 from experiments.report.page import write_page
 
@@ -27,7 +28,7 @@ class Section:
         """The content as it stands in the page."""
         if not isinstance(self.content, go.Figure):
             return Markup(self.content)
-        figure = go.Figure(self.content)
+        figure = thinned_figure(self.content)
         figure.update_layout(
             height=self.height,
             margin={"l": 60, "r": 20, "t": 20, "b": 50},

@@ -30,14 +30,15 @@ async function unpackPage() {
     const note = document.createElement("p");
     note.className = "note";
     note.textContent = "The figures of this page need a browser of 2023 or newer.";
-    document.querySelector("main").prepend(note);
+    (document.querySelector("main") || document.body).prepend(note);
     return;
   }
   for (const element of document.querySelectorAll(".packed"))
     element.textContent = await unpacked(element.textContent);
-  run(document.getElementById("plotly").textContent);
-  document.getElementById("plotly").remove();
+  const library = document.getElementById("library");
+  run(library.textContent);
+  library.remove();
   /* What a robot did stays on the machine of its owner: no figure may be uploaded. */
-  Plotly.setPlotConfig({showSendToCloud: false, plotlyServerURL: ""});
+  if (window.Plotly) Plotly.setPlotConfig({showSendToCloud: false, plotlyServerURL: ""});
   for (const script of document.querySelectorAll("script.later")) run(script.textContent);
 }

@@ -3,7 +3,6 @@
 import base64
 import dataclasses
 import re
-import socket
 from io import StringIO
 from urllib.parse import unquote
 
@@ -164,7 +163,7 @@ def test_the_replay_opens_in_a_browser_and_names_the_laws(replay, logs):
     assert "<canvas" in opened.dom
     for title in map(law_title, logs):
         assert title in opened.dom
-    assert replay.stat().st_size < 10e6
+    assert replay.stat().st_size < 5e6
 
 
 def test_the_replay_moves_by_itself(replay, tmp_path):
@@ -182,17 +181,6 @@ def test_an_initial_error_that_settles_has_a_section(tmp_path):
     html = (tmp_path / "report.html").read_text()
     # log(20) / 10 = 0.2996 s, found at the next sample of 10 ms.
     assert re.search(r"Initial error.*?PBVS</td><td>0\.300</td><td>0\.000</td>", html, re.DOTALL)
-
-
-def test_the_replay_needs_no_particular_port(logs, tmp_path):
-    with socket.socket() as taken:
-        try:
-            taken.bind(("127.0.0.1", 7000))
-            taken.listen()
-        except OSError:
-            pass  # somebody else holds it, which serves as well
-        write_replay(tmp_path / "replay.html", load_robot("irb1200"), {"pbvs": logs["pbvs"][0]})
-    assert "</html>" in (tmp_path / "replay.html").read_text()[-200:]
 
 
 def test_a_replay_of_a_law_that_did_not_run_is_refused(logs, tmp_path):

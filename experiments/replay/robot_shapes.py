@@ -1,0 +1,138 @@
+"""A robot as what a viewer needs to draw it: its frames, and the shapes of its bodies."""
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from pydrake.math import RigidTransform
+
+from experiments.report.curves import coded, rounded
+from robots.description.model import NUM_JOINTS, Link, RobotModel
+from robots.description.placement import Picture
+
+MOST_FACES = 40000  # of all meshes of a robot, so that a page stays small and quick
+_CELLS = (0.0, 0.002, 0.004, 0.006, 0.01, 0.02)  # m, within which points of a mesh become one
+_DIGITS = 7
+LINK, BASE, FLANGE, TOOL = "link", "base", "flange", "tool"
+
+
+def robot_shapes(robot: RobotModel) -> dict[str, Any]:
+    """Frames and shapes of a robot, as plain data.
+
+    Frames are homogeneous matrices, row by row, in m. Without pictures of its own a link is a capsule from
+    its joint to the next one; flange and tool are drawn in any case.
+
+    Args:
+        robot: with the geometry that is to be seen.
+
+    Returns:
+        ``base`` and ``tool``: frames; ``joints``: for each its ``placement`` and ``axis``; ``bodies``: base
+        and six links, each a list of shapes with ``kind``, ``frame``, ``size`` and ``part``; ``meshes``.
+    """
+    ends = [joint.placement.translation for joint in robot.joints]
+    links = [robot.base_link, *robot.links]
+    tips = [*ends, np.zeros(3)]
+    meshes: list[dict[str, Any]] = []
+    bodies = [
+        _body(number, link, np.asarray(tip), meshes)
+        for number, (link, tip) in enumerate(zip(links, tips, strict=True))
+    ]
+    X_FE = robot.tool.pose()
+    radius = 0.6 * robot.links[-1].radius
+    bodies[-1].append(_between(np.zeros(3), -0.25 * radius * robot.axes[-1], radius, FLANGE, "cylinder"))
+    bodies[-1].append(_between(np.zeros(3), X_FE.translation(), 0.35 * radius, TOOL, "cone"))
+    return {
+        "base": _frame(robot.base.pose()),
+        "tool": _frame(X_FE),
+        "joints": [
+            {"placement": _frame(joint.placement.pose()), "axis": rounded(axis, _DIGITS)}
+            for joint, axis in zip(robot.joints, robot.axes, strict=True)
+        ],
+        "bodies": [[shape for shape in body if shape] for body in bodies],
+        "meshes": meshes,
+    }
+
+
+def _body(number: int, link: Link, tip: np.ndarray, meshes: list[dict[str, Any]]) -> list[dict[str, Any]]:
+    pictures, part = link.pictures, LINK if number else BASE
+    if not pictures or any(p.shape == "mesh" and not Path(p.file).is_file() for p in pictures):
+        return _capsule(number, tip, link.radius, part)
+    shapes: list[dict[str, Any]] = []
+    for picture in pictures:
+        shape: dict[str, Any] = {
+            "kind": picture.shape,
+            "frame": _frame(picture.placement.pose()),
+            "part": part,
+        }
+        if picture.shape == "mesh":
+            mesh = _mesh(picture)
+            if mesh is None:
+                return _capsule(number, tip, link.radius, part)
+            shapes.append(shape | {"mesh": len(meshes)})
+            meshes.append(mesh)
+        else:
+            shapes.append(shape | {"size": list(picture.size)})
+    return shapes
+
+
+def _capsule(number: int, tip: np.ndarray, radius: float, part: str) -> list[dict[str, Any]]:
+    """From a joint to the next one: the base stands flat, the wrist does not reach over the flange."""
+    length = float(np.linalg.norm(tip))
+    if number == 0:
+        return [
+            _between(np.zeros(3), tip, radius, part, "cylinder"),
+            _between(0.99 * tip, tip, radius, part, "capsule"),
+        ]
+    if number == NUM_JOINTS - 1 and length > 0.0:
+        end = tip * max(1e-3, 1.0 - radius / length)
+        slim = min(radius, 0.9 * length)
+        return [
+            _between(np.zeros(3), end, slim, part, "capsule"),
+            _between(end, tip, 0.8 * slim, part, "cylinder"),
+        ]
+    return [_between(np.zeros(3), tip, radius, part, "capsule")]
+
+
+def _mesh(picture: Picture) -> dict[str, Any] | None:
+    """Points and faces of a mesh file, coarse enough for a page; None if its format cannot be read here."""
+    import trimesh  # here, because it takes a tenth of a second that only meshes need
+
+    try:
+        mesh: Any = trimesh.load(picture.file, force="mesh")
+    except (ValueError, NotImplementedError, ImportError):  # such as COLLADA without a reader for it
+        return None
+    points, faces = np.asarray(mesh.vertices) * np.array(picture.size), np.asarray(mesh.faces)
+    for cell in _CELLS:
+        coarse, kept = _merged(points, faces, cell)
+        if len(kept) <= MOST_FACES // 7:
+            break
+    return {
+        "points": [coded(coarse[:, axis]) for axis in range(3)],
+        "faces": coded(kept.reshape(-1), is_whole=True),
+    }
+
+
+def _merged(points: np.ndarray, faces: np.ndarray, cell: float) -> tuple[np.ndarray, np.ndarray]:
+    """A mesh whose points within a cube of edge ``cell`` are one, in the middle of them."""
+    if cell == 0.0:
+        return points, faces
+    _, member, count = np.unique(
+        np.floor(points / cell).astype(int), axis=0, return_inverse=True, return_counts=True
+    )
+    member = member.reshape(-1)
+    sums = np.stack([np.bincount(member, points[:, axis]) for axis in range(3)], -1)
+    faces = member[faces]
+    a, b, c = faces.T
+    return sums / count[:, None], faces[(a != b) & (b != c) & (a != c)]
+
+
+def _between(start: np.ndarray, end: np.ndarray, radius: float, part: str, kind: str) -> dict[str, Any]:
+    """A shape of revolution from one point to another; empty if they are the same."""
+    if np.linalg.norm(end - start) < 1e-6:
+        return {}
+    points = {"from": rounded(np.asarray(start), _DIGITS), "to": rounded(np.asarray(end), _DIGITS)}
+    return {"kind": kind, "part": part, "radius": radius, **points}
+
+
+def _frame(X: RigidTransform) -> list[float | None]:
+    return rounded(X.GetAsMatrix4().reshape(-1), _DIGITS)
