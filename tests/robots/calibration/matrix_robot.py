@@ -5,11 +5,15 @@ displaced by a small motion of its own.
 """
 
 import warnings
+import xml.etree.ElementTree as ElementTree
 from importlib.resources import files
+from pathlib import Path
 
 import numpy as np
 import yaml
 from scipy.spatial.transform import Rotation
+
+_WIDEST = 2.97  # rad: beyond it a joint shows nothing new
 
 
 def homogeneous(rotation: Rotation, translation: np.ndarray) -> np.ndarray:
@@ -19,9 +23,13 @@ def homogeneous(rotation: Rotation, translation: np.ndarray) -> np.ndarray:
 
 
 class MatrixRobot:
-    """Placements (8, 4, 4), unit axes (6, 3) and ranges in rad (6, 2), read from a robot file."""
+    """Placements (8, 4, 4), unit axes (6, 3) and ranges in rad (6, 2), of a shipped robot or a URDF."""
 
     def __init__(self, name: str) -> None:
+        self.scales = np.ones(6)
+        if name.endswith(".urdf"):
+            self._read_urdf(Path(name))
+            return
         # Numbers as text, whatever the tags of the other parts mean.
         data = yaml.load((files("robots") / "data" / f"{name}.yaml").read_text(), Loader=yaml.BaseLoader)
         placements = [data["base"], *(joint["placement"] for joint in data["joints"]), data["tool"]]
@@ -32,8 +40,36 @@ class MatrixRobot:
         axes = np.array([joint["axis"] for joint in data["joints"]], float)
         self.axes = axes / np.linalg.norm(axes, axis=1, keepdims=True)
         limits = [[joint["limits"][f"{side}_deg"] for side in ("lower", "upper")] for joint in data["joints"]]
-        self.ranges = np.clip(np.deg2rad(np.array(limits, float)), -2.97, 2.97)
-        self.scales = np.ones(6)
+        self.ranges = np.clip(np.deg2rad(np.array(limits, float)), -_WIDEST, _WIDEST)
+
+    def _read_urdf(self, path: Path, tip: str = "tool0") -> None:
+        """Follows the parents from the tip to the root; fixed joints belong to the placement behind them."""
+        joints = {
+            child.get("link"): joint
+            for joint in ElementTree.parse(path).iter("joint")
+            for child in joint.iter("child")
+        }
+        chain, link = [], tip
+        while link in joints:
+            chain.insert(0, joints[link])
+            link = next(joints[link].iter("parent")).get("link")
+
+        def numbers(joint: ElementTree.Element, tag: str, key: str, default: str) -> np.ndarray:
+            found = joint.find(tag)
+            return np.array((default if found is None else found.get(key, default)).split(), float)
+
+        placements, axes, ranges = [np.eye(4)], [], []
+        for joint in chain:
+            turn = Rotation.from_euler("xyz", numbers(joint, "origin", "rpy", "0 0 0"))
+            X = homogeneous(turn, numbers(joint, "origin", "xyz", "0 0 0"))
+            placements[-1] = placements[-1] @ X
+            if joint.get("type") != "fixed":
+                placements.append(np.eye(4))
+                axes.append(numbers(joint, "axis", "xyz", "1 0 0"))
+                ranges.append([numbers(joint, "limit", side, "0")[0] for side in ("lower", "upper")])
+        self.placements = np.array([np.eye(4), *placements])
+        self.axes = np.array(axes)
+        self.ranges = np.clip(np.array(ranges), -_WIDEST, _WIDEST)
 
     def forward(self, q: np.ndarray) -> np.ndarray:
         """Tool poses (n, 4, 4) at joint positions (n, 6)."""

@@ -15,9 +15,15 @@ from robots.description.model import RobotModel, load_robot
 from robots.dynamics.compliant_kinematics import controller_kinematics
 from robots.kinematics.forward import Kinematics
 from tests.robots.calibration.matrix_robot import MatrixRobot, homogeneous
+from tests.robots.urdfs import published
 
-ROBOTS = ("irb1200", "irb140", "kr16", "puma560", "ur10")
+ROBOTS = ("irb1200", "irb140", "kr16", "puma560", "ur5", "ur10")
 TOOLS = {"none": (0.0, 0.0), "on the axis": (0.1, 0.0), "beside the axis": (0.1, 0.06)}  # m: along, across
+
+
+def file_of(name: str) -> str:
+    """Of a robot: UR5 and UR10 as others publish them, the rest from our files."""
+    return str(published(f"{name}_robot.urdf")) if name in ("ur5", "ur10") else name
 
 
 def measured(robot: MatrixRobot, q: np.ndarray, position_only: bool = False) -> Measurements:
@@ -42,9 +48,19 @@ def calibrated(
 
 @pytest.mark.parametrize("name", ROBOTS)
 def test_poses_without_noise_give_any_robot_to_rounding(name: str):
-    largest, result = calibrated(
-        load_robot(name), MatrixRobot(name), np.random.default_rng(1), False, np.eye(4)
-    )
+    poses_come_back(name, seed=1)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", ROBOTS)
+def test_poses_of_twenty_robots_each(name: str):
+    for seed in range(20):
+        poses_come_back(name, seed)
+
+
+def poses_come_back(name: str, seed: int) -> None:
+    file, rng = file_of(name), np.random.default_rng(seed)
+    largest, result = calibrated(load_robot(file), MatrixRobot(file), rng, False, np.eye(4))
     assert largest <= 1e-10
     assert result.rank == 30  # four for each axis, six for base and tool
     assert result.iterations <= 14
@@ -76,15 +92,15 @@ def test_positions_alone_give_the_robot_with_any_tool_in_any_frame(name: str, to
 @pytest.mark.slow
 @pytest.mark.parametrize("is_own_frame", [False, True], ids=["known frame", "own frame"])
 @pytest.mark.parametrize("tool", TOOLS)
-@pytest.mark.parametrize("name", ["irb1200", "irb140", "kr16", "puma560", "ur10"])
+@pytest.mark.parametrize("name", ROBOTS)
 def test_positions_of_twenty_robots_each(name: str, tool: str, is_own_frame: bool):
     for seed in range(20):
         positions_come_back(name, tool, is_own_frame, seed)
 
 
 def positions_come_back(name: str, tool: str, is_own_frame: bool, seed: int) -> None:
-    rng, robot = np.random.default_rng(seed), load_robot(name)
-    drawn = MatrixRobot(name)
+    rng, robot = np.random.default_rng(seed), load_robot(file_of(name))
+    drawn = MatrixRobot(file_of(name))
     axis, (along, across) = drawn.axes[5], TOOLS[tool]
     drawn = drawn.with_tool(along * axis + across * np.roll(axis, 1))
     drawn.apply_to(robot)
