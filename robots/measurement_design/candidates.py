@@ -15,6 +15,7 @@ _FEW = (
 )
 _MOST_TRIED = 200  # times as many random candidates as are wanted
 _POOL = 20  # times as many candidates as are wanted are sorted at once
+_SAMPLED, _LEAST_SAMPLED = 101, 8  # every so many candidates tell how large the largest gains are
 
 
 class Candidates:
@@ -36,17 +37,18 @@ class Candidates:
         """
         self.grid = grid
         self._admissible = admissible
-        self._cases = tuple(1 if i in indifferent else n for i, n in enumerate(grid.shape))
-        self._state = np.zeros(self._cases, dtype=np.uint8)
-        self._each = len(grid) // self._state.size  # candidates in a case
-        if admissible is not None and self._state.size <= _FEW:
-            cases = np.stack(np.unravel_index(np.arange(self._state.size), self._cases))
+        self._state = np.full(grid.shape, _UNKNOWN, dtype=np.uint8)
+        self._on = [i for i in range(len(grid.shape)) if i not in indifferent]  # joints that make the cases
+        shape = tuple(grid.shape[i] for i in self._on)
+        if admissible is not None and np.prod(shape) <= _FEW:
+            cases = np.zeros((len(grid.shape), int(np.prod(shape))), dtype=int)
+            cases[self._on] = np.unravel_index(np.arange(cases.shape[1]), shape)
             self._check(np.asarray(np.ravel_multi_index(tuple(cases), grid.shape)))
 
     @property
     def num_refused(self) -> int:
         """How many candidates have been found to be inadmissible so far."""
-        return int(np.count_nonzero(self._state == _REFUSED)) * self._each
+        return int(np.count_nonzero(self._state == _REFUSED))
 
     def best(
         self, root: np.ndarray, count: int, without: np.ndarray | None = None
@@ -68,17 +70,18 @@ class Candidates:
         gains = self.grid.screen(root)
         if without is not None:
             gains[without] = -np.inf
-        open_ones = np.flatnonzero(np.broadcast_to(self._state != _REFUSED, self.grid.shape))
-        open_gains = gains[open_ones]  # a partition is slow where many gains are the same
+        # The largest of millions: those above a limit that a sample says, and a lower one if it was too high.
+        is_open = self._state.reshape(-1) != _REFUSED
+        sample = np.sort(gains[::_SAMPLED][is_open[::_SAMPLED]])[::-1]
         pool = _POOL * count
         while True:
-            pool = min(pool, len(open_gains))
-            numbers = open_ones[np.argpartition(open_gains, -pool)[-pool:]] if pool else open_ones
+            last = pool // _SAMPLED + _LEAST_SAMPLED
+            limit = sample[last] if last < len(sample) else -np.inf
+            numbers = np.flatnonzero((gains > limit) & is_open)
             found = self._first_allowed(numbers[np.argsort(-gains[numbers])], count)
-            found = found[np.isfinite(gains[found])]
             if len(found) == count:
                 return found, gains[found]
-            if pool == len(open_gains):
+            if limit == -np.inf:
                 raise ValueError(f"fewer than {count} candidate configurations are admissible")
             pool *= 8
 
@@ -113,14 +116,15 @@ class Candidates:
         """Which candidates are admissible, (n,) bool; what is not known yet is found out."""
         if self._admissible is None or not len(numbers):
             return np.ones(len(numbers), dtype=bool)
-        indices = np.unravel_index(numbers, self.grid.shape)
-        case = np.ravel_multi_index(
-            tuple(np.minimum(i, n - 1) for i, n in zip(indices, self._cases, strict=True)), self._cases
-        )
         state = self._state.reshape(-1)
-        unknown, first = np.unique(case[state[case] == _UNKNOWN], return_index=True)
+        unknown = numbers[state[numbers] == _UNKNOWN]
         if len(unknown):
-            examples = numbers[state[case] == _UNKNOWN][first]
-            allowed = self._admissible(self.grid.configurations(examples))
-            state[unknown] = np.where(allowed, _ALLOWED, _REFUSED)
-        return state[case] == _ALLOWED
+            indices = np.array(np.unravel_index(unknown, self.grid.shape))
+            _, first = np.unique(indices[self._on], axis=1, return_index=True)
+            allowed = self._admissible(self.grid.configurations(unknown[first]))
+            for is_allowed, found in ((allowed, _ALLOWED), (~allowed, _REFUSED)):
+                case: list[slice | np.ndarray] = [slice(None)] * len(indices)
+                for joint in self._on:
+                    case[joint] = indices[joint, first[is_allowed]]
+                self._state[tuple(case)] = found
+        return state[numbers] == _ALLOWED

@@ -81,8 +81,9 @@ def design_measurements(
     candidates = Candidates(grid, admissible, indifferent)
     goal = criterion(criterion_name, robot, grid)
     report = progress or (lambda share: None)
-    relaxed = relaxed_design(candidates, goal, np.random.default_rng(seed), lambda share: report(0.5 * share))
-    whole = whole_design(candidates, goal, relaxed, count, lambda share: report(0.5 + 0.5 * share))
+    rng = np.random.default_rng(seed)
+    relaxed = relaxed_design(candidates, goal, rng, lambda share: report(0.5 * share))
+    whole = whole_design(candidates, goal, relaxed, count, rng, lambda share: report(0.5 + 0.5 * share))
     q = grid.configurations(whole.numbers)
     order = visiting_order(q, np.zeros(NUM_JOINTS))
     return MeasurementDesign(

@@ -1,7 +1,8 @@
 """Exact designs from relaxed ones: rounding, expansion and exchange as in DetMax.
 
 Probst (2024), section 4.2. The best partners of an exchange are found by their first-order gain among all
-candidates of the grid; what is left of them is compared exactly.
+candidates of the grid; what is left of them is compared exactly. Where no exchange helps and the bound is
+still away, some measurements are taken out at random and chosen once more.
 """
 
 from collections.abc import Callable
@@ -17,6 +18,9 @@ _NEWCOMERS, _LEAVERS = 40, 8  # whose pairs are compared exactly
 _SHARPNESS = (30.0, 100.0, 10.0, 300.0)  # with which a gradient for B3 is tried when the last one led nowhere
 _MOST_EXCHANGES = 200
 _WORTHWHILE = 1e-6  # relative gain of an exchange
+_NEAR = 0.99  # of the bound: what is better is good enough
+_FRESH_STARTS = 5
+_TAKEN_OUT = 0.2  # largest share of the measurements that is chosen once more
 
 
 @dataclass(frozen=True)
@@ -32,6 +36,7 @@ def whole_design(
     criterion: Criterion,
     relaxed: RelaxedDesign,
     count: int,
+    rng: np.random.Generator,
     progress: Callable[[float], None] | None = None,
 ) -> WholeDesign:
     """Chooses ``count`` different candidates.
@@ -41,22 +46,26 @@ def whole_design(
         criterion: what is maximised.
         relaxed: the solution to start from.
         count: how many measurements; at least so many that all parameters can be seen.
+        rng: says which measurements are taken out where no exchange helps.
         progress: is called now and then with the share that is done.
 
     Raises:
         ValueError: if too few candidates are admissible.
     """
-    chosen = _Chosen(candidates, criterion, _rounded(relaxed, count))
-    while len(chosen.numbers) < count:
-        chosen.expand()
-        if progress:
-            progress(0.5 * len(chosen.numbers) / count)
-    for number in range(_MOST_EXCHANGES):
-        if not chosen.exchange():
+    report = progress or (lambda share: None)
+    best = _Chosen(candidates, criterion, _rounded(relaxed, count))
+    best.complete(count, lambda share: report(0.5 * share))
+    for number in range(_FRESH_STARTS):
+        if best.value >= _NEAR * count * relaxed.bound:
             break
-        if progress:
-            progress(0.5 + 0.5 * number / _MOST_EXCHANGES)
-    return WholeDesign(chosen.numbers, chosen.value)
+        out = rng.choice(
+            count, rng.integers(1, max(2, int(_TAKEN_OUT * count)), endpoint=True), replace=False
+        )
+        other = _Chosen(candidates, criterion, np.delete(best.numbers, out))
+        other.complete(count)
+        best = max(best, other, key=lambda each: each.value)
+        report(0.5 + 0.5 * (number + 1) / _FRESH_STARTS)
+    return WholeDesign(best.numbers, best.value)
 
 
 def _rounded(relaxed: RelaxedDesign, count: int) -> np.ndarray:
@@ -85,6 +94,18 @@ class _Chosen:
     def value(self) -> float:
         """The criterion of what is chosen."""
         return float(self._criterion.value(self._each.sum(axis=0)))
+
+    def complete(self, count: int, progress: Callable[[float], None] | None = None) -> None:
+        """Adds candidates until there are ``count``, and exchanges some until that does not help any more."""
+        while len(self.numbers) < count:
+            self.expand()
+            if progress:
+                progress(0.5 * len(self.numbers) / count)
+        for number in range(_MOST_EXCHANGES):
+            if not self.exchange():
+                break
+            if progress:
+                progress(0.5 + 0.5 * number / _MOST_EXCHANGES)
 
     def expand(self) -> None:
         """Adds the best candidate."""

@@ -20,7 +20,8 @@ _GAP = 1e-4  # between the bounds of B3, relative; the others come closer to the
 _SLOW_GAP = 1e-3
 _SHARPNESS = (60.0, 200.0, 600.0, 2000.0)  # of the soft smallest eigenvalue, from rough to fine
 _MULTIPLICATIVE_STEPS = 60
-_RANK = 2  # of the certificate for B3; the smallest eigenvalue of the best design is rarely triple
+_RANK = 2  # least one of the certificate for B3
+_ALIKE = 1.1  # times the smallest eigenvalue: so near, others will be as small in the best design
 _IDLE = 1e-5  # a share below this is dropped
 _LARGEST_CUT = 0.1  # of a share in one multiplicative step
 _BLIND = 0.5  # share of the criterion's value below which what is kept has lost a direction
@@ -155,11 +156,14 @@ class _WorkingSet:
         M = self._mean(self._shares)
         eigenvalues, vectors = np.linalg.eigh(M)
         if self._direction is None:
-            self._direction = vectors[:, :_RANK] * np.sqrt([0.98, 0.02])
+            rank = max(_RANK, int(np.sum(eigenvalues < _ALIKE * eigenvalues[0])))
+            shares = np.full(rank, 0.02 / (rank - 1))
+            shares[0] = 1.0 - shares[1:].sum()
+            self._direction = vectors[:, :rank] * np.sqrt(shares)
         B = self._direction
         forward = self._information @ B
         gains = np.einsum("nir,ir->n", forward, B)
-        H = 2.0 * np.kron(M - eigenvalues[0] * np.eye(len(M)), np.eye(_RANK)) + 1e-3 * np.eye(B.size)
+        H = 2.0 * np.kron(M - eigenvalues[0] * np.eye(len(M)), np.eye(B.shape[1])) + 1e-3 * np.eye(B.size)
         step, shares = _minimax_step(gains, 2.0 * forward.reshape(len(gains), -1), H, B.ravel(), self._trust)
         if shares is None:
             self._trust *= 0.5

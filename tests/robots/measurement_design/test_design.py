@@ -15,6 +15,7 @@ from robots.measurement_design.constraints import AdmissibleConfig, AdmissibleCo
 from robots.measurement_design.criteria import NAMES, SmallestEigenvalue, criterion
 from robots.measurement_design.design import MeasurementDesign, design_measurements
 from robots.measurement_design.visiting_order import visiting_order, way_length
+from tests.robots.urdfs import published
 
 ROBOT = load_robot("irb1200")
 COARSE = tuple(
@@ -57,6 +58,15 @@ def test_the_design_is_better_than_the_source_s_and_nearly_as_good_as_any(best: 
     assert best.value >= 3.34
     assert best.bound <= 3.3605
     assert len(np.unique(best.configurations, axis=0)) == 75
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", ["irb140", "kr16", "kr210", "puma560", "ur10", "ur5"])
+def test_any_robot_has_a_design_within_a_hundredth_of_the_bound(name: str):
+    """With its own ranges, floor and arm; each takes four to eight seconds of one core."""
+    robot = load_robot(str(published("ur5_robot.urdf")) if name == "ur5" else name)
+    design = design_measurements(robot, admissible=AdmissibleConfigurations(robot))
+    assert 0.99 * design.bound <= design.value <= design.bound
 
 
 def test_one_screening_proves_the_bound(best: MeasurementDesign, grid: CandidateGrid):
