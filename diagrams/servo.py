@@ -98,6 +98,9 @@ class Servo(Diagram):
         check_path = getattr(self.law, "check_path", None)  # of laws that cannot follow every path
         if check_path is not None:
             check_path(self.reference.path)
+        prepare = getattr(self.law, "prepare", None)  # of laws that do something before a run
+        if prepare is not None:
+            prepare(self.reference.path, np.deg2rad(scenario.home_deg))
         builder.AddNamedSystem("law", self.law)
         feedforward = scenario.servo.feedforward
         self.has_torque = feedforward.kind != "none" or self.law.HasOutputPort("torque_feedforward")

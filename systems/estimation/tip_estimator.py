@@ -68,8 +68,8 @@ class TipEstimator:
         """Lays out the memory."""
         self.model, self._config = model, config
         variances = np.repeat([config.rotation_sigma, config.position_sigma], 3) ** 2
-        self._weights = 1.0 / variances
-        self._keyframes = Keyframes(model, self._weights)
+        self.weights = 1.0 / variances
+        self._keyframes = Keyframes(model, self.weights)
         self._innovations = Innovations(variances)
         n = model.size
         self.layout = Layout(
@@ -182,7 +182,7 @@ class TipEstimator:
                 if memory.was_settled[0]:
                     self._doubt(memory)
         sums = memory.A_open, memory.b_open, memory.sum_y, memory.sum_H
-        kernels.information.add_sample(r, H, memory.xi, self._weights, weight, *sums)
+        kernels.information.add_sample(r, H, memory.xi, self.weights, weight, *sums)
         since_first = [self._since_first(memory, pair.time)]
         means = [pair.theta, found.gears[0], pair.motion, pair.twist, since_first]
         means += [shapes.ravel()] if shapes is not None else []

@@ -14,9 +14,12 @@ from systems.estimation.findings import calibrated_robot, findings
 from systems.estimation.memory import Layout, Views
 from systems.estimation.parameter_lead import ParameterLead
 from systems.estimation.preview_planner import PreviewPlanner, Wanted
-from systems.estimation.probe import Probe
+from systems.estimation.probing.path_needs import PathNeeds
+from systems.estimation.probing.probe import Probe
+from systems.estimation.probing.probe_design import designed
 from systems.estimation.tip_estimator import Pair
 from systems.guard.guard import GuardConfig
+from systems.reference.cartesian_path import CartesianPath
 from systems.reference.reference import PathAhead
 from systems.samples import JointSample, PoseSample
 from systems.servo.self_calibrating_config import SelfCalibratingConfig
@@ -66,7 +69,7 @@ class SelfCalibrating(LeafSystem):
             ValueError: if a part refuses its configuration.
         """
         super().__init__()
-        self._model = model
+        self._model, self._config = model, config
         self.period = model.period
         self._learning = learning = Learning(model, config)
         self.tip_model, self.estimator, self._drives = learning.tip_model, learning.estimator, learning.drives
@@ -79,7 +82,7 @@ class SelfCalibrating(LeafSystem):
             columns=(6, self.tip_model.size),
             start_time=(1,),
             planned=(1,),  # the last instant of the plan
-            amplitude=(6,),
+            amplitude=(2, NUM_JOINTS),  # of the probe: knock, oscillations
             **learning.arrays,
         )
         self._views = Views(self._layout)
@@ -101,6 +104,20 @@ class SelfCalibrating(LeafSystem):
         for name, state in zip((*names, "speed_share", "look_ahead"), self._outputs, strict=True):
             self.DeclareStateOutputPort(name, state)
         self.DeclarePeriodicDiscreteUpdateEvent(model.period, 0.0, self._tick)
+
+    def prepare(self, path: CartesianPath, home: np.ndarray) -> None:
+        """Designs the probe for a path, before anything moves.
+
+        Args:
+            path: that will be run.
+            home: where the joints are near at its start, rad, (6,).
+        """
+        try:
+            needs = PathNeeds(self.tip_model, self.estimator.weights, path, home)
+        except ValueError:
+            return  # out of reach of the nominal robot: whoever starts the run says so
+        rate, sharp = 1.0 / self.period, self._config.probe.sharp
+        self._probe.pattern, _ = designed(needs, self._probe, path.path_start, rate, sharp)
 
     def _first_memory(self) -> np.ndarray:
         vector = np.zeros(self._layout.size)

@@ -4,7 +4,7 @@ from dataclasses import dataclass, field
 
 from systems.estimation.dead_time import DeadTimeConfig
 from systems.estimation.drive_model import DriveModelConfig
-from systems.estimation.probe import ProbeConfig
+from systems.estimation.probing.probe import ProbeConfig
 from systems.estimation.tip_estimator import TipEstimatorConfig
 from systems.servo.law_config import LawConfig
 

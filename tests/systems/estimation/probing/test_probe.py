@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from robots.description.model import load_robot
-from systems.estimation.probe import Probe, ProbeConfig
+from systems.estimation.probing.probe import Probe, ProbeConfig
 
 PATH_START = 4.0
 HOME = np.array([0.9, 0.3, 0.2, 0.5, 0.9, 0.1])
@@ -32,8 +32,12 @@ def test_it_keeps_to_joint_limits_and_to_the_excursion_of_the_tip():
     near_a_limit = HOME.copy()
     near_a_limit[2] = robot.upper[2] - 0.01
     size = probe.amplitude(near_a_limit, JACOBIAN, PATH_START)
-    assert size[2] <= 0.01
-    assert np.linalg.norm(JACOBIAN[3:], axis=0) @ size <= 0.05 + 1e-12
+    moved = [probe.at(t, PATH_START, size)[:2] for t in np.linspace(0.0, PATH_START, 1001)]
+    displacement, velocity = np.array(moved).swapaxes(0, 1)
+    assert (near_a_limit + displacement < robot.upper).all()
+    excursion = np.linalg.norm(displacement @ JACOBIAN[3:].T, axis=1).max()
+    assert 0.045 < excursion < 0.0505  # as far as it may, up to the step in which it was looked at
+    assert (np.abs(velocity) < 0.31 * robot.speed).all()
 
 
 @pytest.mark.parametrize(("kind", "path_start"), [("none", 4.0), ("smooth", 1.2)])

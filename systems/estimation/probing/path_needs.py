@@ -1,0 +1,111 @@
+"""How well the tip is known along a path, and how well it will be after a motion before it."""
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+from scipy.linalg import solve_triangular
+
+from robots.description.model import NUM_JOINTS
+from robots.dynamics.newton_inverse import inverse_kinematics
+from systems.estimation.tip_model import TipModel
+from systems.reference.cartesian_path import CartesianPath
+
+_MOST_INSTANTS = 48  # of the path, evenly spaced in time
+_INVERSE_STEP = 0.05  # s, between two poses of the inverse kinematics
+_LATE = 0.5  # s, by which samples may be late for use: dead time, lead of the parameters, lost images
+_ARM = 0.25  # m, by which an angle counts as a way of the tip
+
+
+class Standing(NamedTuple):
+    """How well the tip is known where it is known worst on a path."""
+
+    sigma: float  # m, of the tip's position
+    time: float  # s, of the path
+    unknown: int  # the one of the unknowns that has the largest part in it
+    share: float  # of the variance, that would go if this one were known
+
+
+class PathNeeds:
+    """The path's columns: how the tip moves with each unknown, at instants all along it."""
+
+    def __init__(self, model: TipModel, weights: np.ndarray, path: CartesianPath, home: np.ndarray) -> None:
+        """Works out the joints along the path as the nominal robot would have them.
+
+        Args:
+            model: of the tip.
+            weights: of the six entries of a pose error, one over their variances.
+            path: that will be run.
+            home: where the joints are near at its start, rad, (6,).
+
+        Raises:
+            ValueError: if the nominal robot does not reach the path.
+        """
+        self._model, self._weights = model, weights
+        length = max(path.dwell_start - path.path_start, _INVERSE_STEP)
+        steps = max(1, math.ceil(length / _INVERSE_STEP))
+        times = path.path_start + np.linspace(0.0, length, steps + 1)
+        inverse = inverse_kinematics(model.robot, float(model.mean[model.M][0]))
+        q = inverse.along(path.sample(times)[0], home)
+        velocity = np.gradient(q, times, axis=0)
+        acceleration = np.gradient(velocity, times, axis=0)
+        chosen = np.unique(np.linspace(0, steps, min(steps + 1, _MOST_INSTANTS)).round().astype(int))
+        self.times, self.q = times[chosen], q[chosen]
+        self._constants = model.constants(model.mean)
+        self.H = self.columns(self.q, velocity[chosen], acceleration[chosen])
+        self._seconds = length / max(1, len(chosen) - 1)
+        self._blind = math.ceil(_LATE / self._seconds)
+        self._informations = np.array([self.information(H[None]) for H in self.H])
+
+    def columns(self, q: np.ndarray, velocity: np.ndarray, acceleration: np.ndarray) -> np.ndarray:
+        """How the tip moves with the unknowns in units of their spreads, (n, 6, size), for joints (n, 6)."""
+        model = self._model
+        arm = model.forward(self._constants, model.mean, q)[1]
+        loads = model.loads.at(arm.frames, q, velocity, acceleration)
+        twist = np.einsum("nij,nj->ni", arm.columns[:, :, :6], velocity)
+        shapes = None
+        if model.has_gear_errors:
+            still = np.zeros(12)
+            shapes = np.array(
+                [model.gear_shapes(model.mean, *row, still) for row in zip(q, loads, strict=True)]
+            )
+        return model.predict(self._constants, model.mean, q, loads, twist, shapes).H
+
+    @property
+    def prior(self) -> np.ndarray:
+        """Information before anything is measured, (size, size)."""
+        return self._model.prior
+
+    def jacobian(self, q: np.ndarray) -> np.ndarray:
+        """Of the tip of the nominal robot at joints q (rad, (6,)), rotation first, (6, 6)."""
+        return self._model.forward(self._constants, self._model.mean, q[None])[1].columns[0, :, :NUM_JOINTS]
+
+    def information(self, H: np.ndarray) -> np.ndarray:
+        """What one sample at each of n columns says of the unknowns, (size, size)."""
+        rows = H.reshape(-1, H.shape[2])
+        return (rows.T * np.tile(self._weights, len(H))) @ rows
+
+    def expected(self, A: np.ndarray, rate: float) -> float:
+        """How well the tip will be known in m where it is known worst, though the camera goes on looking.
+
+        Args:
+            A: information before the path begins.
+            rate: samples of the camera in a second.
+        """
+        A, largest = A.copy(), 0.0
+        for k, H in enumerate(self.H):
+            if k >= self._blind:
+                A += rate * self._seconds * self._informations[k - self._blind]
+            Z = solve_triangular(np.linalg.cholesky(A), H.T, lower=True, check_finite=False)
+            variance = (Z * Z).sum(axis=0)
+            largest = max(largest, float(variance[3:].sum() + _ARM**2 * variance[:3].sum()))
+        return math.sqrt(largest)
+
+    def standing(self, P: np.ndarray) -> Standing:
+        """How well the tip is known on the path with the covariance P of the unknowns, (size, size)."""
+        HP = self.H[:, 3:] @ P
+        variance = np.einsum("nij,nij->n", HP, self.H[:, 3:])
+        worst = int(variance.argmax())
+        shares = (HP[worst] ** 2).sum(axis=0) / np.maximum(np.diag(P), 1e-300) / variance[worst]
+        unknown = int(shares.argmax())
+        return Standing(math.sqrt(variance[worst]), float(self.times[worst]), unknown, float(shares[unknown]))

@@ -1,0 +1,137 @@
+"""A small motion before the path begins, while nothing depends on where the tip is: it shows the robot."""
+
+from dataclasses import dataclass, field
+from typing import NamedTuple
+
+import numpy as np
+
+from robots.description.model import NUM_JOINTS, RobotModel
+
+_MARGIN = 0.8  # of the way to a limit
+_SPEED_SHARE = 0.3
+_KNOCK_BEGIN, _KNOCK_LENGTH = 0.15, 0.4  # s
+_KNOCK_SIZE = np.array([0.01, 0.01, 0.01, 0.03, 0.03, 0.03])  # rad
+_INSTANTS = np.linspace(0.0, 1.0, 59)  # of the window, at which limits are looked at
+_SHORTEST = 0.5  # s, a window in which it is worth while to move
+
+
+@dataclass
+class ProbeConfig:
+    """Whether and how far the joints move before the path begins."""
+
+    kind: str = "smooth"  # or none
+    amplitude: list[float] = field(default_factory=lambda: [0.15, 0.15, 0.15, 0.4, 0.4, 0.4])  # rad, at most
+    largest_excursion: float = 0.1  # m, of the tip
+    begin: float = 0.8  # s after the start
+    rest: float = 0.3  # s before the path begins
+    sharp: float = 3e-5  # m: a tip that will be known so well all along the path needs no oscillations
+
+
+class Pattern(NamedTuple):
+    """Oscillations of the joints under one window."""
+
+    size: np.ndarray  # (6,) rad
+    periods: np.ndarray  # (6,), in the window
+    phases: np.ndarray  # (6,) rad
+
+    def at(self, times: np.ndarray, length: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Displacement and its two derivatives at times in s since the window began, (n, 6) each."""
+        w, times = 2.0 * np.pi / length, times[:, None]
+        window = 0.5 - 0.5 * np.cos(w * times)
+        slope, bend = 0.5 * w * np.sin(w * times), 0.5 * w * w * np.cos(w * times)
+        f = w * self.periods
+        sine, cosine = np.sin(f * times + self.phases), np.cos(f * times + self.phases)
+        return (
+            self.size * window * sine,
+            self.size * (slope * sine + window * f * cosine),
+            self.size * (bend * sine + 2.0 * slope * f * cosine - window * f * f * sine),
+        )
+
+
+# None of the axes moves as another does.
+USUAL = Pattern(np.ones(NUM_JOINTS), np.array([1, 1, 2, 2, 3, 3]), np.array([0, 1, 0, 1, 0, 1]) * 0.5 * np.pi)
+
+
+class Probe:
+    """A short knock that shows the dead time, then oscillations of all joints under a sin^2 window.
+
+    Both begin and end at rest; times count from the start. Which axis oscillates how often, and how far, is
+    for who knows the path to say: `pattern` is the usual one, as large as it may be, until it is replaced.
+    """
+
+    def __init__(self, robot: RobotModel, config: ProbeConfig) -> None:
+        """Checks the configuration.
+
+        Raises:
+            ValueError: if the kind is unknown, or amplitudes are negative or not six.
+        """
+        if config.kind not in ("smooth", "none"):
+            raise ValueError(f"probe: kind must be smooth or none, got '{config.kind}'")
+        amplitude = np.array(config.amplitude, dtype=float)
+        if amplitude.shape != (NUM_JOINTS,) or not (amplitude >= 0.0).all():
+            raise ValueError(
+                f"probe: amplitude must be six numbers of at least 0 rad, got {config.amplitude}"
+            )
+        self._config, self._amplitude = config, amplitude
+        self._lower, self._upper, self._speed = robot.lower, robot.upper, robot.speed
+        self.pattern = USUAL._replace(size=amplitude)
+
+    def window(self, path_start: float) -> tuple[float, float]:
+        """Begin and length in s; a length of zero if there is no time for it or it is not wanted."""
+        length = path_start - self._config.rest - self._config.begin
+        is_wanted = self._config.kind == "smooth" and length > _SHORTEST
+        return self._config.begin, length if is_wanted else 0.0
+
+    def amplitude(self, q: np.ndarray, J: np.ndarray, path_start: float) -> np.ndarray:
+        """Amplitudes in rad of knock and oscillations, (2, 6), within the limits of joints, speeds and tip.
+
+        Args:
+            q: where the robot starts, rad, (6,).
+            J: Jacobian of the tip there, (6, 6).
+            path_start: s.
+        """
+        _, length = self.window(path_start)
+        if length == 0.0:
+            return np.zeros((2, NUM_JOINTS))
+        room = self.room(q)
+        size = self.within_limits(self.pattern, room, J, length)
+        knock = np.minimum(np.minimum(_KNOCK_SIZE, self._amplitude), room)
+        knock_way = float(np.linalg.norm(J[3:] @ knock))
+        return np.array([knock * min(1.0, self._config.largest_excursion / max(knock_way, 1e-9)), size])
+
+    def within_limits(self, pattern: Pattern, room: np.ndarray, J: np.ndarray, length: float) -> np.ndarray:
+        """The amplitudes of a pattern in rad, made smaller by what it would go beyond limits, (6,).
+
+        Args:
+            pattern: of the oscillations.
+            room: how far each joint may go, rad, (6,).
+            J: Jacobian of the tip, (6, 6).
+            length: of the window in s.
+        """
+        pattern = pattern._replace(size=np.minimum(np.minimum(pattern.size, self._amplitude), room))
+        displacement, velocity, _ = pattern.at(length * _INSTANTS, length)
+        excursion = float(np.linalg.norm(displacement @ J[3:].T, axis=1).max())
+        haste = float((np.abs(velocity).max(axis=0) / (_SPEED_SHARE * self._speed)).max())
+        largest = max(1.0, excursion / self._config.largest_excursion, haste)
+        return pattern.size / largest
+
+    def room(self, q: np.ndarray) -> np.ndarray:
+        """How far the joints may go from q (rad, (6,)) without coming near their limits, rad, (6,)."""
+        return _MARGIN * np.maximum(0.0, np.minimum(self._upper - q, q - self._lower))
+
+    def at(
+        self, time: float, path_start: float, amplitude: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Displacement of the joints and its two derivatives at a time in s, (6,) each."""
+        begin, length = self.window(path_start)
+        if 0.0 < time - _KNOCK_BEGIN < _KNOCK_LENGTH:
+            # sin^4: a step of the acceleration would be a step of the gears' deflection.
+            s, w = 2.0 * np.pi * (time - _KNOCK_BEGIN) / _KNOCK_LENGTH, 2.0 * np.pi / _KNOCK_LENGTH
+            u, du, ddu = 0.5 - 0.5 * np.cos(s), 0.5 * w * np.sin(s), 0.5 * w * w * np.cos(s)
+            size = amplitude[0]
+            return size * u * u, 2.0 * size * u * du, 2.0 * size * (du * du + u * ddu)
+        if not 0.0 < time - begin < length:
+            return np.zeros(NUM_JOINTS), np.zeros(NUM_JOINTS), np.zeros(NUM_JOINTS)
+        pattern = self.pattern._replace(size=amplitude[1])
+        displacement, velocity, acceleration = pattern.at(np.array([time - begin]), length)
+        return displacement[0], velocity[0], acceleration[0]

@@ -1,0 +1,72 @@
+"""Probes for a path: what the path needs is shown, for less than a larger motion of the usual kind would."""
+
+import numpy as np
+import pytest
+
+from robots.description.model import load_robot
+from systems.estimation.probing.path_needs import PathNeeds
+from systems.estimation.probing.probe import USUAL, Probe, ProbeConfig
+from systems.estimation.probing.probe_design import designed
+from systems.reference.paths import Circle, Rectangle, ReferenceConfig, make_path
+from tests.systems.estimation.arms import CAMERA, tip_model
+
+HOME = np.deg2rad([45.0, 45.0, 5.0, -50.0, -60.0, 120.0])
+RATE = 250.0  # samples of the camera in a second
+MODEL = tip_model()
+WEIGHTS = 1.0 / CAMERA**2
+
+
+def needs(shape) -> PathNeeds:
+    return PathNeeds(MODEL, WEIGHTS, make_path(ReferenceConfig(path=shape, settle=4.0)), HOME)
+
+
+def expected(of: PathNeeds, probe: Probe, amplitude: np.ndarray) -> float:
+    """How well the tip will be known after a probe, worked out sample by sample from its motion."""
+    times = np.arange(0.0, 4.0, 1.0 / RATE)
+    q, v, a = np.array([probe.at(t, 4.0, amplitude) for t in times]).swapaxes(0, 1)
+    return of.expected(of.prior + of.information(of.columns(of.q[0] + q, v, a)), RATE)
+
+
+def test_columns_are_how_the_tip_moves():
+    of, i = needs(Circle()), MODEL.G.start + 3
+    q, still = of.q[:1], np.zeros((1, 6))
+    x = MODEL.mean.copy()
+    x[i] += 1e-3 * MODEL.sigma[i]
+    arm = MODEL.forward(MODEL.constants(MODEL.mean), MODEL.mean, q)[1]
+    loads = MODEL.loads.at(arm.frames, q, still, still)
+    before, after = (MODEL.predict(MODEL.constants(y), y, q, loads, still).X_WE for y in (MODEL.mean, x))
+    step = (after - before)[0, :3, 3] / 1e-3
+    np.testing.assert_allclose(of.columns(q, still, still)[0, 3:, i], step, rtol=1e-3, atol=1e-7)
+
+
+@pytest.mark.parametrize("shape", [Rectangle(), Circle()])
+def test_what_the_design_promises_its_motion_shows(shape):
+    of, probe = needs(shape), Probe(load_robot("irb1200"), ProbeConfig())
+    J = of.jacobian(of.q[0])
+    usual = expected(of, probe, probe.amplitude(of.q[0], J, 4.0))
+    probe.pattern, promised = designed(of, probe, 4.0, RATE, sharp=0.0)
+    amplitude = probe.amplitude(of.q[0], J, 4.0)
+    shown = expected(of, probe, amplitude)
+    nothing = expected(of, probe, 0.0 * amplitude)
+    assert shown == pytest.approx(promised, rel=0.2)  # knock and tails are not counted in the promise
+    assert shown <= 1.02 * usual
+    assert shown < 0.1 * nothing
+
+
+def test_none_where_the_tip_is_known_well_enough():
+    of, probe = needs(Circle()), Probe(load_robot("irb1200"), ProbeConfig())
+    pattern, without = designed(of, probe, 4.0, RATE, sharp=1.0)
+    assert not pattern.size.any()
+    still = Probe(load_robot("irb1200"), ProbeConfig(kind="none"))
+    assert without == designed(of, still, 4.0, RATE, sharp=0.0)[1]
+    assert (probe.pattern.periods == USUAL.periods).all()
+
+
+def test_what_is_known_least_has_a_name():
+    of = needs(Rectangle())
+    P = 1e-6 * np.eye(MODEL.size)
+    P[4, 4] = 1.0
+    found = of.standing(P)
+    assert found.unknown == 4
+    assert found.share == pytest.approx(1.0, abs=1e-3)
+    assert found.sigma == pytest.approx(np.linalg.norm(of.H[:, 3:, 4], axis=1).max(), rel=1e-3)
