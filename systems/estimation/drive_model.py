@@ -8,9 +8,14 @@ import numpy as np
 from pydrake.multibody.plant import MultibodyPlant
 from scipy.linalg import expm
 
+from robots.description.error_parameters import NUM_PARAMETERS
+from robots.description.model import RobotModel
 from robots.dynamics.plant import add_robot
 from systems.controller_model import ControllerModel
 from systems.estimation import kernels
+from systems.estimation.arm_geometry import ArmGeometry
+from systems.estimation.arm_loads import ArmLoads
+from systems.estimation.kernels.arrays import DriveMemory, Drives
 from systems.estimation.memory import Layout
 
 _FILTERED = 5  # torque that is needed beside the feedforward; rotor, viscous, Coulomb; the load of a kilogram
@@ -56,21 +61,26 @@ class DriveModel:
     def __init__(self, model: ControllerModel, config: DriveModelConfig) -> None:
         """Works out the gains of the cascade and the filter G for one period."""
         robot, period = model.robot, model.period
-        self._config, self._period, self._takes_torque = config, period, model.takes_torque
-        # Kept as a member: the parts only refer to it. Its context is scratch memory, written before use.
-        self._plant = MultibodyPlant(0.0)
-        self._parts = add_robot(self._plant, robot, "rigid", min(model.payload, robot.payload.largest_mass))
-        self._plant.Finalize()
-        self._context = self._plant.CreateDefaultContext()
-        inertia = np.diag(self._plant.CalcMassMatrix(self._context))
-        self._kd = config.velocity * inertia
-        self._kp = self._kd * (config.position + config.integral)
-        self._ki = self._kd * config.position * config.integral
-        self._rotor, self._viscous = robot.reflected_inertia, robot.joint_viscous_friction
-        self._coulomb, self._width = robot.joint_coulomb_friction, robot.coulomb_velocity
-        self._step = np.array(
-            [_filter_step(*gains, period) for gains in zip(self._kp, self._ki, self._kd, strict=True)]
+        self._config = config
+        payload = min(model.payload, robot.payload.largest_mass)
+        kd = config.velocity * _inertia(robot, payload)
+        kp, ki = kd * (config.position + config.integral), kd * config.position * config.integral
+        self._drives = Drives(
+            robot.reflected_inertia,
+            robot.joint_viscous_friction,
+            robot.joint_coulomb_friction,
+            robot.coulomb_velocity,
+            kp,
+            ki,
+            kd,
+            np.array([_filter_step(*gains, period) for gains in zip(kp, ki, kd, strict=True)]),
+            period,
+            payload,
+            model.takes_torque,
         )
+        # The arm as the drives know it, which hold it against gravity.
+        drawn = ArmGeometry(robot, np.array([], dtype=int))
+        self._held = drawn.constants(np.zeros(NUM_PARAMETERS)), ArmLoads(robot).masses
         spread = [config.dead_time_sigma, *[config.lag_sigma] * 6, *[1e-4] * 6]
         spread += [0.3, 0.3, 0.5] * 6 + [1e-5] * 6 + [config.payload_sigma]
         self._prior = np.diag(np.array(spread) ** 2)
@@ -103,43 +113,10 @@ class DriveModel:
             mass: of the payload as the drives' own gravity compensation has it in kg.
 
         """
-        theta, v, a = motion
-        rotor, viscous = self._rotor * a, self._viscous * v
-        coulomb = self._coulomb * np.tanh(v / self._width)
-        gears = loads[0, :6] + mass * loads[1, :6]
-        self._plant.SetPositions(self._context, theta)
-        needed = rotor + viscous + coulomb + gears + self._parts.load(self._context)
-        torque, missing = np.zeros(6), needed
-        if self._takes_torque:
-            # It arrives when the motion does; drives hold it for a period, so it is that of its middle.
-            last = memory.w[0] if memory.started[0] else needed
-            torque, missing = 1.5 * needed - 0.5 * last, np.zeros(6)
-        self._filter(memory, np.array([missing, rotor, viscous, coulomb, loads[1, :6]]), needed)
-        position, velocity = theta.copy(), v.copy()
-        if not self._takes_torque:
-            integral, error = memory.z[0, :, 0], memory.z[0, :, 1]
-            position += error
-            velocity += (missing - self._kp * error - self._ki * integral) / self._kd
-        columns = memory.z[1:, :, 1].ravel().copy()
-        correction = self.features(v, a, columns) @ memory.beta
-        last = memory.correction.copy() if memory.started[0] else correction
-        most = self._period * _STEEPEST
-        correction = last + np.clip(correction - last, -most, most)
-        memory.correction[:], memory.started[0] = correction, 1.0
-        velocity += (correction - last) / self._period
-        return DriveCommand(position + correction, velocity, torque, columns)
-
-    def _filter(self, memory: SimpleNamespace, w: np.ndarray, needed: np.ndarray) -> None:
-        """e = G w for several torques, exact for torques that change evenly within a period."""
-        if not memory.started[0]:
-            memory.z[..., 0] = w / self._ki
-        else:
-            last = memory.w
-            if self._takes_torque:
-                last[0] = w[0]
-            kernels.drives.filtered(self._step, memory.z, last, w)
-        memory.w[:] = w
-        memory.w[0] = needed
+        known = DriveMemory(memory.started, memory.z, memory.w, memory.beta, memory.correction)
+        out, columns = np.empty((3, 6)), np.empty(24)
+        kernels.drives.command(self._drives, *self._held, known, motion, loads, mass, _STEEPEST, out, columns)
+        return DriveCommand(*out, columns)
 
     def features(self, v: np.ndarray, a: np.ndarray, columns: np.ndarray) -> np.ndarray:
         """Rows of the regression, shape (6, 38), from motion and the filtered torques (24,)."""
@@ -159,6 +136,14 @@ class DriveModel:
 
 
 _DIAGONAL = np.arange(SIZE)
+
+
+def _inertia(robot: RobotModel, payload: float) -> np.ndarray:
+    """What each motor turns in the straight arm, in kg m^2, (6,)."""
+    plant = MultibodyPlant(0.0)
+    add_robot(plant, robot, "rigid", payload)
+    plant.Finalize()
+    return np.diag(plant.CalcMassMatrix(plant.CreateDefaultContext())).copy()
 
 
 def _filter_step(kp: float, ki: float, kd: float, period: float) -> np.ndarray:

@@ -84,3 +84,31 @@ class FollowerState(NamedTuple):
     q: np.ndarray  # (6,) rad, of the joints behind the gears
     rates: np.ndarray  # (2, 6), of the last two instants, newest first
     wander: np.ndarray  # (6,) rad/s, by which joints move because parameters do
+
+
+class Drives(NamedTuple):
+    """What is believed of motors and of the cascades that control them."""
+
+    rotor: np.ndarray  # (6,) kg m^2, joint side
+    viscous: np.ndarray  # (6,) N m s/rad
+    coulomb: np.ndarray  # (6,) N m
+    width: np.ndarray  # (6,) rad/s, of the speeds in which friction turns over
+    kp: np.ndarray  # (6,) N m/rad, gains of a following error, of its integral and of its rate
+    ki: np.ndarray  # (6,)
+    kd: np.ndarray  # (6,)
+    step: (
+        np.ndarray
+    )  # (6, 2, 4), a period's step from integral, error, torque and its change to the first two
+    period: float  # s
+    payload: float  # kg, with which the drives hold the arm
+    takes_torque: bool
+
+
+class DriveMemory(NamedTuple):
+    """What one command hands on to the next."""
+
+    started: np.ndarray  # (1,)
+    z: np.ndarray  # (5, 6, 2), integral of a following error, and the error, of each of five torques
+    w: np.ndarray  # (5, 6), those torques
+    beta: np.ndarray  # (38,), parameters of the regression
+    correction: np.ndarray  # (6,) rad

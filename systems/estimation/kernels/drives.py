@@ -1,7 +1,11 @@
-"""Regression of following errors: its rows, and one step of recursive least squares."""
+"""Commands of drives, and the regression of their following errors: its rows, and a step of least squares."""
+
+import math
 
 import numpy as np
 
+from systems.estimation.kernels.geometry import place_links
+from systems.estimation.kernels.loads import hold
 from systems.estimation.kernels.poses import compiled
 
 
@@ -21,59 +25,121 @@ def features(v, a, filtered, Phi):
 def learn(P, beta, Phi, y, variance):
     """Takes six equations y = Phi beta of one variance into covariance P and parameters beta."""
     n, m = len(beta), len(y)
-    PH, S, gain, r = np.zeros((n, m)), np.zeros((m, m)), np.empty((n, m)), np.empty(m)
-    for i in range(n):
-        for k in range(m):
-            for j in range(n):
-                PH[i, k] += P[i, j] * Phi[k, j]
+    # Transposed, as rows are quicker.
+    PH, S, gain, r = np.zeros((m, n)), np.zeros((m, m)), np.empty((m, n)), np.empty(m)
     for k in range(m):
-        r[k] = y[k]
+        for j in range(n):
+            if Phi[k, j] != 0.0:  # a joint has a fifth of the columns
+                for i in range(n):
+                    PH[k, i] += Phi[k, j] * P[j, i]
+    for k in range(m):
         S[k, k] = variance
         for i in range(n):
-            r[k] -= Phi[k, i] * beta[i]
-            for j in range(m):
-                S[k, j] += Phi[k, i] * PH[i, j]
-    # S = L L^T, and gain = P H S^-1 by two triangular solutions a row.
+            if Phi[k, i] != 0.0:
+                for j in range(m):
+                    S[k, j] += Phi[k, i] * PH[j, i]
+    # S = L L^T, and gain = P H S^-1 by two triangular solutions.
     for k in range(m):
         for j in range(k + 1):
             total = S[k, j]
             for i in range(j):
                 total -= S[k, i] * S[j, i]
             S[k, j] = np.sqrt(total) if j == k else total / S[j, j]
+    for k in range(m):
+        for i in range(n):
+            gain[k, i] = PH[k, i]
+        for j in range(k):
+            for i in range(n):
+                gain[k, i] -= S[k, j] * gain[j, i]
+        for i in range(n):
+            gain[k, i] /= S[k, k]
+    for k in range(m - 1, -1, -1):
+        for j in range(k + 1, m):
+            for i in range(n):
+                gain[k, i] -= S[j, k] * gain[j, i]
+        for i in range(n):
+            gain[k, i] /= S[k, k]
+    for k in range(m):
+        r[k] = y[k]
+        for i in range(n):
+            r[k] -= Phi[k, i] * beta[i]
+    for k in range(m):
+        for i in range(n):
+            beta[i] += gain[k, i] * r[k]
     for i in range(n):
         for k in range(m):
-            total = PH[i, k]
-            for j in range(k):
-                total -= S[k, j] * gain[i, j]
-            gain[i, k] = total / S[k, k]
-        for k in range(m - 1, -1, -1):
-            total = gain[i, k]
-            for j in range(k + 1, m):
-                total -= S[j, k] * gain[i, j]
-            gain[i, k] = total / S[k, k]
-    for i in range(n):
-        for k in range(m):
-            beta[i] += gain[i, k] * r[k]
-        for j in range(i + 1):
-            change = 0.0
-            for k in range(m):
-                change += 0.5 * (gain[i, k] * PH[j, k] + gain[j, k] * PH[i, k])
-            P[i, j] = 0.5 * (P[i, j] + P[j, i]) - change
+            a, b = 0.5 * gain[k, i], 0.5 * PH[k, i]
+            for j in range(i + 1):
+                P[i, j] -= a * PH[k, j] + b * gain[k, j]
+        for j in range(i):
             P[j, i] = P[i, j]
 
 
 @compiled
-def filtered(step, z, last, w):
-    """e = G w for several torques, exact for torques that change evenly within a period.
+def _behind(v, a, filtered, beta, i):
+    """The row of a joint times the parameters."""
+    total = v * beta[0] + v * beta[1 + i] + 1e-2 * a * beta[7 + i]
+    for k in range(3):
+        total += filtered[6 * k + i] * beta[13 + 3 * i + k]
+    return total + beta[31 + i] + filtered[18 + i] * beta[37]
+
+
+@compiled
+def _filter(step, z, last, w):
+    """e = G w for the torques of one joint, exact for torques that change evenly within a period."""
+    for k in range(len(z)):
+        integral, e, before, change = z[k, 0], z[k, 1], last[k], w[k] - last[k]
+        for i in range(2):
+            row = step[i]
+            z[k, i] = row[0] * integral + row[1] * e + row[2] * before + row[3] * change
+
+
+@compiled
+def command(drives, arm, masses, memory, motion, loads, mass, steepest, out, filtered):
+    """What to command so that motors move as planned, see `DriveModel.command`.
 
     Args:
-        step: (6, 2, 4), a period's step from state, torque and its change to the state.
-        z: (m, 6, 2), integral of e and e; is renewed.
-        last, w: torques a period ago and now, (m, 6).
+        drives: `Drives`.
+        arm, masses: with which the drives hold it, `Constants` and `Masses`.
+        memory: `DriveMemory`; is renewed.
+        motion: position, velocity and acceleration of the motors, (6,) each.
+        loads: of the gears, (5, 18).
+        mass: of the payload, kg.
+        steepest: rad/s, what the correction may add to the speed of a joint.
+        out: (3, 6), position, velocity and torque; filtered: (24,), what `features` takes, of rotor, viscous
+            and Coulomb friction and of a kilogram; are written.
     """
-    for k in range(len(z)):
-        for j in range(6):
-            integral, e, before, change = z[k, j, 0], z[k, j, 1], last[k, j], w[k, j] - last[k, j]
-            for i in range(2):
-                row = step[j, i]
-                z[k, j, i] = row[0] * integral + row[1] * e + row[2] * before + row[3] * change
+    theta, v, a = motion
+    X_WE, frames, held, w = np.empty((4, 4)), np.empty((7, 4, 4)), np.empty(6), np.empty(5)
+    place_links(arm, theta, X_WE, frames)
+    hold(masses, drives.payload, frames, theta, held)
+    is_first, most = memory.started[0] == 0.0, drives.period * steepest
+    for i in range(6):
+        w[1], w[2] = drives.rotor[i] * a[i], drives.viscous[i] * v[i]
+        w[3], w[4] = drives.coulomb[i] * math.tanh(v[i] / drives.width[i]), loads[1, i]
+        w[0] = needed = w[1] + w[2] + w[3] + loads[0, i] + mass * loads[1, i] - held[i]
+        z, last = memory.z[:, i], memory.w[:, i]
+        out[0, i], out[1, i], out[2, i] = theta[i], v[i], 0.0
+        if drives.takes_torque:
+            # It arrives when the motion does; drives hold it for a period, so it is that of its middle.
+            out[2, i] = needed if is_first else 1.5 * needed - 0.5 * last[0]
+            last[0] = w[0] = 0.0  # nothing is missing
+        if is_first:
+            for k in range(5):
+                z[k, 0] = w[k] / drives.ki[i]
+        else:
+            _filter(drives.step[i], z, last, w)
+        if not drives.takes_torque:
+            integral, e = z[0, 0], z[0, 1]
+            out[0, i] += e
+            out[1, i] += (needed - drives.kp[i] * e - drives.ki[i] * integral) / drives.kd[i]
+        last[0] = needed
+        for k in range(1, 5):
+            last[k], filtered[6 * (k - 1) + i] = w[k], z[k, 1]
+        correction = _behind(v[i], a[i], filtered, memory.beta, i)
+        before = correction if is_first else memory.correction[i]
+        correction = before + min(max(correction - before, -most), most)
+        memory.correction[i] = correction
+        out[0, i] += correction
+        out[1, i] += (correction - before) / drives.period
+    memory.started[0] = 1.0

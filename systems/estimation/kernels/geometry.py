@@ -91,16 +91,8 @@ def fill_constants(drawing, c):
 
 
 @compiled
-def place(c, q, X_WE, frames, columns):
-    """Poses and columns of one configuration.
-
-    Args:
-        c: `Constants`.
-        q: joints behind the gears in rad, (6,).
-        X_WE: the tool, (4, 4), is written.
-        frames: of the world and the links, (7, 4, 4), likewise.
-        columns: (6, C), likewise.
-    """
+def place_links(c, q, X_WE, frames):
+    """The poses of `place` without its columns."""
     step = np.empty((3, 4))
     for k in range(4):
         for j in range(4):
@@ -124,6 +116,20 @@ def place(c, q, X_WE, frames, columns):
             )
             there[3, k] = 0.0
         there[3, 3] = 1.0
+
+
+@compiled
+def place(c, q, X_WE, frames, columns):
+    """Poses and columns of one configuration.
+
+    Args:
+        c: `Constants`.
+        q: joints behind the gears in rad, (6,).
+        X_WE: the tool, (4, 4), is written.
+        frames: of the world and the links, (7, 4, 4), likewise.
+        columns: (6, C), likewise.
+    """
+    place_links(c, q, X_WE, frames)
     for j in range(columns.shape[1]):
         R = frames[c.frame[j]]
         x, y, z = c.turn[j, 0], c.turn[j, 1], c.turn[j, 2]

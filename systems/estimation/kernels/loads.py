@@ -147,3 +147,27 @@ def load_all(masses, frames, q, velocity, acceleration, loads):
     """`load` for n configurations."""
     for i in range(len(frames)):
         load(masses, frames[i], q[i], velocity[i], acceleration[i], loads[i])
+
+
+@compiled
+def hold(masses, payload, frames, q, torques):
+    """What holds an arm at rest: the torques in N m of its six motors, without what bends.
+
+    Args:
+        masses: `Masses`.
+        payload: kg.
+        frames, q: as of `load`.
+        torques: (6,), is written.
+    """
+    mass = x = y = 0.0  # of all that is carried, and its first moment
+    for body in range(6, -1, -1):
+        i, m = min(body, 5), masses.mass[body] * (payload if body == 6 else 1.0)
+        R, centre, axis = frames[i + 1], masses.centres[body], masses.axes[i, 0]
+        mass += m
+        x += m * (R[0, 0] * centre[0] + R[0, 1] * centre[1] + R[0, 2] * centre[2] + R[0, 3])
+        y += m * (R[1, 0] * centre[0] + R[1, 1] * centre[1] + R[1, 2] * centre[2] + R[1, 3])
+        about_x = R[0, 0] * axis[0] + R[0, 1] * axis[1] + R[0, 2] * axis[2]
+        about_y = R[1, 0] * axis[0] + R[1, 1] * axis[1] + R[1, 2] * axis[2]
+        torques[i] = GRAVITY * (about_x * (y - mass * R[1, 3]) - about_y * (x - mass * R[0, 3]))
+    if masses.spring[0] > 0.0:
+        torques[1] -= _counterbalance(masses.spring, q[1])

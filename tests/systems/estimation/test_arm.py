@@ -9,6 +9,7 @@ from robots.calibration.identifiability import identifiable_parameters
 from robots.description.model import load_robot
 from robots.dynamics.plant import add_robot
 from robots.kinematics.error_kinematics import ErrorKinematics
+from systems.estimation import kernels
 from systems.estimation.arm_geometry import ArmGeometry
 from systems.estimation.arm_loads import ArmLoads
 
@@ -50,6 +51,23 @@ def test_loads_are_those_of_inverse_dynamics_with_calibrated_geometry(name):
     found = found[:, 0] + mass * found[:, 1] + np.einsum("k,nkj->nj", mass * shift, found[:, 2:])
     moved.payload.center_of_mass = np.asarray(moved.payload.center_of_mass) + shift
     np.testing.assert_allclose(found, drake_loads(moved, mass, q, still, still), rtol=1e-9, atol=1e-9)
+
+
+@pytest.mark.parametrize("name", ["irb1200", "kr16", "kr210"])
+def test_motors_hold_the_arm_as_in_drake(name):
+    robot, _, q, *_ = random_case(name, 3)
+    payload = 0.7 * robot.payload.largest_mass
+    plant = MultibodyPlant(0.0)
+    parts = add_robot(plant, robot, "rigid", payload)
+    plant.Finalize()
+    context, geometry = plant.CreateDefaultContext(), ArmGeometry(robot, np.array([], dtype=int))
+    constants, masses = geometry.constants(np.zeros(48)), ArmLoads(robot).masses
+    for position in q:
+        plant.SetPositions(context, position)
+        frames, torques = geometry.arm(constants, position[None]).frames[0], np.empty(6)
+        kernels.loads.hold(masses, payload, frames, position, torques)
+        largest = np.abs(torques).max()
+        np.testing.assert_allclose(torques, -parts.load(context), rtol=0.0, atol=1e-12 * largest)
 
 
 def drake_loads(robot, mass, q, v, a):

@@ -51,7 +51,7 @@ def test_a_dead_time_and_wrong_friction_are_learnt():
 
 def test_the_position_command_makes_up_for_a_torque_that_nobody_gives():
     model, memory = drives(takes_torque=False)
-    kd, kp, ki = model._kd[1], model._kp[1], model._ki[1]
+    kd, kp, ki = model._drives.kd[1], model._drives.kp[1], model._drives.ki[1]
     times, errors, torques = [], [], []
     for k in range(500):
         theta, v, a = motion(k * PERIOD)
