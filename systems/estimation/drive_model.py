@@ -124,6 +124,29 @@ class DriveModel:
         kernels.drives.features(v, a, columns, Phi)
         return Phi
 
+    def compare(
+        self,
+        memory: SimpleNamespace,
+        planned: tuple[np.ndarray, np.ndarray, np.ndarray],
+        columns: np.ndarray,
+        correction: np.ndarray,
+        actual: np.ndarray,
+    ) -> tuple[np.ndarray, np.ndarray, float]:
+        """What the motors have to say of an instant that was planned.
+
+        Args:
+            memory: of the layout.
+            planned: position, velocity and acceleration, (6,) each.
+            columns, correction: of the command of that instant, (24,) and (6,) in rad.
+            actual: where the motors were, rad, (6,).
+
+        Returns:
+            Phi (6, 38) and y (6,) for `learn`, and the most that is not explained yet in rad.
+        """
+        Phi, y = np.zeros((6, SIZE)), np.empty(6)
+        left = kernels.drives.compare(planned, correction, columns, actual, memory.beta, Phi, y)
+        return Phi, y, left
+
     def learn(self, memory: SimpleNamespace, Phi: np.ndarray, y: np.ndarray) -> None:
         """One step of recursive least squares: the motors were y behind a plan without correction, (6,)."""
         kernels.drives.learn(memory.P, memory.beta, Phi, y, self._config.following_sigma**2)

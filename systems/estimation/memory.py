@@ -21,12 +21,12 @@ class Layout:
         self.size = start
 
     def view(self, vector: np.ndarray) -> SimpleNamespace:
-        """The arrays as attributes; they are windows of the vector and not copies.
+        """The arrays as attributes; they are windows of the vector, which is ``all``, and not copies.
 
         Args:
             vector: shape (size,), contiguous.
         """
-        windows = SimpleNamespace()
+        windows = SimpleNamespace(all=vector)
         attributes = windows.__dict__
         for name, place, shape in self._places:
             part = vector[place]
@@ -83,21 +83,11 @@ class History:
         order = (first + np.arange(min(count, self.length))) % self.length
         return memory.times[order], memory.rows[order]
 
-    def around(self, memory: SimpleNamespace, time: float) -> tuple[int, int, float] | None:
-        """The places of the rows before and after a time, and the share of the way from one to the other.
-
-        Before the oldest row and after the newest one both are that row. None if there is no row.
-        """
+    def at(self, memory: SimpleNamespace, time: float) -> np.ndarray | None:
+        """The row at a time, linear between rows and constant outside; None if there is none."""
         count = int(memory.count[0])
         if not count:
             return None
-        return kernels.history.around(count, memory.times, time)
-
-    def at(self, memory: SimpleNamespace, time: float) -> np.ndarray | None:
-        """The row at a time, linear between rows and constant outside; None if there is none."""
-        place = self.around(memory, time)
-        if place is None:
-            return None
         row = np.empty(memory.rows.shape[1])
-        kernels.history.between(memory.rows, *place, row)
+        kernels.history.row_at(count, memory.times, memory.rows, time, row)
         return row

@@ -110,8 +110,9 @@ class TipEstimator:
 
     def clock_offset(self, memory: SimpleNamespace, time: float) -> float:
         """What is to be added to a stamp of the camera in s."""
-        x = self.x(memory)
-        return float(x[self.model.C] + x[self.model.D] * self._since_first(memory, time))
+        model, xi = self.model, memory.xi
+        offset, drift = (float(model.mean[k] + model.sigma[k] * xi[k]) for k in (model.C, model.D))
+        return offset + drift * self._since_first(memory, time)
 
     @staticmethod
     def _since_first(memory: SimpleNamespace, time: float) -> float:

@@ -138,15 +138,16 @@ class SelfCalibrating(LeafSystem):
             plan = self._planner.step(memory.planner, parameters, wanted, 0.0, self.period)
             motion = plan.theta, plan.velocity, plan.acceleration
             command = self._drives.command(memory.drives, motion, plan.loads, self._model.payload)
-        Phi = self._drives.features(plan.velocity, plan.acceleration, command.columns)
-        self._drives.learn(memory.drives, Phi, still)
+        Phi, y, _ = self._drives.compare(memory.drives, motion, command.columns, still, q)
+        self._drives.learn(memory.drives, Phi, y)
         pair = Pair(q, plan.loads, plan.motion, plan.twist, X_WE)
         for _ in range(40):  # the first ones are only looked at
             self.estimator.add(memory.estimator, pair)
         for time in (0.0, 1.0):
             self._learning.encoders.append(memory.encoders, time, np.concatenate((q, still)))
-        self._learning.encoders.at(memory.encoders, 0.5)
+            self._learning.plan.append(memory.plan, time, memory.passed.all)
         self._learning.encoders_at(memory, 0.5)
+        self._learning.pair(memory, 0.5, X_WE)
 
     def memory(self, context: Context) -> SimpleNamespace:
         """All that the law remembers, as arrays that must not be written to."""

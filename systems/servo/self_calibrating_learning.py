@@ -10,9 +10,10 @@ from systems.estimation import kernels
 from systems.estimation.dead_time import CommandDelay
 from systems.estimation.drive_model import DriveModel
 from systems.estimation.events import DEAD_TIME_CHANGED, Event, EventLog
+from systems.estimation.kernels.arrays import Ring
 from systems.estimation.memory import History, Layout
 from systems.estimation.tip_estimator import Pair, TipEstimator
-from systems.estimation.tip_model import TipModel, moved
+from systems.estimation.tip_model import TipModel
 from systems.samples import JointSample, PoseSample
 from systems.servo.self_calibrating_config import SelfCalibratingConfig
 
@@ -80,6 +81,8 @@ class Learning:
                 accepted=(1,),  # when the last pose came that was learnt from, s
                 path_start=(1,),
             ),
+            "pair": Layout(theta=(6,), then=PLAN, now=PLAN, X_WE=(4, 4)),  # room for that of an exposure
+            "passed": PLAN,  # room for the plan of an instant that has passed
             "first": (1,),  # the first planned instant
             "compared": (1,),  # how many planned instants encoders have been compared at
             "upset_at": (1,),
@@ -140,36 +143,40 @@ class Learning:
     def pair(self, memory: SimpleNamespace, stamp: float, X_WE: np.ndarray) -> Pair | None:
         """The encoders and the plan at the instant of an exposure; None if they are not known, or astray.
 
+        The pair is made of windows of the memory, in which the next one takes its place.
+
         Args:
             memory: of the law.
             stamp: of the exposure in s, as the camera has it.
             X_WE: the pose seen, (4, 4).
         """
-        count = int(memory.encoders.count[0])
-        newest = memory.encoders.times[(count - 1) % self.encoders.length]
-        offset = self.estimator.clock_offset(memory.estimator, stamp)
-        exposure = min(stamp + offset, newest)
-        encoders = self.encoders_at(memory, exposure)
-        loaded = self.plan.at(memory.plan, exposure - self._load_lag)
-        planned = self.plan.at(memory.plan, exposure)
-        if encoders is None or loaded is None or planned is None:
+        encoders, plan, at = memory.encoders, memory.plan, memory.pair
+        count = int(encoders.count[0])
+        if not count or not plan.count[0]:
             return None
-        then, now = PLAN.view(loaded), PLAN.view(planned)
-        if memory.delay.known[0] and np.abs(now.theta - encoders).max() > _ASTRAY:
+        newest = float(encoders.times[(count - 1) % self.encoders.length])
+        exposure = min(stamp + self.estimator.clock_offset(memory.estimator, stamp), newest)
+        then, now = at.then, at.now
+        rings = Ring(encoders.count, encoders.times, encoders.rows), Ring(plan.count, plan.times, plan.rows)
+        kernels.instants.read(*rings, exposure, self._load_lag, at.theta, then.all, now.all)
+        is_known = memory.delay.known[0]
+        if is_known and kernels.tip.largest_change(now.theta, at.theta, NUM_JOINTS) > _ASTRAY:
             return None
         # As it would have been seen had the clock been right: the column stands for all of the offset.
-        X_WE = moved(X_WE[None], ((exposure - stamp) * now.twist)[None])[0]
+        at.X_WE[:] = X_WE
+        kernels.poses.move(at.X_WE, (exposure - stamp) * now.twist)
         is_settling = exposure < memory.delay.settled[0] + _SETTLING
         unrest = UNREST if is_settling else float(now.unrest[0])
-        return Pair(encoders, then.loads, then.motion, now.twist, X_WE, unrest, then.states, stamp)
+        return Pair(at.theta, then.loads, then.motion, now.twist, at.X_WE, unrest, then.states, stamp)
 
     def encoders_at(self, memory: SimpleNamespace, time: float) -> np.ndarray | None:
         """Positions between two samples, a cubic through positions and velocities, rad, (6,)."""
-        place = self.encoders.around(memory.encoders, time)
-        if place is None:
+        encoders = memory.encoders
+        count = int(encoders.count[0])
+        if not count:
             return None
         position = np.empty(NUM_JOINTS)
-        kernels.history.cubic(memory.encoders.times, memory.encoders.rows, *place, position)
+        kernels.history.cubic_at(count, encoders.times, encoders.rows, time, position)
         return position
 
     def _watch_delay(self, memory: SimpleNamespace, time: float) -> None:
@@ -199,18 +206,20 @@ class Learning:
             if instant > newest + 1e-9:
                 break
             memory.compared[0] = k + 1
-            actual = self.encoders_at(memory, instant)
-            if actual is None or instant < first or not self.delay.is_settled(memory.delay, instant):
+            if instant < first or not self.delay.is_settled(memory.delay, instant):
                 continue
-            row = PLAN.view(plan.rows[k % self.plan.length])
-            y = row.theta - actual + row.correction
-            Phi = self.drives.features(row.velocity, row.acceleration, row.columns)
-            self._learn_drives(memory, (instant, Phi, y), instant > memory.heard.path_start[0])
+            actual = self.encoders_at(memory, instant)
+            if actual is not None:
+                self._learn_drives(memory, instant, plan.rows[k % self.plan.length], actual)
 
-    def _learn_drives(self, memory: SimpleNamespace, sample, on_path: bool) -> None:
-        instant, Phi, y = sample
-        drives = memory.drives
-        if on_path and np.abs(y - Phi @ drives.beta).max() > _UPSET:
+    def _learn_drives(
+        self, memory: SimpleNamespace, instant: float, planned: np.ndarray, actual: np.ndarray
+    ) -> None:
+        drives, row = memory.drives, memory.passed
+        row.all[:] = planned
+        motion = row.theta, row.velocity, row.acceleration
+        Phi, y, left = self.drives.compare(drives, motion, row.columns, row.correction, actual)
+        if left > _UPSET and instant > memory.heard.path_start[0]:
             if instant > memory.upset_at[0] + _CALM_AGAIN:
                 memory.upset_at[0] = instant
             memory.paused_until[0] = min(instant + _UPSET_PAUSE, memory.upset_at[0] + _LONGEST_PAUSE)

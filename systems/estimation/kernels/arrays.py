@@ -112,3 +112,11 @@ class DriveMemory(NamedTuple):
     w: np.ndarray  # (5, 6), those torques
     beta: np.ndarray  # (38,), parameters of the regression
     correction: np.ndarray  # (6,) rad
+
+
+class Ring(NamedTuple):
+    """Rows of numbers with their times, the last ones of all that there were."""
+
+    count: np.ndarray  # (1,), of all of them
+    times: np.ndarray  # (n,) s
+    rows: np.ndarray  # (n, columns)

@@ -22,6 +22,36 @@ def features(v, a, filtered, Phi):
 
 
 @compiled
+def _behind(v, a, filtered, beta, i):
+    """The row of a joint times the parameters."""
+    total = v * beta[0] + v * beta[1 + i] + 1e-2 * a * beta[7 + i]
+    for k in range(3):
+        total += filtered[6 * k + i] * beta[13 + 3 * i + k]
+    return total + beta[31 + i] + filtered[18 + i] * beta[37]
+
+
+@compiled
+def compare(planned, correction, filtered, actual, beta, Phi, y):
+    """Equations y = Phi beta of one instant, and by how much they are off at most at a beta, rad.
+
+    Args:
+        planned: position, velocity and acceleration of the motors, (6,) each.
+        correction: that was commanded beside the plan, rad, (6,).
+        filtered: as of `features`.
+        actual: positions of the motors, rad, (6,).
+        beta: (38,).
+        Phi: (6, 38), which are zero before, y: (6,), are written.
+    """
+    theta, v, a = planned
+    features(v, a, filtered, Phi)
+    largest = 0.0
+    for i in range(6):
+        y[i] = theta[i] - actual[i] + correction[i]
+        largest = max(largest, abs(y[i] - _behind(v[i], a[i], filtered, beta, i)))
+    return largest
+
+
+@compiled
 def learn(P, beta, Phi, y, variance):
     """Takes six equations y = Phi beta of one variance into covariance P and parameters beta."""
     n, m = len(beta), len(y)
@@ -73,15 +103,6 @@ def learn(P, beta, Phi, y, variance):
                 P[i, j] -= a * PH[k, j] + b * gain[k, j]
         for j in range(i):
             P[j, i] = P[i, j]
-
-
-@compiled
-def _behind(v, a, filtered, beta, i):
-    """The row of a joint times the parameters."""
-    total = v * beta[0] + v * beta[1 + i] + 1e-2 * a * beta[7 + i]
-    for k in range(3):
-        total += filtered[6 * k + i] * beta[13 + 3 * i + k]
-    return total + beta[31 + i] + filtered[18 + i] * beta[37]
 
 
 @compiled

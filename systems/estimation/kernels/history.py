@@ -34,8 +34,16 @@ def between(rows, before, behind, share, out):
 
 
 @compiled
-def cubic(times, rows, before, behind, s, out):
-    """Positions between two rows of positions and velocities, by the cubic through both."""
+def row_at(count, times, rows, time, out):
+    """`History.at` of the first ``count`` rows; there is one at least."""
+    before, behind, share = around(count, times, time)
+    between(rows, before, behind, share, out)
+
+
+@compiled
+def cubic_at(count, times, rows, time, out):
+    """Positions at a time, by the cubic through the rows of positions and velocities beside it."""
+    before, behind, s = around(count, times, time)
     number = len(out)
     h, r = times[behind] - times[before], 1.0 - s
     for k in range(number):
