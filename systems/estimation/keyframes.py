@@ -7,13 +7,10 @@ import numpy as np
 from systems.estimation import kernels
 from systems.estimation.arm_geometry import Constants
 from systems.estimation.gear_errors import NUM_SHAPES
+from systems.estimation.kernels.arrays import GEARS, MOTION, SHAPES, THETA, TIME, TWIST
 from systems.estimation.memory import Layout
 from systems.estimation.tip_model import Prediction, TipModel
 
-# A keyframe: encoder positions, deflection of the gears, joint velocity and acceleration, twist, time, the
-# rows of the pose that was seen, its weight in samples, and shapes of the gears' errors if there are any.
-_THETA, _GEARS, _MOTION, _TWIST, _TIME = slice(0, 6), slice(6, 12), slice(12, 24), slice(24, 30), 30
-_POSE, _WEIGHT, _SHAPES = slice(31, 43), 43, 44
 # m or rad, by which the parameters may be off from where the sum was linearised: half of its square, over an
 # arm of a metre, is a third of what the mean of a dozen samples of a good camera may be wrong by.
 _LINEAR = 3e-3
@@ -40,7 +37,7 @@ class Keyframes:
         self._model, self._weights, self._length, self._batch = model, weights, length, batch
         n = model.size
         self.layout = Layout(
-            rows=(length, _SHAPES + 6 * NUM_SHAPES * model.has_gear_errors),
+            rows=(length, SHAPES + 6 * NUM_SHAPES * model.has_gear_errors),
             first=(1,),
             end=(1,),
             position=(1,),  # of the pass; below zero for none
@@ -114,10 +111,12 @@ class Keyframes:
         position = int(memory.position[0])
         leaving = int(memory.leaving[0])
         until = min(position + self._batch, end, max(leaving, position) if position < leaving else end)
-        A, b = self._information(memory, np.arange(position, until), constants, xi)
         is_leaving = position < leaving
-        (memory.A_leaving if is_leaving else memory.A_pass)[:] += A
-        (memory.b_leaving if is_leaving else memory.b_pass)[:] += b
+        A = memory.A_leaving if is_leaving else memory.A_pass
+        b = memory.b_leaving if is_leaving else memory.b_pass
+        model = self._model
+        arm = constants, model.unknowns(model.full(xi)), model.loads.masses
+        kernels.keyframes.read(*arm, xi, memory.rows, position, until, self._weights, A, b)
         memory.position[0] = until
         if until < end:
             return False
@@ -140,26 +139,10 @@ class Keyframes:
         """The tip of some keyframes, (n, row), with loads worked out anew."""
         model = self._model
         motion = rows[:, 12:18], rows[:, 18:24]
-        configuration = rows[:, _THETA], rows[:, _GEARS]
-        shapes = rows[:, _SHAPES:].reshape(-1, NUM_SHAPES, 6) if model.has_gear_errors else None
-        seen = rows[:, _TWIST], shapes, rows[:, _TIME]
+        configuration = rows[:, THETA:GEARS], rows[:, GEARS:MOTION]
+        shapes = rows[:, SHAPES:].reshape(-1, NUM_SHAPES, 6) if model.has_gear_errors else None
+        seen = rows[:, TWIST:TIME], shapes, rows[:, TIME]
         return model.predict_anew(constants, model.full(xi), configuration, motion, *seen)
-
-    def _information(
-        self, memory: SimpleNamespace, numbers: np.ndarray, constants: Constants, xi: np.ndarray
-    ) -> tuple[np.ndarray, np.ndarray]:
-        """A and b of some keyframes, linear about xi; renews the deflections of their gears."""
-        places = numbers % self._length
-        rows = memory.rows[places]
-        n = len(rows)
-        model = self._model
-        found = self.predict(constants, xi, rows)
-        memory.rows[places, _GEARS] = found.gears
-        seen = np.ascontiguousarray(rows[:, _POSE]).reshape(n, 3, 4)
-        y = kernels.poses.pose_errors(seen, found.X_WE) + found.H @ xi
-        H = found.H.reshape(-1, model.size)
-        weighted = (rows[:, _WEIGHT, None] * self._weights).ravel()[:, None] * H
-        return H.T @ weighted, weighted.T @ y.ravel()
 
 
 def keyframe_row(means: np.ndarray, seen: tuple[np.ndarray, float]) -> np.ndarray:

@@ -6,8 +6,8 @@ from types import SimpleNamespace
 from typing import NamedTuple
 
 import numpy as np
-from scipy.linalg import get_lapack_funcs
 
+from robots.description.model import NUM_JOINTS
 from systems.estimation import kernels
 from systems.estimation.arm_geometry import Constants
 from systems.estimation.events import CLOCK_DRIFTS, LOAD_CHANGED, Event, Innovations
@@ -16,7 +16,6 @@ from systems.estimation.keyframes import Keyframes, keyframe_row
 from systems.estimation.memory import Layout
 from systems.estimation.tip_model import Prediction, Spread, TipModel, moved
 
-(_POSV,) = get_lapack_funcs(("posv",), dtype=np.float64)  # symmetric positive definite equations
 _AGAIN = 500  # samples, in which a second event says that the first was explained wrongly
 _OF_THE_LOAD = 0.1  # of its spread, when a tool was displaced
 _DOUBT = 3.0  # times wider, what is known of everything, where it does not hold
@@ -125,27 +124,27 @@ class TipEstimator:
 
     def constants(self, memory: SimpleNamespace) -> Constants:
         """The geometry near the estimate; a function of the memory alone, kept to save time."""
+        return self._constants_at(memory, self.x(memory))
+
+    def _constants_at(self, memory: SimpleNamespace, x: np.ndarray) -> Constants:
         self._constants = self.model.constants_near(
-            self.x(memory), memory.x_geometry, self._config.geometry_step, self._constants
+            x, memory.x_geometry, self._config.geometry_step, self._constants
         )
         return self._constants
 
     def predict(self, memory: SimpleNamespace, pair: Pair) -> Prediction:
         """The tip of one pair at the estimate."""
-        return self._predict(memory, pair)[0]
-
-    def _predict(self, memory: SimpleNamespace, pair: Pair) -> tuple[Prediction, np.ndarray | None]:
         x = self.x(memory)
         shapes = self.model.gear_shapes(x, pair.theta, pair.loads, pair.states)
-        rows = pair.theta[None], pair.loads[None], pair.twist[None]
-        found = self.model.predict(
-            self.constants(memory),
+        return self.model.predict(
+            self._constants_at(memory, x),
             x,
-            *rows,
-            shapes[None] if shapes is not None else None,
+            pair.theta[None],
+            pair.loads[None],
+            pair.twist[None],
+            None if shapes is None else shapes[None],
             self._since_first(memory, pair.time),
         )
-        return found, shapes
 
     def tip_covariance(self, memory: SimpleNamespace, pair: Pair) -> np.ndarray:
         """Covariance of the predicted tip, rotation (rad^2) first, shape (6, 6)."""
@@ -160,8 +159,10 @@ class TipEstimator:
         memory.last_time[0] = pair.time
         if memory.is_foreign[0]:
             return None
-        found, shapes = self._predict(memory, pair)
-        r, H = kernels.poses.pose_errors(pair.X_WE[None], found.X_WE)[0], found.H[0]
+        model, x, since_first = self.model, self.x(memory), self._since_first(memory, pair.time)
+        shapes = model.gear_shapes(x, pair.theta, pair.loads, pair.states)
+        seen = pair.theta, pair.loads, pair.twist, pair.X_WE
+        r, H, gears = model.innovation(self._constants_at(memory, x), x, seen, shapes, since_first)
         weight = 1.0 / (1.0 + (pair.unrest / config.calm) ** 2)
         event, innovations = None, memory.innovations
         if memory.count[0] <= config.test_after:
@@ -184,12 +185,13 @@ class TipEstimator:
                     self._doubt(memory)
         sums = memory.A_open, memory.b_open, memory.sum_y, memory.sum_H
         kernels.information.add_sample(r, H, memory.xi, self.weights, weight, *sums)
-        since_first = [self._since_first(memory, pair.time)]
-        means = [pair.theta, found.gears[0], pair.motion, pair.twist, since_first]
+        means = [pair.theta, gears, pair.motion, pair.twist, (since_first,)]
         means += [shapes.ravel()] if shapes is not None else []
         self._open(memory, np.concatenate(means), weight)
         memory.count[0] += 1.0
-        moved_away = np.abs(pair.theta - memory.first_theta).max() > config.keyframe_step
+        moved_away = (
+            kernels.tip.largest_change(pair.theta, memory.first_theta, NUM_JOINTS) > config.keyframe_step
+        )
         is_long = memory.samples[0] >= config.keyframe_samples
         if moved_away or is_long or int(memory.count[0]) in _CLOSE_AT:
             self._close(memory)
@@ -251,18 +253,19 @@ class TipEstimator:
         self._forget_open(memory)
 
     def _solve(self, memory: SimpleNamespace) -> None:
-        A, b = memory.keyframes.A + memory.A_open, memory.keyframes.b + memory.b_open
-        _, xi, info = _POSV(A, b, lower=1)
-        if info != 0:
-            return
         # Half of the square of a step is what it leaves of samples that are known far better: small steps
         # from where the past was read keep to the curved set of parameters that explain it.
-        step = xi - memory.keyframes.xi_sum
-        largest = np.abs((step * self.model.sigma)[self.model.G]).max()
-        memory.xi[:] = memory.keyframes.xi_sum + min(1.0, _TRUST / max(largest, 1e-12)) * step
+        past, model = memory.keyframes, self.model
+        sums = past.A, memory.A_open, past.b, memory.b_open
+        kernels.information.estimate(*sums, past.xi_sum, model.sigma, model.K.start, _TRUST, memory.xi)
 
     def _solve_columns(self, memory: SimpleNamespace, H: np.ndarray) -> np.ndarray:
-        return np.linalg.solve(memory.keyframes.A + memory.A_open, H.T)
+        """P H^T with the covariance P of the estimate, (n, 6)."""
+        out = np.empty((self.model.size, len(H)))
+        columns = np.ascontiguousarray(H.T)
+        if not kernels.information.solve(memory.keyframes.A, memory.A_open, columns, out):
+            return np.linalg.solve(memory.keyframes.A + memory.A_open, columns)
+        return out
 
     def _doubt(self, memory: SimpleNamespace) -> None:
         """What was learnt does not hold where the robot is now, though nothing happened: it weighs less."""

@@ -13,10 +13,11 @@ from systems.estimation import kernels
 from systems.estimation.arm_geometry import Arm, ArmGeometry, Constants
 from systems.estimation.arm_loads import ArmLoads
 from systems.estimation.gear_errors import NUM_SHAPES, GearErrors
-from systems.estimation.kernels.arrays import Seen, Unknowns
+from systems.estimation.kernels.arrays import Seen, SeenOnce, Unknowns
 from systems.estimation.learnt_robot import known_before
 
 HELD = 1e5  # information on the drift of a clock as long as nothing shows that there is one
+_NO_SHAPES = np.empty((0, 6))
 _STAYS = 0.02  # of the spread, by which what was measured of a robot may have changed since
 
 
@@ -210,6 +211,30 @@ class TipModel:
         seen = self._seen(n, twist, shapes, time)
         kernels.tip.predict(constants, self.unknowns(x), theta, loads, seen, *out)
         return Prediction(*out)
+
+    def innovation(
+        self,
+        constants: Constants,
+        x: np.ndarray,
+        pair: tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray],
+        shapes: np.ndarray | None = None,
+        time: float = 0.0,
+    ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """How far the tip is seen from where it is predicted.
+
+        Args:
+            constants, x: as of `predict`.
+            pair: encoder positions (6,), loads (5, 18), twist (6,) and the pose seen (4, 4) of one instant.
+            shapes, time: of this instant, as of `predict`.
+
+        Returns:
+            The error (6,), rotation in rad first; its columns (6, size); deflections of gears in rad, (6,).
+        """
+        theta, loads, twist, X_WE = pair
+        out = np.empty(6), np.empty((6, self.size)), np.empty(6)
+        seen = SeenOnce(twist, time, _NO_SHAPES if shapes is None else shapes)
+        kernels.tip.innovation(constants, self.unknowns(x), theta, loads, seen, X_WE, *out)
+        return out
 
     def predict_anew(
         self,

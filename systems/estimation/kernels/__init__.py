@@ -8,7 +8,18 @@ beside the source (``__pycache__``); only the first process after a change compi
 from importlib import import_module
 from types import ModuleType
 
-_COMPILED = ("drives", "geometry", "history", "information", "instants", "loads", "plan", "poses", "tip")
+_COMPILED = (
+    "drives",
+    "geometry",
+    "history",
+    "information",
+    "instants",
+    "keyframes",
+    "loads",
+    "plan",
+    "poses",
+    "tip",
+)
 
 
 def __getattr__(name: str) -> ModuleType:

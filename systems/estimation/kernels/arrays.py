@@ -5,6 +5,9 @@ from typing import NamedTuple
 import numpy as np
 
 SHIFTS, TURNS_BEFORE, TURNS_BEHIND = 0, 1, 2  # what a parameter does to the placement of its body
+# A keyframe: encoder positions, deflection of the gears, joint velocity and acceleration, twist, time, the
+# rows of the pose that was seen, its weight in samples, and shapes of the gears' errors if there are any.
+THETA, GEARS, MOTION, TWIST, TIME, POSE, WEIGHT, SHAPES = 0, 6, 12, 24, 30, 31, 43, 44
 
 
 class Drawing(NamedTuple):
@@ -63,6 +66,14 @@ class Seen(NamedTuple):
     twist: np.ndarray  # (n, 6), of the tip
     time: np.ndarray  # (n,) s, since the camera's clock was compared first
     shapes: np.ndarray  # (n, 7, 6) of the gears' errors, or (n, 0, 6)
+
+
+class SeenOnce(NamedTuple):
+    """The same of one instant."""
+
+    twist: np.ndarray  # (6,)
+    time: float  # s
+    shapes: np.ndarray  # (7, 6) or (0, 6)
 
 
 class PathInstant(NamedTuple):

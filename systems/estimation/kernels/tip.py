@@ -2,9 +2,10 @@
 
 import numpy as np
 
+from systems.estimation.kernels.arrays import SeenOnce
 from systems.estimation.kernels.geometry import place
 from systems.estimation.kernels.loads import load
-from systems.estimation.kernels.poses import compiled, move
+from systems.estimation.kernels.poses import compiled, error, move
 
 
 @compiled
@@ -47,12 +48,12 @@ def move_by_geometry(c, x, columns, X_WE, step):
 
 
 @compiled
-def _complete(unknowns, g, loads, unit, yields, seen, n, columns, X_WE, H):
+def _complete(unknowns, g, loads, unit, yields, seen, columns, X_WE, H):
     """Adds the tilting bearings and the clock to a pose, and makes the columns."""
     x, sigma = unknowns.x, unknowns.sigma
-    clock, time, step = x[g + 22], seen.time[n], np.empty(6)
+    clock, time, step = x[g + 22], seen.time, np.empty(6)
     for i in range(6):
-        twist = seen.twist[n, i]
+        twist = seen.twist[i]
         step[i] = twist * clock + time * twist * x[g + 23]
         for j in range(6, 18):
             step[i] += columns[i, j] * yields[j]
@@ -68,11 +69,26 @@ def _complete(unknowns, g, loads, unit, yields, seen, n, columns, X_WE, H):
         H[i, g + 22], H[i, g + 23] = twist * sigma[g + 22], time * twist * sigma[g + 23]
         for k in range(g + 24, len(x)):
             H[i, k] = 0.0
-        for k in range(seen.shapes.shape[1]):
+        for k in range(len(seen.shapes)):
             for j in range(6):
                 entry = g + 24 + 6 * k + j
-                H[i, entry] = columns[i, j] * seen.shapes[n, k, j] * sigma[entry]
+                H[i, entry] = columns[i, j] * seen.shapes[k, j] * sigma[entry]
     move(X_WE, step)
+
+
+@compiled
+def predict_one(c, unknowns, theta, loads, seen, X_WE, H, gears):
+    """`predict` for one instant, with `SeenOnce`."""
+    g = len(c.chosen)
+    unit, yields, q, step = np.empty(18), np.empty(18), np.empty(6), np.empty(6)
+    frames, columns = np.empty((7, 4, 4)), np.empty((6, len(c.frame)))
+    deflect(unknowns, g, loads, unit, yields)
+    for j in range(6):
+        gears[j] = yields[j]
+        q[j] = theta[j] + yields[j] + _error_of_gear(unknowns, g, seen.shapes, j)
+    place(c, q, X_WE, frames, columns)
+    move_by_geometry(c, unknowns.x, columns, X_WE, step)
+    _complete(unknowns, g, loads, unit, yields, seen, columns, X_WE, H)
 
 
 @compiled
@@ -87,17 +103,39 @@ def predict(c, unknowns, theta, loads, seen, X_WE, H, gears):
         seen: `Seen`.
         X_WE: (n, 4, 4), H: (n, 6, size), gears: deflections in rad (n, 6), are written.
     """
+    for n in range(len(theta)):
+        once = SeenOnce(seen.twist[n], seen.time[n], seen.shapes[n])
+        predict_one(c, unknowns, theta[n], loads[n], once, X_WE[n], H[n], gears[n])
+
+
+@compiled
+def innovation(c, unknowns, theta, loads, seen, X_seen, r, H, gears):
+    """How far the camera sees the tip from where it is predicted, (6,), beside what `predict_one` writes."""
+    X_WE = np.empty((4, 4))
+    predict_one(c, unknowns, theta, loads, seen, X_WE, H, gears)
+    error(X_seen, X_WE, r)
+
+
+@compiled
+def predict_one_anew(c, unknowns, masses, theta, gears, motion, seen, X_WE, H):
+    """`predict_anew` for one instant, with `SeenOnce`."""
     g = len(c.chosen)
     unit, yields, q, step = np.empty(18), np.empty(18), np.empty(6), np.empty(6)
-    frames, columns = np.empty((7, 4, 4)), np.empty((6, len(c.frame)))
-    for n in range(len(theta)):
-        deflect(unknowns, g, loads[n], unit, yields)
+    frames, columns, loads = np.empty((7, 4, 4)), np.empty((6, len(c.frame))), np.empty((5, 18))
+    for j in range(6):
+        q[j] = theta[j] + gears[j] + _error_of_gear(unknowns, g, seen.shapes, j)
+    place(c, q, X_WE, frames, columns)
+    move_by_geometry(c, unknowns.x, columns, X_WE, step)
+    load(masses, frames, q, motion[:6], motion[6:], loads)
+    deflect(unknowns, g, loads, unit, yields)
+    for i in range(6):
+        step[i] = 0.0
         for j in range(6):
-            gears[n, j] = yields[j]
-            q[j] = theta[n, j] + yields[j] + _error_of_gear(unknowns, g, seen.shapes[n], j)
-        place(c, q, X_WE[n], frames, columns)
-        move_by_geometry(c, unknowns.x, columns, X_WE[n], step)
-        _complete(unknowns, g, loads[n], unit, yields, seen, n, columns, X_WE[n], H[n])
+            step[i] += columns[i, j] * (yields[j] - gears[j])
+    for j in range(6):
+        gears[j] = yields[j]
+    move(X_WE, step)
+    _complete(unknowns, g, loads, unit, yields, seen, columns, X_WE, H)
 
 
 @compiled
@@ -110,21 +148,6 @@ def predict_anew(c, unknowns, masses, theta, gears, motion, seen, X_WE, H):
         gears: about by how much the gears yield in rad, (n, 6); is renewed.
         motion: velocities and accelerations of the joints, (n, 12).
     """
-    g = len(c.chosen)
-    unit, yields, q, step = np.empty(18), np.empty(18), np.empty(6), np.empty(6)
-    frames, columns, loads = np.empty((7, 4, 4)), np.empty((6, len(c.frame))), np.empty((5, 18))
     for n in range(len(theta)):
-        for j in range(6):
-            q[j] = theta[n, j] + gears[n, j] + _error_of_gear(unknowns, g, seen.shapes[n], j)
-        place(c, q, X_WE[n], frames, columns)
-        move_by_geometry(c, unknowns.x, columns, X_WE[n], step)
-        load(masses, frames, q, motion[n, :6], motion[n, 6:], loads)
-        deflect(unknowns, g, loads, unit, yields)
-        for i in range(6):
-            step[i] = 0.0
-            for j in range(6):
-                step[i] += columns[i, j] * (yields[j] - gears[n, j])
-        for j in range(6):
-            gears[n, j] = yields[j]
-        move(X_WE[n], step)
-        _complete(unknowns, g, loads, unit, yields, seen, n, columns, X_WE[n], H[n])
+        once = SeenOnce(seen.twist[n], seen.time[n], seen.shapes[n])
+        predict_one_anew(c, unknowns, masses, theta[n], gears[n], motion[n], once, X_WE[n], H[n])

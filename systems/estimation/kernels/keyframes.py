@@ -1,0 +1,45 @@
+"""What keyframes say of the unknowns, read anew, compiled."""
+
+import numpy as np
+
+from systems.estimation.kernels.arrays import (
+    GEARS,
+    MOTION,
+    POSE,
+    SHAPES,
+    THETA,
+    TIME,
+    TWIST,
+    WEIGHT,
+    SeenOnce,
+)
+from systems.estimation.kernels.information import add_squares
+from systems.estimation.kernels.poses import compiled, error
+from systems.estimation.kernels.tip import predict_one_anew
+
+
+@compiled
+def read(c, unknowns, masses, xi, keyframes, first, until, weights, A, b):
+    """Adds what some keyframes say, linear about xi; renews the deflections of their gears.
+
+    Args:
+        c, unknowns, masses: the arm at xi, (n,).
+        keyframes: rows in a ring, (length, row).
+        first, until: numbers of those that are read.
+        weights: of the six entries of a pose error.
+        A: (n, n), b: (n,), are added to.
+    """
+    length, number = len(keyframes), len(xi)
+    X_WE, H, y, shares = np.empty((4, 4)), np.empty((6, number)), np.empty(6), np.empty(6)
+    for k in range(first, until):
+        row = keyframes[k % length]
+        shapes = row[SHAPES:].reshape((len(row) - SHAPES) // 6, 6)
+        seen = SeenOnce(row[TWIST:TIME], row[TIME], shapes)
+        moving = row[MOTION:TWIST]
+        predict_one_anew(c, unknowns, masses, row[THETA:GEARS], row[GEARS:MOTION], moving, seen, X_WE, H)
+        error(row[POSE:WEIGHT].reshape(3, 4), X_WE, y)
+        for i in range(6):
+            shares[i] = row[WEIGHT] * weights[i]
+            for j in range(number):
+                y[i] += H[i, j] * xi[j]
+        add_squares(H, shares, y, A, b)
