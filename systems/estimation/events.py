@@ -1,22 +1,25 @@
 """Whether camera and estimate still agree: outliers, a displaced tool, a load picked up or put down."""
 
+import math
 from collections.abc import Callable
 from types import SimpleNamespace
 from typing import Any, NamedTuple
 
 import numpy as np
 
+from systems.estimation import kernels
 from systems.estimation.memory import Layout
 from systems.estimation.tip_model import TipModel
 
 _WINDOW = 12.0  # samples of the running mean
-_AVERAGING = np.sqrt(2.0 * _WINDOW - 1.0)  # times, by which the noise of the mean is smaller
+_AVERAGING = math.sqrt(2.0 * _WINDOW - 1.0)  # times, by which the noise of the mean is smaller
 _SUSPICIOUS = 4.0  # sigmas of the camera alone, of one sample: below, nothing is to do
 _OUTLIER, _LONGEST_OUTLIER = 6.0, 5  # sigmas; and how many samples in a row may be so called
 _JUMP, _CALM = 9.0, 4.0  # sigmas of the mean: what no parameter describes lasts longer than noise
 _MODEL_SHARE = 3.0 / _JUMP  # what the estimate is wrong by is within 5 sigmas
 _FIRST = 15  # samples, whose median is what the next ones are compared with
 _MARGIN = np.repeat([3e-3, 1e-3], 3)  # rad and m, what the first linearisations may be wrong by
+_SURE = np.zeros(6)  # where the estimate is not what an error could come from
 _RECENT = 24  # samples, among which a change is looked for that came from one to the next
 _AFTER = 3  # of them at least have to be behind it
 _SUDDEN = 60.0  # by which chi squared is smaller with a step than with a parabola: e to the 30 to one
@@ -153,16 +156,15 @@ class Innovations:
             H: its columns, (6, n).
             solve: gives P H^T, (n, 6), with the covariance P of the estimate; called where it matters.
         """
-        known = np.sqrt(self._variances)
-        z = np.abs(r) / known
+        z = kernels.innovations.largest(r, self._variances)
         by_model = None  # what the estimate may be wrong by, in variances of the camera
-        if z.max() > _SUSPICIOUS:
+        if z > _SUSPICIOUS:
             by_model = np.einsum("ij,ji->i", H, solve()) / self._variances
-            z = z / np.sqrt(1.0 + by_model)
+            z = kernels.innovations.largest(r, self._variances * (1.0 + by_model))
         memory.pause[0] = max(0.0, memory.pause[0] - 1.0)
-        is_large = z.max() > _OUTLIER
+        is_large = z > _OUTLIER
         # Reflections lie anywhere; a tool that was displaced is seen at the same place again.
-        is_again = is_large and np.abs((r - memory.left_out) / known).max() < _OUTLIER
+        is_again = is_large and kernels.innovations.largest(r - memory.left_out, self._variances) < _OUTLIER
         if is_large:
             memory.left_out[:] = r
         if is_large and memory.outliers[0] < _LONGEST_OUTLIER and not is_again:
@@ -171,21 +173,17 @@ class Innovations:
         # Samples that were left out count as soon as they agree, or are too many in a row to be outliers.
         number = 1 + int(memory.outliers[0]) * int(is_large)
         share = 1.0 - (1.0 - 1.0 / _WINDOW) ** number
-        memory.error += share * (r - memory.error)
-        memory.spread += share * ((0.0 if by_model is None else np.sqrt(by_model)) - memory.spread)
         memory.outliers[0] = 0.0
-        memory.recent[:-number] = memory.recent[number:]
-        memory.recent[-number:] = r
-        memory.by_model[:-number] = memory.by_model[number:]
-        memory.by_model[-number:] = 0.0 if by_model is None else by_model
         memory.held[0] += number
-        mean = np.abs(memory.error) / known
-        size = mean.max() * _AVERAGING
+        means = memory.error, memory.spread, memory.recent, memory.by_model
+        unsure = _SURE if by_model is None else by_model
+        size = _AVERAGING * kernels.innovations.enter(r, unsure, number, share, self._variances, *means)
         if size > _CALM:
             if by_model is None:
                 by_model = np.einsum("ij,ji->i", H, solve()) / self._variances
             memory.by_model[-1] = by_model
             by_model = np.maximum(by_model, memory.spread**2)
+            mean = np.abs(memory.error) / np.sqrt(self._variances)
             size = (mean / np.sqrt(_AVERAGING**-2 + _MODEL_SHARE**2 * by_model)).max()
         if size > _CALM and memory.pause[0] == 0.0 and self._is_sudden(memory):
             return Verdict(has_jumped=True)

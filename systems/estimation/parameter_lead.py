@@ -1,10 +1,10 @@
 """Leads the parameters that a robot is commanded with to those that are estimated, without a jerk."""
 
-import math
 from types import SimpleNamespace
 
 import numpy as np
 
+from systems.estimation import kernels
 from systems.estimation.memory import Layout
 
 _ARM = 0.25  # m, by which an angle counts as a way of the tip
@@ -29,24 +29,14 @@ class ParameterLead:
         self._frequency, self._acceleration = frequency, acceleration
         self.layout = Layout(x=(size,), rate=(size,), unrest=(1,))
 
-    def step(
-        self, memory: SimpleNamespace, target: np.ndarray, columns: np.ndarray | None, period: float
-    ) -> None:
+    def step(self, memory: SimpleNamespace, target: np.ndarray, columns: np.ndarray, period: float) -> None:
         """Goes one step.
 
         Args:
             memory: of the layout: parameters, their rates, and the acceleration of the tip in m/s^2.
             target: the estimate.
-            columns: how the tip moves with the first parameters, (6, k); None if that is not known yet.
+            columns: how the tip moves with the first parameters, (6, g); zero if that is not known yet.
             period: in s.
         """
-        way = target - memory.x
-        size = 0.05
-        if columns is not None:
-            effect = columns @ way[: columns.shape[1]]
-            turn, shift = float(effect[:3] @ effect[:3]), float(effect[3:] @ effect[3:])
-            size = math.sqrt(shift + _ARM**2 * turn)
-        w = min(self._frequency, math.sqrt(self._acceleration / max(size, 1e-9)))
-        memory.unrest[0] = w * w * size
-        memory.rate[:] = (memory.rate + period * w * w * way) / (1.0 + w * period * (2.0 + w * period))
-        memory.x += period * memory.rate
+        limits = self._frequency, self._acceleration
+        memory.unrest[0] = kernels.plan.lead(memory.x, memory.rate, target, columns, limits, _ARM, period)

@@ -79,7 +79,7 @@ class SelfCalibrating(LeafSystem):
         self._layout = Layout(
             lead=self._lead.layout,
             planner=self._planner.layout,
-            columns=(6, self.tip_model.size),
+            columns=(6, len(self.tip_model.chosen)),  # of the tip, as the geometry changes
             start_time=(1,),
             planned=(1,),  # the last instant of the plan
             amplitude=(2, NUM_JOINTS),  # of the probe: knock, oscillations
@@ -141,8 +141,14 @@ class SelfCalibrating(LeafSystem):
         Phi, y, _ = self._drives.compare(memory.drives, motion, command.columns, still, q)
         self._drives.learn(memory.drives, Phi, y)
         pair = Pair(q, plan.loads, plan.motion, plan.twist, X_WE)
+        self._lead.step(memory.lead, model.mean, memory.columns, self.period)
         for _ in range(40):  # the first ones are only looked at
             self.estimator.add(memory.estimator, pair)
+        self.estimator.work(memory.estimator)
+        memory.estimator.count[0] = 1e6  # from now on samples are judged
+        for size in (0.0, 0.1):
+            X_WE[0, 3] += size
+            self.estimator.add(memory.estimator, pair._replace(X_WE=X_WE))
         for time in (0.0, 1.0):
             self._learning.encoders.append(memory.encoders, time, np.concatenate((q, still)))
             self._learning.plan.append(memory.plan, time, memory.passed.all)
@@ -220,7 +226,8 @@ class SelfCalibrating(LeafSystem):
         share = self._speed_share(memory, reference, time)
         for state, value in zip(self._outputs[5:], (share, ahead), strict=True):
             discrete_state.set_value(int(state), [value])
-        learnt = memory.lead.x - self.tip_model.mean
+        model = self.tip_model
+        learnt = memory.lead.x[model.G] - model.mean[model.G]
         discrete_state.set_value(int(self._outputs[3]), memory.columns @ learnt)
 
     def _speed_share(self, memory: SimpleNamespace, reference: PathAhead, time: float) -> float:
@@ -251,14 +258,13 @@ class SelfCalibrating(LeafSystem):
             if not memory.amplitude.any():
                 memory.delay.known[0] = 1.0  # nothing will show it
         lead, since_start = memory.lead, time - memory.start_time[0]
-        columns = memory.columns[:, self.tip_model.G] if memory.columns.any() else None
-        self._lead.step(lead, self.estimator.x(memory.estimator), columns, self.period)
+        self._lead.step(lead, self.estimator.x(memory.estimator), memory.columns, self.period)
         first = memory.first[0]
         aside = self._probe.at(instant - first, path_start - first, memory.amplitude)
         step = instant - memory.planned[0]
         wanted = Wanted(X_WE, V_WE, aside)
         plan = self._planner.step(memory.planner, (lead.x, lead.rate), wanted, since_start, step)
-        memory.columns[:, self.tip_model.G] = plan.columns[:, 18:]
+        memory.columns[:] = plan.columns[:, 18:]
         motion = plan.theta, plan.velocity, plan.acceleration
         drives = memory.drives
         command = self._drives.command(drives, motion, plan.loads, self._model.payload)

@@ -13,6 +13,7 @@ _COMPILED = (
     "geometry",
     "history",
     "information",
+    "innovations",
     "instants",
     "keyframes",
     "loads",

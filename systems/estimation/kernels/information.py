@@ -56,7 +56,7 @@ def solve(A, A_open, B, X):
     n, m = B.shape
     U = np.empty((n, n))  # U^T U, of which each row is finished by those above
     for i in range(n):
-        for k in range(i, n):
+        for k in range(n):
             U[i, k] = A[i, k] + A_open[i, k]
         for k in range(m):
             X[i, k] = B[i, k]
@@ -64,14 +64,15 @@ def solve(A, A_open, B, X):
         if not U[i, i] > 0.0:
             return False
         scale = 1.0 / math.sqrt(U[i, i])
-        for k in range(i, n):
-            U[i, k] *= scale
+        above = U[i, i:]
+        for k in range(len(above)):
+            above[k] *= scale
         for k in range(m):
             X[i, k] *= scale
         for j in range(i + 1, n):
-            factor = U[i, j]
-            for k in range(j, n):
-                U[j, k] -= factor * U[i, k]
+            factor, above, row = U[i, j], U[i, j:], U[j, j:]
+            for k in range(len(row)):
+                row[k] -= factor * above[k]
             for k in range(m):
                 X[j, k] -= factor * X[i, k]
     for i in range(n - 1, -1, -1):

@@ -38,14 +38,15 @@ def _copy(a, out):
 @compiled
 def _acceleration(w, alpha, r, out):
     """What a way r from the origin of a turning body adds to the acceleration, alpha x r + w x (w x r)."""
-    across = np.zeros(3)
-    _add_cross(w, r, across)
+    x, y, z = w[1] * r[2] - w[2] * r[1], w[2] * r[0] - w[0] * r[2], w[0] * r[1] - w[1] * r[0]
     _add_cross(alpha, r, out)
-    _add_cross(w, across, out)
+    out[0] += w[1] * z - w[2] * y
+    out[1] += w[2] * x - w[0] * z
+    out[2] += w[0] * y - w[1] * x
 
 
 @compiled
-def _body(masses, k, frame, motion, total):
+def _body(masses, k, frame, motion, total, room):
     """Adds force and moment about the world's origin, (2, 3), that a body k needs.
 
     Args:
@@ -54,9 +55,11 @@ def _body(masses, k, frame, motion, total):
         frame: of its link, (4, 4).
         motion: angular velocity, its derivative, and acceleration of the link's origin, (3, 3) rows.
         total: (2, 3).
+        room: (6, 3), for what is worked out on the way.
     """
     m, w, alpha = masses.mass[k], motion[0], motion[1]
-    centre, force = np.empty(3), np.empty(3)
+    centre, force, own = room[0], room[1], room[2]
+    momentum, couple, turned = room[3], room[4], room[5]
     _turned(frame, masses.centres[k], centre)
     _copy(motion[2], force)
     _acceleration(w, alpha, centre, force)
@@ -66,7 +69,6 @@ def _body(masses, k, frame, motion, total):
         total[0, i] += force[i]
     _add_cross(centre, force, total[1])
     # Euler's equation in the axes of the link, where the inertia is constant.
-    own, momentum, couple, turned = np.empty(3), np.empty(3), np.empty(3), np.empty(3)
     _turned_back(frame, alpha, own)
     _turned(masses.inertia[k], own, couple)
     _turned_back(frame, w, own)
@@ -98,7 +100,7 @@ def load(masses, frames, q, velocity, acceleration, loads):
     """
     motion = np.zeros((6, 3, 3))  # of the links
     w, alpha, a, way = np.zeros(3), np.zeros(3), np.zeros(3), np.empty(3)
-    spin, axis, about = np.empty(3), np.empty(3), np.empty(3)
+    spin, axis, about, room = np.empty(3), np.empty(3), np.empty((5, 3)), np.empty((6, 3))
     a[2] = GRAVITY
     for i in range(6):
         if i > 0:
@@ -126,18 +128,19 @@ def load(masses, frames, q, velocity, acceleration, loads):
     for body in range(6, -1, -1):
         i = min(body, 5)
         frame = frames[i + 1]
-        _body(masses, body, frame, motion[i], wrench[1 if body == 6 else 0])
+        _body(masses, body, frame, motion[i], wrench[1 if body == 6 else 0], room)
         if body == 6:
             continue
         for k in range(3):
             way[k] = frame[k, 3]
         for s in range(5):
-            _copy(wrench[s, 1], about)
-            _add_cross(wrench[s, 0], way, about)
-            for j in range(3):
-                _turned(frame, masses.axes[i, j], axis)
-                torque = axis[0] * about[0] + axis[1] * about[1] + axis[2] * about[2]
-                loads[s, i if j == 0 else 5 + 2 * i + j] = torque
+            _copy(wrench[s, 1], about[s])
+            _add_cross(wrench[s, 0], way, about[s])
+        for j in range(3):
+            _turned(frame, masses.axes[i, j], axis)
+            column = i if j == 0 else 5 + 2 * i + j
+            for s in range(5):
+                loads[s, column] = axis[0] * about[s, 0] + axis[1] * about[s, 1] + axis[2] * about[s, 2]
     if masses.spring[0] > 0.0:
         loads[0, 1] -= _counterbalance(masses.spring, q[1])
 

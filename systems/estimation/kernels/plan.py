@@ -1,5 +1,7 @@
 """Motions of the joints on a path: Newton's method on the estimated arm, and what its loads bend."""
 
+import math
+
 import numpy as np
 
 from systems.estimation.kernels.geometry import place
@@ -128,3 +130,30 @@ def motors(moving, wander, yields, history, step, lag, columns, out):
         out[3, k] = 0.0
         for i in range(6):
             out[3, k] += columns[k, i] * (moving[1, i] + wander[i])
+
+
+@compiled
+def lead(x, rate, target, columns, limits, arm, period):
+    """A step of `ParameterLead`, in place; returns the acceleration of the tip in m/s^2.
+
+    Args:
+        x, rate, target: (n,).
+        columns: of the tip for the first parameters, (6, g), zero if they are not known yet.
+        limits: of frequency in rad/s and acceleration in m/s^2.
+        arm: m, by which an angle counts as a way.
+        period: s.
+    """
+    is_known, square = False, 0.0
+    for i in range(6):
+        effect = 0.0
+        for k in range(columns.shape[1]):
+            effect += columns[i, k] * (target[k] - x[k])
+            is_known = is_known or columns[i, k] != 0.0
+        square += effect * effect * (arm * arm if i < 3 else 1.0)
+    size = math.sqrt(square) if is_known else 0.05
+    w = min(limits[0], math.sqrt(limits[1] / max(size, 1e-9)))
+    slowing = 1.0 + w * period * (2.0 + w * period)
+    for k in range(len(x)):
+        rate[k] = (rate[k] + period * w * w * (target[k] - x[k])) / slowing
+        x[k] += period * rate[k]
+    return w * w * size

@@ -1,0 +1,39 @@
+"""What samples say beyond the estimate: their running mean, and the last of them."""
+
+import math
+
+from systems.estimation.kernels.poses import compiled
+
+
+@compiled
+def largest(r, variances):
+    """The largest entry of an error (6,) in standard deviations."""
+    most = 0.0
+    for i in range(len(r)):
+        most = max(most, abs(r[i]) / math.sqrt(variances[i]))
+    return most
+
+
+@compiled
+def enter(r, by_model, number, share, variances, error, spread, recent, by_model_then):
+    """Takes one innovation in, as if it had come ``number`` times; returns the largest mean in sigmas.
+
+    Args:
+        r: (6,); by_model: what the estimate may be wrong by, in variances of the camera, (6,).
+        share: of it in the mean.
+        variances: of the camera, (6,).
+        error, spread: running means of r, and of what the estimate may be wrong by in sigmas, (6,);
+        recent, by_model_then: the last r and by_model, the newest one last, (n, 6); all are renewed.
+    """
+    n = len(recent)
+    kept = max(0, n - number)
+    most = 0.0
+    for i in range(6):
+        for k in range(kept):
+            recent[k, i], by_model_then[k, i] = recent[k + number, i], by_model_then[k + number, i]
+        for k in range(kept, n):
+            recent[k, i], by_model_then[k, i] = r[i], by_model[i]
+        error[i] += share * (r[i] - error[i])
+        spread[i] += share * (math.sqrt(by_model[i]) - spread[i])
+        most = max(most, abs(error[i]) / math.sqrt(variances[i]))
+    return most
