@@ -116,7 +116,8 @@ class DriveModel:
         known = DriveMemory(memory.started, memory.z, memory.w, memory.beta, memory.correction)
         out, columns = np.empty((3, 6)), np.empty(24)
         kernels.drives.command(self._drives, *self._held, known, motion, loads, mass, _STEEPEST, out, columns)
-        return DriveCommand(*out, columns)
+        position, velocity, torque = out
+        return DriveCommand(position, velocity, torque, columns)
 
     def features(self, v: np.ndarray, a: np.ndarray, columns: np.ndarray) -> np.ndarray:
         """Rows of the regression, shape (6, 38), from motion and the filtered torques (24,)."""
