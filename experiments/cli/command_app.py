@@ -1,12 +1,14 @@
 """The frame of all commands: plain help, and one line for what was typed wrongly."""
 
 import re
+from collections.abc import Mapping
 from typing import Any
 
 import typer
 from typer.core import TyperGroup
 from typer.exceptions import TyperException
 
+from experiments.cli.command_table import CommandTable
 from experiments.cli.console import BAD_INPUT, fail
 from robots.configuration.suggestion import did_you_mean
 
@@ -36,10 +38,29 @@ class _Commands(TyperGroup):
             fail(_line(error, f"{ctx.command_path} {ctx.invoked_subcommand or ''}"), BAD_INPUT)
 
 
-def command_app(help_text: str, no_args_is_help: bool = True, completes: bool = False) -> typer.Typer:
-    """A group of commands; ``completes`` adds options that install or show the completion of a shell."""
+def command_app(
+    help_text: str,
+    no_args_is_help: bool = True,
+    completes: bool = False,
+    table: Mapping[str, str] | None = None,
+) -> typer.Typer:
+    """A group of commands.
+
+    Args:
+        help_text: what they are for.
+        no_args_is_help: whether the group named alone shows its help.
+        completes: adds options that install or show the completion of a shell.
+        table: commands to import when they are asked for; see `CommandTable`.
+    """
+
+    class Commands(_Commands):
+        def __init__(self, **given: Any) -> None:
+            super().__init__(**given)
+            if table is not None:
+                self.commands = CommandTable(table)
+
     return typer.Typer(
-        cls=_Commands,
+        cls=Commands,
         help=help_text,
         no_args_is_help=no_args_is_help,
         add_completion=completes,

@@ -7,6 +7,7 @@ import typer
 
 from systems.cell.cameras import CAMERAS
 from systems.feedforward import FEEDFORWARDS
+from systems.servo import LAWS
 
 ScenarioOption = Annotated[
     str, typer.Option("--scenario", metavar="NAME|FILE", help="A shipped scenario or a YAML file.")
@@ -34,6 +35,15 @@ WithCellOption = Annotated[
 ]
 YesOption = Annotated[
     bool, typer.Option("--yes", help="Do not ask for confirmation before a real robot moves.")
+]
+LawOption = Annotated[
+    str | None,
+    typer.Option(
+        "--law",
+        metavar="NAME|FILE:CLASS",
+        help=f"One of {', '.join(LAWS)}, or my_law.py:MyLaw.",
+        show_default="the scenario's",
+    ),
 ]
 SetOption = Annotated[
     list[str] | None,

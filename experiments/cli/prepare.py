@@ -155,3 +155,24 @@ def check(prepared: Prepared, laws: Sequence[str]) -> None:
             Experiment(prepared.scenario, law, prepared.robot)
         except RuntimeError as error:  # what Drake does not like, such as an unknown integration scheme
             raise ScenarioError(f"scenario {prepared.title}: {' '.join(str(error).split())}") from error
+
+
+def option_settings(
+    settings: list[str] | None,
+    law: str | None,
+    feedforward: str | None,
+    camera: str | None = None,
+    laps: int | None = None,
+) -> list[str]:
+    """The changes of a scenario that options of their own make, behind those of --set."""
+    own = {
+        "law": law,
+        "servo.feedforward.kind": feedforward,
+        "station.camera.kind": camera,
+        "reference.laps": laps,
+    }
+    # An empty name is a name that does not exist, and not what YAML makes of nothing.
+    return [
+        *(settings or []),
+        *(f"{key}={repr('') if value == '' else value}" for key, value in own.items() if value is not None),
+    ]

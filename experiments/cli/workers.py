@@ -12,9 +12,10 @@ from dataclasses import dataclass
 from multiprocessing.connection import wait as wait_for
 from typing import Any, Protocol, TypeVar
 
+from experiments.cli.one_thread import ONE_THREAD
+
 _POLL = 0.1  # s between two looks at the progress
 _AHEAD = 4  # jobs per process that wait in its queue: enough that none is idle, few enough to hold in memory
-_ONE_THREAD = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "OPENCV_FOR_THREADS_NUM")
 
 Job = TypeVar("Job")
 Result = TypeVar("Result")
@@ -78,7 +79,7 @@ class LocalProcesses:
         context = multiprocessing.get_context("spawn")
         shares = context.Array("d", len(jobs), lock=False)
         stop = context.Event()
-        with _environment(dict.fromkeys(_ONE_THREAD, "1")):
+        with _environment(dict.fromkeys(ONE_THREAD, "1")):
             pool = ProcessPoolExecutor(processes, context, _start_worker, (shares, stop))
             waiting: dict[Future[Result], int] = {}
             upcoming = iter(enumerate(jobs))

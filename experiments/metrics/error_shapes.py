@@ -3,7 +3,6 @@
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.signal import welch
 
 from diagrams.record.log import RunLog
 from experiments.metrics.run_metrics import judged_source, path_window, pose_errors
@@ -71,6 +70,8 @@ def error_spectrum(log: RunLog) -> tuple[np.ndarray, np.ndarray]:
         Frequencies in Hz and the amplitude density in m / sqrt(Hz), the root of the sum over the three axes
         of what Welch's method gives; both (n,), without the mean. Empty for fewer than 64 known samples.
     """
+    from scipy.signal import welch  # here: half a second that few need
+
     on_path = path_window(log)
     error = pose_errors(log, judged_source(log))[on_path, 3:]
     known = np.isfinite(error).all(axis=1)

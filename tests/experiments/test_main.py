@@ -3,6 +3,8 @@
 import json
 import os
 import re
+import subprocess
+import sys
 from itertools import pairwise
 from pathlib import Path
 
@@ -11,6 +13,7 @@ import pytest
 from diagrams.scenario.scenario import load_scenario, shipped_scenarios
 from experiments import main
 from experiments.cli.prepare import check, prepare
+from experiments.running import compare_command
 from robots.description.model import shipped_robots
 from tests.experiments.commands import RESULTS, SHORT, files, refusal, truetip
 
@@ -68,6 +71,16 @@ def test_a_folder_without_permission_is_refused_before_anything_runs(tmp_path):
     (tmp_path / "closed").mkdir(mode=0o500)
     refused = refusal(truetip("compare", "--out=closed"))
     assert refused == "truetip: cannot write in folder closed: permission denied\n"
+
+
+def test_a_command_starts_without_what_few_need():
+    """A refusal or a help text would wait a second for it, and so would every process of a comparison."""
+    read = "from diagrams.scenario.scenario import load_scenario; load_scenario('everything')"
+    slow = "{'numba', 'scipy.stats', 'scipy.signal', 'matplotlib', 'casadi'}"
+    ask = f"import sys, experiments.running.compare_command; {read}; print({slow} & set(sys.modules))"
+    folder = Path(main.__file__).parents[1]
+    said = subprocess.run([sys.executable, "-c", ask], capture_output=True, text=True, check=True, cwd=folder)
+    assert said.stdout.strip() == "set()"
 
 
 def test_a_comparison_gives_the_same_bytes_whatever_the_number_of_processes(tmp_path):
@@ -145,7 +158,7 @@ def test_an_interrupted_comparison_leaves_nothing(tmp_path, monkeypatch):
     def interrupted(*_):
         raise KeyboardInterrupt
 
-    monkeypatch.setattr(main, "compare", interrupted)
+    monkeypatch.setattr(compare_command, "compare", interrupted)
     result = truetip("compare", *SHORT)
     assert result.exit_code == 130
     assert result.stderr.strip() == "truetip: interrupted, nothing was written"

@@ -2,22 +2,10 @@
 
 import importlib
 import pkgutil
-import subprocess
-import sys
 
 from diagrams.runs.simulation import Experiment
 from diagrams.scenario.scenario import load_scenario
 from systems.estimation import kernels
-
-_READ = "from diagrams.scenario.scenario import load_scenario; load_scenario('everything')"
-_ASK = "import sys; print('numba' in sys.modules)"
-
-
-def test_reading_a_scenario_does_not_import_numba():
-    said = subprocess.run(
-        [sys.executable, "-c", f"{_READ}; {_ASK}"], capture_output=True, text=True, check=True
-    )
-    assert said.stdout.strip() == "False"
 
 
 def compiled() -> dict[str, int]:

@@ -1,0 +1,1 @@
+"""The two commands that run laws: `compare` and `run`."""
