@@ -1,5 +1,6 @@
 """The table of Probst (2024), 6.7, on a terminal: largest and static error per axis, for every law."""
 
+import math
 from collections.abc import Mapping
 from typing import Any
 
@@ -13,6 +14,14 @@ from experiments.report.style import law_colors, law_title
 
 SOURCES = {"true": "true, what a perfect instrument would see", "measured": "measured, what the camera says"}
 
+_SHOWN = {
+    "m": (1e3, "mm"),
+    "rad": (180.0 / math.pi, "°"),
+    "s": (1e3, "ms"),
+    "s/s": (1e6, "ppm"),
+    "1": (100.0, "%"),
+}
+
 
 def print_summary(console: Console, result: Mapping[str, Any]) -> None:
     """Prints the true and the measured errors of a `metrics.summary`, and what the guard did."""
@@ -22,6 +31,9 @@ def print_summary(console: Console, result: Mapping[str, Any]) -> None:
         console.print(error_table(result, source))
     if any("laps" in run for run in result["runs"].values()):
         console.print(lap_table(result))
+    for law, run in result["runs"].items():
+        for line in learnt_lines(run.get("learnt") or {}):
+            console.print(f"[italic]{escape(law_title(law))}: {escape(line)}[/italic]")
     if any(count for run in result["runs"].values() for count in run["guard"].values()):
         console.print(guard_table(result))
     else:
@@ -70,6 +82,29 @@ def lap_table(result: Mapping[str, Any]) -> Table:
         ]
         table.add_row(f"[{colors[law]}]{escape(law_title(law))}[/]", *cells)
     return table
+
+
+def learnt_lines(learnt: Mapping[str, Any]) -> list[str]:
+    """What a law says of what it knows of its path, and of what has happened to the robot."""
+    lines = []
+    if path := learnt.get("path"):
+        before, now = path["before"], path["now"]
+        when, what = before["time_s"], before["parameter"]
+        off = _in_units(2.0 * before["parameter_sigma"], before["unit"])
+        lines.append(
+            f"half a second ahead the tip was expected to be known to {2e3 * before['tip_sigma_m']:.3f} mm, "
+            f"least at {when:.1f} s and most because of {what}, which may be off by {off}; "
+            f"in the end it is known to {2e3 * now['tip_sigma_m']:.3f} mm (2 sigma)"
+        )
+    for event in learnt.get("events", []):
+        lines.append(f"{event['time_s']:.2f} s: {event['kind']}, {_in_units(event['size'], event['unit'])}")
+    return lines
+
+
+def _in_units(value: float, unit: str) -> str:
+    """A value as people read it: mm, degrees, ms and ppm in place of m, rad, s and s/s."""
+    factor, shown = _SHOWN.get(unit, (1.0, unit))
+    return f"{factor * value:.3g} {shown}".rstrip()
 
 
 def guard_table(result: Mapping[str, Any]) -> Table:

@@ -31,6 +31,8 @@ _EXPLAINED = 0.15  # what a cause leaves of the mean error if it is the cause
 TOOL_DISPLACED, LOAD_CHANGED = "tool displaced", "load changed"
 DEAD_TIME_CHANGED, CLOCK_DRIFTS = "dead time changed", "clock drifts"
 FOREIGN_FRAME = "camera frame is another"
+PATH_UNSEEN = "path needs more than was shown"
+_UNITS = {LOAD_CHANGED: "kg", DEAD_TIME_CHANGED: "s", CLOCK_DRIFTS: "s/s", FOREIGN_FRAME: "rad"}  # others: m
 
 
 class Verdict(NamedTuple):
@@ -55,7 +57,7 @@ class EventLog:
     """The last events with their times, for whoever asks what happened."""
 
     _LENGTH = 8
-    _KINDS = TOOL_DISPLACED, LOAD_CHANGED, DEAD_TIME_CHANGED, CLOCK_DRIFTS, FOREIGN_FRAME
+    _KINDS = TOOL_DISPLACED, LOAD_CHANGED, DEAD_TIME_CHANGED, CLOCK_DRIFTS, FOREIGN_FRAME, PATH_UNSEEN
 
     def __init__(self) -> None:
         """Lays out the memory."""
@@ -68,11 +70,17 @@ class EventLog:
         memory.count[0] = count + 1
 
     def read(self, memory: SimpleNamespace) -> list[dict[str, Any]]:
-        """The last events, oldest first: ``time_s``, ``kind``, ``size`` and ``tip_error_m``."""
+        """The last events, oldest first: ``time_s``, ``kind``, ``size``, its ``unit`` and ``tip_error_m``."""
         count = int(memory.count[0])
         rows = [memory.rows[k % self._LENGTH].tolist() for k in range(max(0, count - self._LENGTH), count)]
         return [
-            {"time_s": time, "kind": self._KINDS[int(kind)], "size": size, "tip_error_m": error}
+            {
+                "time_s": time,
+                "kind": self._KINDS[int(kind)],
+                "size": size,
+                "unit": _UNITS.get(self._KINDS[int(kind)], "m"),
+                "tip_error_m": error,
+            }
             for time, kind, size, error in rows
         ]
 

@@ -5,8 +5,10 @@ from typing import Any
 
 import numpy as np
 
-from robots.description.model import RobotModel
+from robots.description.model import NUM_JOINTS, RobotModel
+from systems.estimation.gear_errors import SHAPE_NAMES
 from systems.estimation.learnt_robot import BEARING_NAMES, GEAR_NAMES, learnt_robot
+from systems.estimation.probing.path_needs import Standing
 from systems.estimation.tip_estimator import TipEstimator
 
 
@@ -50,6 +52,34 @@ def calibrated_robot(estimator: TipEstimator, memory: SimpleNamespace, of: str) 
     covariance = (np.outer(model.sigma, model.sigma) * estimator.covariance(memory))[:count, :count]
     known = names, x[:count], covariance
     return learnt_robot(model.robot, model.geometric_errors(x), x[model.K], known, of)
+
+
+def path_knowledge(estimator: TipEstimator, standing: Standing) -> dict[str, Any]:
+    """How well the tip is known where it is known worst on the path, and because of what.
+
+    Returns:
+        ``tip_sigma_m`` at ``time_s`` of the path; ``parameter``, which has the largest part in it, with its
+        ``parameter_sigma`` in its ``unit`` (1 for factors of compliances) and its ``share`` of the variance.
+    """
+    name, unit = _names_and_units(estimator)[standing.unknown]
+    return {
+        "tip_sigma_m": standing.sigma,
+        "time_s": standing.time,
+        "parameter": name,
+        "parameter_sigma": standing.unknown_sigma,
+        "unit": unit,
+        "share": standing.share,
+    }
+
+
+def _names_and_units(estimator: TipEstimator) -> list[tuple[str, str]]:
+    model = estimator.model
+    geometry = [(model.parameters[i].name, model.parameters[i].unit) for i in model.chosen]
+    springs = [(name, "1") for name in (*GEAR_NAMES, *BEARING_NAMES)]
+    moments = [(f"payload_moment_{axis}", "kg m") for axis in "xyz"]
+    others = [("payload", "kg"), *moments, ("clock_offset", "s"), ("clock_drift", "s/s")]
+    shapes = [(f"gear_error_{shape}_{i + 1}", "rad") for shape in SHAPE_NAMES for i in range(NUM_JOINTS)]
+    return [*geometry, *springs, *others, *(shapes if model.has_gear_errors else [])]
 
 
 def _names(estimator: TipEstimator) -> list[str]:

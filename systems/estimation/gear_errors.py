@@ -8,7 +8,9 @@ from robots.description.model import NUM_JOINTS, RobotModel
 from robots.drivetrain.dahl import DahlHysteresis
 from systems.estimation.memory import Layout
 
-NUM_SHAPES = 7  # of each joint: two waves with sine and cosine each, the gap, two hystereses
+# Of each joint: two waves with sine and cosine each, the gap, two hystereses.
+SHAPE_NAMES = "sine_1", "cosine_1", "sine_2", "cosine_2", "gap", "hysteresis_1", "hysteresis_2"
+NUM_SHAPES = len(SHAPE_NAMES)
 _GAP_TORQUE = 0.5  # N m, beyond which the teeth are through the gap
 _WIDTHS = 1e-4, 5e-4  # rad of deflection, after which hysteresis has turned over
 

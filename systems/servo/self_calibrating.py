@@ -10,11 +10,12 @@ from pydrake.systems.framework import Context, DiscreteValues, LeafSystem
 from robots.description.model import NUM_JOINTS, RobotModel
 from systems.controller_model import ControllerModel
 from systems.estimation.drive_model import DEAD_TIME
-from systems.estimation.findings import calibrated_robot, findings
+from systems.estimation.events import PATH_UNSEEN, Event
+from systems.estimation.findings import calibrated_robot, findings, path_knowledge
 from systems.estimation.memory import Layout, Views
 from systems.estimation.parameter_lead import ParameterLead
 from systems.estimation.preview_planner import PreviewPlanner, Wanted
-from systems.estimation.probing.path_needs import PathNeeds
+from systems.estimation.probing.path_needs import PathNeeds, Standing
 from systems.estimation.probing.probe import Probe
 from systems.estimation.probing.probe_design import designed
 from systems.estimation.tip_estimator import Pair
@@ -70,6 +71,8 @@ class SelfCalibrating(LeafSystem):
         """
         super().__init__()
         self._model, self._config = model, config
+        self._needs: PathNeeds | None = None  # both once the path is known
+        self._forecast: Standing | None = None
         self.period = model.period
         self._learning = learning = Learning(model, config)
         self.tip_model, self.estimator, self._drives = learning.tip_model, learning.estimator, learning.drives
@@ -113,11 +116,12 @@ class SelfCalibrating(LeafSystem):
             home: where the joints are near at its start, rad, (6,).
         """
         try:
-            needs = PathNeeds(self.tip_model, self.estimator.weights, path, home)
+            self._needs = PathNeeds(self.tip_model, self.estimator.weights, path, home)
         except ValueError:
             return  # out of reach of the nominal robot: whoever starts the run says so
         rate, sharp = 1.0 / self.period, self._config.probe.sharp
-        self._probe.pattern, _ = designed(needs, self._probe, path.path_start, rate, sharp)
+        found = designed(self._needs, self._probe, path.path_start, rate, sharp)
+        self._probe.pattern, self._forecast = found
 
     def _first_memory(self) -> np.ndarray:
         vector = np.zeros(self._layout.size)
@@ -160,13 +164,27 @@ class SelfCalibrating(LeafSystem):
         return self._layout.view(context.get_discrete_state(self._memory).value())
 
     def learnt(self, context: Context) -> dict[str, Any]:
-        """What it has found out: `findings`, ``dead_time_s`` from command to motion, the last ``events``."""
+        """What it has found out: `findings`, ``dead_time_s`` from command to motion, the last ``events``.
+
+        ``path`` is how well the tip is known where the path needs it most, as `path_knowledge` has it:
+        ``before`` it is reached, as the design of the probe expects, and ``now``.
+        """
         memory = self.memory(context)
         late = float(memory.drives.beta[DEAD_TIME])
         return {
             "dead_time_s": float(memory.delay.delay[0]) + late,
             **findings(self.estimator, memory.estimator),
+            "path": self._path_knowledge(memory),
             "events": self._learning.events.read(memory.events),
+        }
+
+    def _path_knowledge(self, memory: SimpleNamespace) -> dict[str, Any] | None:
+        if self._needs is None or self._forecast is None:
+            return None
+        now = self._needs.standing(self.estimator.covariance(memory.estimator))
+        return {
+            "before": path_knowledge(self.estimator, self._forecast),
+            "now": path_knowledge(self.estimator, now),
         }
 
     def predicted_tip(self, context: Context) -> tuple[float, np.ndarray, np.ndarray] | None:
@@ -230,6 +248,12 @@ class SelfCalibrating(LeafSystem):
         learnt = memory.lead.x[model.G] - model.mean[model.G]
         discrete_state.set_value(int(self._outputs[3]), memory.columns @ learnt)
 
+    def _note_vague(self, memory: SimpleNamespace, time: float) -> None:
+        """Says so if nothing has shown well enough what the path needs that begins now."""
+        sigma = self._forecast.sigma if self._forecast else 0.0
+        if sigma > self._config.probe.vague:
+            self._learning.events.note(memory.events, time, Event(PATH_UNSEEN, sigma, sigma))
+
     def _speed_share(self, memory: SimpleNamespace, reference: PathAhead, time: float) -> float:
         """The share of the planned speed at which the path may be run with what is known of the dead time."""
         instant = float(memory.planned[0])
@@ -284,6 +308,11 @@ class SelfCalibrating(LeafSystem):
         )
         self._learning.plan.append(memory.plan, instant, row)
         self._learning.delay.search.command(memory.delay.search, time, plan.theta)
+        forecast, last = self._forecast, memory.planned[0]
+        if forecast and forecast.sigma > self._config.probe.vague and last < path_start <= instant:
+            self._learning.events.note(
+                memory.events, time, Event(PATH_UNSEEN, forecast.sigma, forecast.sigma)
+            )
         memory.planned[0] = instant
         # While the delay is corrected the path is sent faster or slower than it is to be travelled.
         return command.position, (1.0 + memory.delay.rate[0]) * command.velocity, command.torque

@@ -14,16 +14,18 @@ from systems.reference.cartesian_path import CartesianPath
 _MOST_INSTANTS = 48  # of the path, evenly spaced in time
 _INVERSE_STEP = 0.05  # s, between two poses of the inverse kinematics
 _LATE = 0.5  # s, by which samples may be late for use: dead time, lead of the parameters, lost images
-_ARM = 0.25  # m, by which an angle counts as a way of the tip
+# An angle counts as a way of the tip at an arm of 0.25 m.
+_SCALE = np.array([0.25, 0.25, 0.25, 1.0, 1.0, 1.0])
 
 
 class Standing(NamedTuple):
     """How well the tip is known where it is known worst on a path."""
 
-    sigma: float  # m, of the tip's position
+    sigma: float  # m, standard deviation of the tip, turns counted at an arm of 0.25 m
     time: float  # s, of the path
-    unknown: int  # the one of the unknowns that has the largest part in it
-    share: float  # of the variance, that would go if this one were known
+    unknown: int  # the one that has the largest part in it
+    unknown_sigma: float  # its own, in its unit
+    share: float  # of the tip's variance that would go if this one were known
 
 
 class PathNeeds:
@@ -92,20 +94,35 @@ class PathNeeds:
             A: information before the path begins.
             rate: samples of the camera in a second.
         """
-        A, largest = A.copy(), 0.0
-        for k, H in enumerate(self.H):
-            if k >= self._blind:
-                A += rate * self._seconds * self._informations[k - self._blind]
-            Z = solve_triangular(np.linalg.cholesky(A), H.T, lower=True, check_finite=False)
-            variance = (Z * Z).sum(axis=0)
-            largest = max(largest, float(variance[3:].sum() + _ARM**2 * variance[:3].sum()))
-        return math.sqrt(largest)
+        return self._worst(A, rate)[0]
+
+    def forecast(self, A: np.ndarray, rate: float) -> Standing:
+        """What lies behind `expected`, of which the arguments are."""
+        sigma, worst, A = self._worst(A, rate)
+        return self._standing(np.linalg.inv(A), worst, sigma)
 
     def standing(self, P: np.ndarray) -> Standing:
         """How well the tip is known on the path with the covariance P of the unknowns, (size, size)."""
-        HP = self.H[:, 3:] @ P
-        variance = np.einsum("nij,nij->n", HP, self.H[:, 3:])
+        rows = _SCALE[:, None] * self.H
+        variance = np.einsum("nij,nij->n", rows @ P, rows)
         worst = int(variance.argmax())
-        shares = (HP[worst] ** 2).sum(axis=0) / np.maximum(np.diag(P), 1e-300) / variance[worst]
-        unknown = int(shares.argmax())
-        return Standing(math.sqrt(variance[worst]), float(self.times[worst]), unknown, float(shares[unknown]))
+        return self._standing(P, worst, math.sqrt(variance[worst]))
+
+    def _worst(self, A: np.ndarray, rate: float) -> tuple[float, int, np.ndarray]:
+        """The worst standard deviation of the tip in m, its place on the path, and the information there."""
+        A, largest, worst, then = A.copy(), -1.0, 0, A
+        for k, H in enumerate(self.H):
+            if k >= self._blind:
+                A += rate * self._seconds * self._informations[k - self._blind]
+            Z = solve_triangular(np.linalg.cholesky(A), (_SCALE[:, None] * H).T, lower=True)
+            variance = float((Z * Z).sum())
+            if variance > largest:
+                largest, worst, then = variance, k, A.copy()
+        return math.sqrt(largest), worst, then
+
+    def _standing(self, P: np.ndarray, worst: int, sigma: float) -> Standing:
+        effects = ((_SCALE[:, None] * self.H[worst] @ P) ** 2).sum(axis=0) / np.diag(P)
+        unknown = int(effects.argmax())
+        share = float(effects[unknown]) / sigma**2
+        own = float(self._model.sigma[unknown] * math.sqrt(P[unknown, unknown]))
+        return Standing(sigma, float(self.times[worst]), unknown, own, share)

@@ -25,6 +25,7 @@ class ProbeConfig:
     begin: float = 0.8  # s after the start
     rest: float = 0.3  # s before the path begins
     sharp: float = 3e-5  # m: a tip that will be known so well all along the path needs no oscillations
+    vague: float = 2.5e-4  # m: a tip that is known less well than this somewhere on the path is an event
 
 
 class Pattern(NamedTuple):

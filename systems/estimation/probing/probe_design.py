@@ -3,7 +3,7 @@
 import numpy as np
 
 from robots.description.model import NUM_JOINTS
-from systems.estimation.probing.path_needs import PathNeeds
+from systems.estimation.probing.path_needs import PathNeeds, Standing
 from systems.estimation.probing.probe import USUAL, Pattern, Probe
 
 _TRIES = 32
@@ -15,8 +15,8 @@ _QUARTER = 0.5 * np.pi
 
 def designed(
     needs: PathNeeds, probe: Probe, path_start: float, rate: float, sharp: float
-) -> tuple[Pattern, float]:
-    """The pattern after which the tip is known best where it is known worst, and how well that is in m.
+) -> tuple[Pattern, Standing]:
+    """The pattern after which the tip is known best where it is known worst, and how well that is.
 
     It begins with the usual pattern, as large as it may be, and goes on from the best one by changing the
     amplitude, the number of periods or the phase of up to three axes. Amplitudes are zero where the tip will
@@ -32,18 +32,21 @@ def designed(
     q, still = needs.q[0], np.zeros((1, NUM_JOINTS))
     at_rest = rate * needs.information(needs.columns(q[None], still, still))
     _, length = probe.window(path_start)
-    without = needs.expected(needs.prior + path_start * at_rest, rate)
-    if length == 0.0 or without < sharp:
+    without = needs.forecast(needs.prior + path_start * at_rest, rate)
+    if length == 0.0 or without.sigma < sharp:
         return USUAL._replace(size=np.zeros(NUM_JOINTS)), without
     known = needs.prior + (path_start - length) * at_rest
     J, room = needs.jacobian(q), probe.room(q)
     times = np.linspace(0.0, length, _INSTANTS)
 
-    def judged(pattern: Pattern) -> tuple[float, Pattern]:
-        pattern = pattern._replace(size=probe.within_limits(pattern, room, J, length))
+    def shown(pattern: Pattern) -> np.ndarray:
         displacement, velocity, acceleration = pattern.at(times, length)
         H = needs.columns(q + displacement, velocity, acceleration)
-        return needs.expected(known + rate * length / _INSTANTS * needs.information(H), rate), pattern
+        return known + rate * length / _INSTANTS * needs.information(H)
+
+    def judged(pattern: Pattern) -> tuple[float, Pattern]:
+        pattern = pattern._replace(size=probe.within_limits(pattern, room, J, length))
+        return needs.expected(shown(pattern), rate), pattern
 
     best = judged(USUAL._replace(size=np.full(NUM_JOINTS, np.inf)))
     rng = np.random.default_rng(0)
@@ -51,7 +54,7 @@ def designed(
         candidate = judged(_changed(best[1], rng))
         if candidate[0] < best[0]:
             best = candidate
-    return best[1], best[0]
+    return best[1], needs.forecast(shown(best[1]), rate)
 
 
 def _changed(pattern: Pattern, rng: np.random.Generator) -> Pattern:

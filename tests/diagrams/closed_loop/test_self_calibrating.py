@@ -60,6 +60,20 @@ def test_a_dead_time_that_nobody_told_is_found_before_the_path_begins():
     assert not any(experiment.log().guard_counts.values())
 
 
+def test_a_path_that_nothing_has_shown_the_needs_of_is_named():
+    settings = ["servo.laws.self_calibrating.probe.kind=none", "reference.settle=0.2"]
+    experiment = Experiment(load_scenario("misaligned", settings), "self_calibrating")
+    experiment.advance(until=0.3)
+    learnt = experiment.log().learnt
+    assert learnt is not None
+    assert [event["kind"] for event in learnt["events"]] == ["path needs more than was shown"]
+    before = learnt["path"]["before"]
+    assert learnt["events"][0]["size"] == before["tip_sigma_m"] > 1e-3
+    assert before["parameter"] in learnt["parameters"]
+    # By then the camera will have shown some of it.
+    assert before["parameter_sigma"] < learnt["parameters"][before["parameter"]]["sigma"]
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize(
     ("name", "settings", "moving"),

@@ -48,7 +48,7 @@ def test_what_the_design_promises_its_motion_shows(shape):
     amplitude = probe.amplitude(of.q[0], J, 4.0)
     shown = expected(of, probe, amplitude)
     nothing = expected(of, probe, 0.0 * amplitude)
-    assert shown == pytest.approx(promised, rel=0.2)  # knock and tails are not counted in the promise
+    assert shown == pytest.approx(promised.sigma, rel=0.2)  # knock and tails are not counted in the promise
     assert shown <= 1.02 * usual
     assert shown < 0.1 * nothing
 
@@ -62,11 +62,24 @@ def test_none_where_the_tip_is_known_well_enough():
     assert (probe.pattern.periods == USUAL.periods).all()
 
 
-def test_what_is_known_least_has_a_name():
-    of = needs(Rectangle())
+def test_what_is_known_least_has_a_name_and_a_size():
+    of, i = needs(Rectangle()), MODEL.G.start + 4
     P = 1e-6 * np.eye(MODEL.size)
-    P[4, 4] = 1.0
+    P[i, i] = 1.0
     found = of.standing(P)
-    assert found.unknown == 4
+    assert found.unknown == i
+    assert found.unknown_sigma == MODEL.sigma[i]
     assert found.share == pytest.approx(1.0, abs=1e-3)
-    assert found.sigma == pytest.approx(np.linalg.norm(of.H[:, 3:, 4], axis=1).max(), rel=1e-3)
+    ways = np.linalg.norm(of.H[:, 3:, i], axis=1)
+    turns = np.linalg.norm(of.H[:, :3, i], axis=1)
+    assert found.sigma == pytest.approx(np.sqrt(ways**2 + (0.25 * turns) ** 2).max(), rel=1e-3)
+
+
+def test_a_forecast_says_when_and_because_of_what():
+    of = needs(Circle())
+    found = of.forecast(of.prior, RATE)
+    assert found.sigma == of.expected(of.prior, RATE)
+    assert found.time in of.times
+    better = of.prior.copy()
+    better[found.unknown, found.unknown] *= 1e6
+    assert of.expected(better, RATE) < found.sigma
