@@ -73,7 +73,7 @@ def drivetrain_command(
                 "Figure 2.4: a ramp of torque drives two inertias through a gear with losses. Friction holds "
                 "it at first; later the direction in which power flows decides what is lost.",
                 efficiency_figure(),
-                360,
+                480,
             ),
             Section(
                 "Play",

@@ -62,14 +62,12 @@ def efficiency_figure() -> go.Figure:
     times, speed, torque = efficiency_run()
     acceleration = np.gradient(speed, times)
     loss = EFFICIENCY.loss(torque - INERTIA_A * acceleration, speed)
-    figure = go.Figure()
-    for name, values in (
-        ("torque in N m", torque),
-        ("loss in N m", loss),
-        ("speed in rad/s x 10", 10.0 * speed),
-    ):
-        figure.add_trace(go.Scatter(x=times, y=values, name=name))
-    return figure.update_layout(xaxis={"title": "time in s"})
+    figure = make_subplots(2, 1, shared_xaxes=True, vertical_spacing=0.08)
+    figure.add_trace(go.Scatter(x=times, y=torque, name="torque that drives"), 1, 1)
+    figure.add_trace(go.Scatter(x=times, y=loss, name="loss in the gear"), 1, 1)
+    figure.add_trace(go.Scatter(x=times, y=speed, name="speed", showlegend=False), 2, 1)
+    figure.update_yaxes(title="torque in N m", row=1).update_yaxes(title="speed in rad/s", row=2)
+    return figure.update_xaxes(title="time in s", row=2)
 
 
 def backlash_figure() -> go.Figure:
@@ -85,7 +83,7 @@ def backlash_figure() -> go.Figure:
             x = x + dt * smooth.rate(np.array(angle), x)
         curves[f"visco-elastic, {frequency:g} Hz"] = np.array(torques)
     figure, cycle = make_subplots(1, 2, subplot_titles=["play", "near zero"]), slice(4000, None)
-    for (name, torque), color in zip(curves.items(), ("#2c3e50", "#0f7cc0", "#e0a030"), strict=True):
+    for (name, torque), color in zip(curves.items(), ("#5b6675", "#0f7cc0", "#d55e00"), strict=True):
         for column in (1, 2):
             line, group = {"color": color}, {"legendgroup": name, "showlegend": column == 1}
             trace = go.Scatter(x=1e3 * phi[cycle], y=torque[cycle], name=name, line=line, **group)
@@ -128,4 +126,4 @@ def hysteresis_figure() -> go.Figure:
     figure.add_trace(go.Scatter(x=x, y=compensated, name="compensated, exactly"), 1, 2)
     for name, compensated in smoothly_compensated(x, step).items():
         figure.add_trace(go.Scatter(x=x, y=compensated, name=f"compensated, smoothly, {name}"), 1, 2)
-    return figure.update_xaxes(title="input")
+    return figure.update_xaxes(title="input").update_yaxes(title="output", col=1)

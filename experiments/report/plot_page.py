@@ -8,6 +8,7 @@ import plotly.graph_objects as go
 from markupsafe import Markup, escape
 
 from experiments.report.curves import thinned_figure
+from experiments.report.figure_style import TEMPLATE
 from experiments.report.packed import later
 from experiments.report.page import write_page
 
@@ -29,13 +30,7 @@ class Section:
         if not isinstance(self.content, go.Figure):
             return Markup(self.content)
         figure = thinned_figure(self.content)
-        figure.update_layout(
-            height=self.height,
-            margin={"l": 60, "r": 20, "t": 20, "b": 50},
-            paper_bgcolor="rgba(0,0,0,0)",
-            plot_bgcolor="rgba(0,0,0,0)",
-            font={"color": "#7a8696"},
-        )
+        figure.update_layout(height=self.height, template=TEMPLATE)
         return later(figure.to_html(full_html=False, include_plotlyjs=False, config=_CONFIG))
 
 
@@ -50,7 +45,7 @@ def write_plot_page(path: str | Path, title: str, verdict: str, sections: Sequen
 
 def html_table(head: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
     """A table; cells are text unless they are marked as HTML."""
-    return f"<div class=scroll><table>{_inside(head, rows)}</table></div>"
+    return f"<div class=scroll tabindex=0><table>{_inside(head, rows)}</table></div>"
 
 
 def sortable_table(
@@ -67,7 +62,7 @@ def sortable_table(
     button = f'<button class=csv data-table="{name}">Save as CSV</button>'
     table = f'<table class=sortable id="{name}">{_inside(head, rows)}</table>'
     filter_field = f'<input class=filter data-table="{name}" placeholder="Filter" aria-label="Filter"> '
-    return f'{filter_field if has_filter else ""}{button}<div class="scroll tall">{table}</div>'
+    return f'{filter_field if has_filter else ""}{button}<div class="scroll tall" tabindex="0">{table}</div>'
 
 
 def _inside(head: Sequence[str], rows: Sequence[Sequence[str]]) -> str:

@@ -30,6 +30,8 @@ from experiments.station.clients import station_clients
 from experiments.station.guided_command import ask_before_moving, on_station
 from experiments.station.latency import ImpossibleDelayError, Latency, evaluate
 
+_LEAST_RANGE_MS = 0.01  # of the plot of the clocks
+
 
 def latency_command(
     scenario: ScenarioOption = "cell",
@@ -156,13 +158,16 @@ def write_latency_page(path: Path, found: Latency, record: LatencyRecord) -> Non
         ("measured, moved back by the loop", record.measured, found.loop),
     ):
         moved.add_scatter(x=time - shift, y=np.rad2deg(values), name=name, mode="lines")
-    moved.update_layout(xaxis_title="time, s", yaxis_title="joint, degrees")
+    moved.update_layout(xaxis_title="time in s", yaxis_title="joint in degrees")
     clocks = go.Figure()
     difference = 1e3 * (record.reported - record.reported[0] - time)
     clocks.add_scatter(x=time, y=difference, name="own clock less the controller's", mode="lines")
-    clocks.update_layout(xaxis_title="time, s", yaxis_title="difference, ms")
+    clocks.update_layout(xaxis_title="time in s", yaxis_title="difference in ms")
+    if len(difference) and np.ptp(difference) < _LEAST_RANGE_MS:  # clocks that agree: nothing but rounding
+        middle = float(np.mean(difference))
+        clocks.update_yaxes(range=[middle - _LEAST_RANGE_MS, middle + _LEAST_RANGE_MS])
     spread = go.Figure(go.Histogram(x=1e3 * record.turn_around, nbinsx=100))
-    spread.update_layout(xaxis_title="turn-around, ms", yaxis_title="replies")
+    spread.update_layout(xaxis_title="turn-around in ms", yaxis_title="replies")
     verdict = (
         f"A command takes {1e3 * found.loop:.1f} ms to the joint, {1e3 * found.dead_time:.1f} ms more than "
         "the cycle in which it is heard."

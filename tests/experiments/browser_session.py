@@ -18,7 +18,7 @@ import websocket
 
 from tests.experiments.browser import FLAGS, chromium
 
-PATIENCE = 60.0  # s
+PATIENCE = 120.0  # s
 
 
 class Session:

@@ -24,6 +24,17 @@ function saveText(text, name) {
   link.click();
   URL.revokeObjectURL(link.href);
 }
+/* Words in the colour of the page, and three dimensions from farther away where there is less room. */
+function colorFigures() {
+  const ink = getComputedStyle(document.documentElement).getPropertyValue("--soft").trim();
+  for (const plot of document.querySelectorAll(".js-plotly-plot")) {
+    const change = {"font.color": ink};
+    if (window.innerWidth < 520 && plot._fullLayout.scene) change["scene.camera.eye"] = {x: 1.9, y: 1.9, z: 1.5};
+    Plotly.relayout(plot, change);
+  }
+}
+/* On paper words are dark, whatever the screen was. */
+const paperInk = "#5b6675";
 function prepareFigures() {
   let number = 0;
   for (const plot of document.querySelectorAll(".plot, .js-plotly-plot")) {

@@ -12,7 +12,8 @@ async function drawForPaper() {
   const plots = new Set(document.querySelectorAll(".js-plotly-plot"));
   for (const id in own) plots.add(document.getElementById(id));
   for (const plot of plots) {
-    const figure = own[plot.id] || {data: plot.data, layout: plot.layout};
+    const figure = own[plot.id] || {data: plot.data,
+      layout: {...plot.layout, font: {...plot.layout.font, color: paperInk}}};
     const isDeep = figure.data.some(trace => /3d|surface|gl/.test(trace.type || ""));
     const options = {format: isDeep ? "png" : "svg", width: 760, height: plot.offsetHeight || parseInt(plot.style.height) || 450,
       scale: isDeep ? 2 : 1};

@@ -1,0 +1,41 @@
+"""One look for the plotly figures of all pages, on white, on black and on paper."""
+
+import plotly.graph_objects as go
+
+# Told apart by people who do not see all colours: Okabe and Ito (2008), with the blue of the pages first.
+COLORS = ("#0f7cc0", "#d55e00", "#009e73", "#c2739f", "#8a6d00", "#5b6675", "#7a5195", "#56b4e9")
+INK = "#6a7585"  # of words and numbers; the script of the page sets that of its colour scheme
+_GRID, _LINE = "rgba(128,140,156,0.25)", "rgba(128,140,156,0.6)"
+
+_AXIS = {
+    "gridcolor": _GRID,
+    "zerolinecolor": _LINE,
+    "linecolor": _LINE,
+    "automargin": True,
+    # 1e-10 as 10 to a power and not as "100p".
+    "exponentformat": "power",
+    "title": {"standoff": 8},
+}
+_AXIS_3D = {
+    "gridcolor": _GRID,
+    "zerolinecolor": _LINE,
+    "linecolor": _LINE,
+    "showbackground": False,
+    "showspikes": False,
+}
+
+TEMPLATE = go.layout.Template(
+    layout={
+        "colorway": COLORS,
+        "colorscale": {"sequential": "Viridis"},
+        "font": {"family": "system-ui, sans-serif", "size": 13, "color": INK},
+        "paper_bgcolor": "rgba(0,0,0,0)",
+        "plot_bgcolor": "rgba(0,0,0,0)",
+        "xaxis": _AXIS,
+        "yaxis": _AXIS,
+        "scene": {f"{name}axis": _AXIS_3D for name in "xyz"},
+        # Below, where it takes no width from the figure.
+        "legend": {"orientation": "h", "x": 0.0, "y": -0.2, "yanchor": "top"},
+        "margin": {"l": 60, "r": 20, "t": 28, "b": 50},
+    }
+)
