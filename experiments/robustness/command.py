@@ -9,12 +9,11 @@ from rich.console import Console
 from rich.markup import escape
 from rich.table import Table
 
-from diagrams.scenario.scenario import load_scenario
 from experiments.cli.cluster import executor
 from experiments.cli.console import count, progress_bar, refusing
 from experiments.cli.json_output import human_console, json_output
 from experiments.cli.option_limits import at_least
-from experiments.cli.options import JobsOption, JsonOption, SchedulerOption, SetOption
+from experiments.cli.options import JobsOption, JsonOption, RobotOption, SchedulerOption, SetOption
 from experiments.comparison.compare import named_laws
 from experiments.report.style import law_title
 from experiments.robustness.cases import CASES
@@ -42,6 +41,7 @@ def robustness_command(
     first_seed: Annotated[int, typer.Option(metavar="N", help="First seed.")] = 1000,
     laps: Annotated[int, typer.Option(metavar="N", help="Laps of the path in each run.")] = 1,
     settings: SetOption = None,
+    robot: RobotOption = None,
     jobs: JobsOption = None,
     scheduler: SchedulerOption = None,
     json_file: JsonOption = None,
@@ -54,10 +54,10 @@ def robustness_command(
         chosen = [_case(name, settings or []) for name in (CASES if cases == "all" else cases.split(","))]
         named = named_laws(laws)
         drawn = range(first_seed, first_seed + seeds)
-        todo = trials(scenario, chosen, named, drawn, paths.split(","), laps)
+        todo = trials(scenario, chosen, named, drawn, paths.split(","), laps, robot)
         for trial in todo:
             if trial.seed == first_seed:  # what cannot run is refused before anything does
-                make_path(load_scenario(scenario, trial.settings).reference)
+                make_path(trial.load().reference)
         where = executor(scheduler, jobs)
         with (
             json_output(json_file) as output,
@@ -71,7 +71,7 @@ def robustness_command(
                 for law in named
                 if (matching := [row for row in rows if (row["case"], row["law"]) == (case.name, law)])
             ]
-            output.write({"scenario": scenario, "results": results, "runs": rows})
+            output.write({"scenario": scenario, "robot": robot, "results": results, "runs": rows})
     _print(human, scenario, results)
 
 
@@ -106,6 +106,9 @@ def _print(console: Console, scenario: str, results: list[dict[str, Any]]) -> No
     console.print(table)
     for result in results:
         label = f"{escape(result['case'])}, {escape(law_title(result['law']))}"
+        if "coverage" in result:
+            smallest, of_all = result["coverage"]
+            console.print(f"{label}: in the predicted 95 % ellipsoid {of_all:.3f}, worst run {smallest:.3f}")
         if result.get("guard"):
             console.print(f"{label}: the guard intervened in {result['guard']} ticks")
         for failure in result["failures"]:

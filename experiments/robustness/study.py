@@ -1,17 +1,19 @@
 """One law after the other on random robots: each seed draws a robot, its errors and the camera's noise."""
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
 from diagrams.runs.simulation import run
-from diagrams.scenario.scenario import load_scenario
+from diagrams.scenario.carried import carried_over
+from diagrams.scenario.scenario import Scenario, load_scenario
 from experiments.cli.workers import Executor, LocalProcesses, Progress, in_order
 from experiments.comparison.compare import simulating
 from experiments.metrics.laps import lap_metrics
 from experiments.metrics.run_metrics import error_metrics, pose_errors
+from robots.description.model import load_robot
 
 
 @dataclass(frozen=True)
@@ -33,6 +35,7 @@ class Trial:
     seed: int
     path: str
     laps: int
+    robot: str | None = None  # in place of the scenario's, which is carried over to it
 
     @property
     def settings(self) -> list[str]:
@@ -45,6 +48,15 @@ class Trial:
             f"reference.laps={self.laps}",
         ]
 
+    def load(self) -> Scenario:
+        """The scenario. Raises what `load_scenario` and `carried_over` raise."""
+        scenario = load_scenario(self.scenario, self.settings)
+        if self.robot is None:
+            return scenario
+        belief = replace(scenario.servo.model, robot="")
+        named = replace(scenario, robot=self.robot, servo=replace(scenario.servo, model=belief))
+        return carried_over(named, load_robot(scenario.robot), load_robot(self.robot))[0]
+
 
 def trials(
     scenario: str,
@@ -53,10 +65,11 @@ def trials(
     seeds: Sequence[int],
     paths: Sequence[str],
     laps: int = 1,
+    robot: str | None = None,
 ) -> list[Trial]:
     """All combinations, seed by seed, so that the first results are of all laws."""
     return [
-        Trial(scenario, case, law, seed, path, laps)
+        Trial(scenario, case, law, seed, path, laps, robot)
         for case in cases
         for seed in seeds
         for path in paths
@@ -89,13 +102,16 @@ def run_trial(trial: Trial, progress: Progress) -> dict[str, Any]:
     }
     try:
         with simulating(trial.law, trial.seed):
-            log = run(load_scenario(trial.scenario, trial.settings), trial.law, progress=progress)
+            log = run(trial.load(), trial.law, progress=progress)
     except RuntimeError as error:  # a SimulationError; the others shall go on
         return row | {"failure": str(error)}
     errors = error_metrics(log, "true")
     if trial.case.recovered_at is not None:
         e = pose_errors(log, "true")[log.time >= trial.case.recovered_at]
         row["recovered_mm"] = 1e3 * float(np.linalg.norm(e[:, 3:], axis=1).max())
+    coverage = (log.learnt or {}).get("coverage")
+    if coverage and coverage["samples"]:
+        row["coverage"] = coverage
     return row | {
         "max_norm_mm": errors["max_norm_mm"],
         "max_angle_deg": errors["max_angle_deg"],
@@ -113,6 +129,8 @@ def judged(rows: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
     Returns:
         ``laps``: per lap ``max_norm_mm`` and ``max_angle_deg``, then ``static_mm``, as (worst, median) each;
         ``recovered_mm``: largest distance after what happens, where something does, likewise;
+        ``coverage``: share of samples in which the true tip was within the ellipsoid of 95 % of a law that
+        predicts it, as (smallest of a run, of all samples);
         ``worst_seed`` and ``worst_path`` of the largest distance; ``guard``: interventions of all runs;
         ``failures``: runs that broke off.
     """
@@ -135,6 +153,11 @@ def judged(rows: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
     ]
     if "recovered_mm" in done[0]:
         result["recovered_mm"] = _worst_and_median([row["recovered_mm"] for row in done])
+    said = [row["coverage"] for row in done if "coverage" in row]
+    if said:
+        samples = sum(each["samples"] for each in said)
+        inside = sum(each["share"] * each["samples"] for each in said)
+        result["coverage"] = min(each["share"] for each in said), inside / samples
     return result | {
         "laps": laps,
         "static_mm": _worst_and_median([row["static_mm"] for row in done]),

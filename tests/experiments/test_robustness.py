@@ -3,11 +3,13 @@
 import json
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from diagrams.scenario.scenario import load_scenario
 from experiments.robustness.cases import CASES
 from experiments.robustness.study import Case, judged, trials
+from systems.reference.paths import make_path
 from systems.reference.shapes import Circle
 from tests.experiments.commands import refusal, truetip
 
@@ -56,6 +58,30 @@ def test_a_case_is_a_name_and_settings():
     assert load_scenario(trial.scenario, trial.settings).station.payload == 3.0
 
 
+def test_another_robot_gets_the_path_and_the_load_of_its_own_size():
+    (trial,) = trials("everything", [CASES["plain"]], ["open_loop"], [3], ["rectangle"], robot="kr16")
+    own, drawn = load_scenario(trial.scenario, trial.settings), trial.load()
+    assert drawn.robot == "kr16"
+    assert drawn.station.payload == pytest.approx(own.station.payload * 16.0 / 7.0)
+    # The belief is wrong by the same share.
+    assert drawn.servo.model.payload is not None
+    assert drawn.servo.model.payload / drawn.station.payload == pytest.approx(0.95)
+    assert drawn.station.errors.random.seed == 3
+    paths = [make_path(each.reference) for each in (own, drawn)]
+    poses = [path.sample(np.linspace(path.path_start, path.dwell_start, 200))[0] for path in paths]
+    size = [np.ptp(X_WE[:, :3, 3], axis=0).max() for X_WE in poses]
+    assert size[1] > 1.5 * size[0]
+
+
+def test_coverage_is_that_of_the_worst_run_and_of_all_samples():
+    rows = [
+        row(seed, [1.0]) | {"coverage": {"share": share, "samples": samples}}
+        for seed, share, samples in ((1, 0.9, 10), (2, 1.0, 30))
+    ]
+    assert judged(rows)["coverage"] == pytest.approx((0.9, 0.975))
+    assert "coverage" not in judged([row(1, [1.0])])
+
+
 def test_the_command_prints_a_row_of_each_law_and_writes_the_numbers(tmp_path: Path):
     file = tmp_path / "numbers.json"
     settings = [part for setting in QUICK for part in ("--set", setting)]
@@ -86,6 +112,7 @@ def test_what_is_left_after_an_event_is_told(tmp_path: Path):
         (["--laws", "nothing"], "nothing"),
         (["--seeds", 0], "--seeds"),
         (["--paths", "spiral"], "spiral"),
+        (["--robot", "kr17"], "kr17"),
         (["--scenario", "nowhere"], "scenario 'nowhere': no file"),
     ],
 )
