@@ -7,7 +7,6 @@ from robots.description.joint_errors import JointErrors
 from robots.description.model import NUM_JOINTS, RobotModel
 from robots.dynamics.plant import add_robot
 from robots.kinematics.forward import Kinematics
-from robots.pose import Rows
 
 # A joint yields by a thousandth of a radian and its torque changes by a thousandth of that: three rounds
 # leave less than 1e-11 rad.
@@ -76,10 +75,10 @@ class CompliantKinematics:
         """Geometric Jacobians by motor positions q in rad, rotation first, (..., 6) -> (..., 6, 6)."""
         return self.forward_and_jacobian(q)[1]
 
-    def rows_and_jacobian(self, q: np.ndarray) -> tuple[Rows, np.ndarray]:
-        """`forward_and_jacobian` at one q (6,), with the first three rows of the pose as floats."""
+    def rows_and_jacobian(self, q: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """`forward_and_jacobian` at one q (6,), with the first three rows of the pose, (3, 4)."""
         X, J = self.forward_and_jacobian(q)
-        return X[:3].tolist(), J
+        return X[:3], np.ascontiguousarray(J)
 
     def forward_and_jacobian(self, q: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """What `forward` and `jacobian` return, computed together."""

@@ -90,7 +90,7 @@ def kinematics_code(robot: RobotModel) -> Callable[..., tuple[tuple, tuple]]:
         axis_S = R_BS.T @ R_BL @ axis
         k = int(np.argmax(axis_S))
         if np.abs(axis_S - np.eye(3)[k]).max() >= _ROUNDING:
-            turn, k = _z_to(axis_S), 2
+            turn, k = z_to(axis_S), 2
             R_BS = R_BS @ turn
             columns = [lines.times(columns, _constants(column)) for column in turn.T]
         axes.append(columns[k])
@@ -118,7 +118,7 @@ def _constants(vector: Iterable[float]) -> Vector:
     return x, y, z
 
 
-def _z_to(axis: np.ndarray) -> np.ndarray:
+def z_to(axis: np.ndarray) -> np.ndarray:
     """A rotation whose third column is the given unit vector."""
     helper = np.cross(axis, np.eye(3)[np.argmin(np.abs(axis))])
     x = helper / np.linalg.norm(helper)

@@ -11,7 +11,6 @@ from pydrake.common.value import AbstractValue, Value
 from pydrake.math import RigidTransform
 from pydrake.systems.framework import BasicVector, Context, DependencyTicket, DiscreteValues, LeafSystem
 
-from robots.pose import Rows
 from systems.reference.path_time import PathTime
 from systems.reference.paths import CartesianPath, ReferenceConfig, make_path
 
@@ -20,11 +19,11 @@ _EPSILON = 1e-9  # s, by which rounding may miss a tick
 
 
 class PathMoment(NamedTuple):
-    """The path at one time, in plain floats: with so few numbers Python is quicker than numpy."""
+    """The path at one time. The arrays are not to be changed: others look at the same ones."""
 
-    X_WE: Rows  # the first three rows of the pose
-    V_WE: Sequence[float]  # the spatial velocity, rad/s and m/s
-    A_WE: Sequence[float]  # the spatial acceleration, rad/s^2 and m/s^2
+    X_WE: np.ndarray  # the first three rows of the pose, (3, 4)
+    V_WE: np.ndarray  # the spatial velocity, (6,), rad/s and m/s
+    A_WE: np.ndarray  # the spatial acceleration, (6,), rad/s^2 and m/s^2
 
 
 @dataclass(frozen=True)
@@ -181,7 +180,7 @@ class Reference(LeafSystem):
 
         def calc_pose(context: Context, X_WE: AbstractValue) -> None:
             # Orthonormal by construction; checking it again would cost more than the path.
-            X_WE.set_value(RigidTransform.MakeUnchecked(np.array(moment(context).X_WE)))
+            X_WE.set_value(RigidTransform.MakeUnchecked(moment(context).X_WE))
 
         def calc_velocity(context: Context, V_WE: BasicVector) -> None:
             V_WE.set_value(moment(context).V_WE)
@@ -211,4 +210,4 @@ def _path_time(context: Context) -> PathTime:
 
 def _moments(X_WE: np.ndarray, V_WE: np.ndarray, A_WE: np.ndarray) -> list[PathMoment]:
     """The path at each of some times."""
-    return list(map(PathMoment, X_WE[:, :3].tolist(), V_WE.tolist(), A_WE.tolist()))
+    return list(map(PathMoment, X_WE[:, :3], V_WE, A_WE))

@@ -7,7 +7,6 @@ import numpy as np
 from robots.kinematics.forward import robust_solve
 from systems.servo.law import LawInput, LawOutput, ServoLaw
 from systems.servo.law_config import LawConfig
-from systems.servo.sine_feedback import sine_feedback
 
 
 @dataclass
@@ -42,7 +41,7 @@ class Compensation(ServoLaw):
         # The wanted pose is that of this tick, so the error is taken where the positions will be by then.
         rows, J = self.kinematics.rows_and_jacobian(q + self.period * last_velocity)
         gains = self.config.rotation, self.config.translation
-        feedback = sine_feedback(moment.X_WD, rows, moment.V_WD, *gains)
-        velocity = robust_solve(J, np.add(moment.V_WD, feedback))
+        feedback = self.kernels.sine_feedback(moment.X_WD, rows, moment.V_WD, *gains)
+        velocity = robust_solve(J, moment.V_WD + feedback)
         q = q + 0.5 * self.period * (velocity + last_velocity)
         return LawOutput(q, velocity, np.zeros(6), np.concatenate([q, velocity]))

@@ -5,7 +5,6 @@ import math
 import numpy as np
 
 from robots.pose import (
-    Rows,
     angular_velocity,
     euler_difference,
     euler_rates,
@@ -25,9 +24,9 @@ class EulerCorrection:
     Near beta = 90 degrees an error of a degree is one of any size in alpha and gamma.
     """
 
-    def initial(self, X_WE: Rows, X_WD: Rows) -> np.ndarray:
+    def initial(self, X_WE: np.ndarray, X_WD: np.ndarray) -> np.ndarray:
         """The correction with which the command is X_WE, in rad, shape (3,)."""
-        return np.array(euler_difference(zyx_angles(X_WE), zyx_angles(X_WD)))
+        return np.array(euler_difference(zyx_angles(X_WE.tolist()), zyx_angles(X_WD.tolist())))
 
     def check_path(self, path: CartesianPath) -> None:
         """Refuses a path near the singular orientation. Raises ValueError."""
@@ -39,9 +38,9 @@ class EulerCorrection:
                 f"the path reaches {math.degrees(beta):.1f}; angles: rotation_vector takes any path"
             )
 
-    def rate(self, X_WD: Rows, X_WE: Rows) -> np.ndarray:
+    def rate(self, X_WD: np.ndarray, X_WE: np.ndarray) -> np.ndarray:
         """The differences of the angles in rad, shape (3,)."""
-        return np.array(euler_difference(zyx_angles(X_WD), zyx_angles(X_WE)))
+        return np.array(euler_difference(zyx_angles(X_WD.tolist()), zyx_angles(X_WE.tolist())))
 
     def moved(self, turn: np.ndarray, step: np.ndarray) -> np.ndarray:
         """The correction after a small step (rad)."""

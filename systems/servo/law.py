@@ -1,19 +1,18 @@
 """What all visual-servo laws share: ports, the comparison with the camera, and what is never trusted."""
 
+import importlib
 import math
-from collections.abc import Sequence
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from pydrake.common.value import Value
 from pydrake.systems.framework import Context, DiscreteValues, LeafSystem
 
-from robots.description.model import NUM_JOINTS
-from robots.dynamics.compliant_kinematics import controller_kinematics
+from robots.description.model import NUM_JOINTS, RobotModel
+from robots.dynamics.compliant_kinematics import CompliantKinematics
 from robots.dynamics.newton_inverse import InverseSolver, inverse_kinematics
 from robots.kinematics.analytic_inverse import JointLimitError, UnreachableError
 from robots.kinematics.forward import robust_solve, rotation_about
-from robots.pose import Rows, error_of_rows
 from systems.controller_model import ControllerModel
 from systems.guard.guard import GuardConfig
 from systems.reference.paths import CartesianPath
@@ -21,11 +20,12 @@ from systems.reference.reference import PathAhead
 from systems.samples import JointSample, PoseSample
 from systems.servo.law_config import LawConfig
 
+if TYPE_CHECKING:
+    from robots.kinematics.compiled import CompiledKinematics
+
 # rad in one tick: ten times what the fastest joint can do, far less than from branch to branch
 _LARGEST_STEP = 0.4
 _JOINTS_SIZE = 18  # positions, velocities, velocities of the tick before
-_NEWTON_STEP = 5e-5  # rad; what one such step leaves is its square, a few nanometres
-_DAMPED = 1e-10  # rad and m that a step leaves which was not damped
 _NO_COMMAND = np.full(NUM_JOINTS, np.nan)
 # The groups of the state, each a port but for what the law itself remembers.
 _OUTPUTS = ("position_command", "velocity_command", "correction", "measurement")
@@ -35,13 +35,14 @@ _POSITION, _VELOCITY, _CORRECTION, _MEASUREMENT, _MEMORY = range(len(_OUTPUTS) +
 class LawInput(NamedTuple):
     """What a law sees at one tick. Poses are the first three rows of homogeneous matrices.
 
-    They are lists of floats, for which Python is quicker than numpy in so small a thing as a pose.
+    They are not to be changed: others look at the same arrays.
     """
 
-    X_WD: Rows  # wanted pose
-    V_WD: Sequence[float]  # wanted twist
-    position: np.ndarray  # measured joint positions, rad
-    measured: tuple[Rows, Rows] | None  # wanted and seen pose at an exposure, if it may be used
+    X_WD: np.ndarray  # wanted pose, (3, 4)
+    V_WD: np.ndarray  # wanted twist, (6,)
+    position: np.ndarray  # measured joint positions, (6,) rad
+    # Wanted and seen pose at an exposure, (3, 4) each, if it may be used
+    measured: tuple[np.ndarray, np.ndarray] | None
 
 
 class LawOutput(NamedTuple):
@@ -75,6 +76,7 @@ class ServoLaw(LeafSystem):
 
     What a law is stands on its class, see `systems.servo.contract.LawTraits`. What it works with:
         ``kinematics``  of the robot as the controller knows it, compliant if that knows its compliances
+        ``kernels``     `systems.servo.kernels`, compiled functions
         ``config``      gains and limits, ``gains`` of the six parts of an error (rotation first) in 1/s
         ``period``      of a tick in s
         ``angle_limit`` of the correction in rad
@@ -105,10 +107,13 @@ class ServoLaw(LeafSystem):
                 raise ValueError(f"servo law: {label} must be positive, got {getattr(config, label)}")
         robot, period, preview = model.robot, model.period, model.preview
         self.config, self.period = config, period
-        self.kinematics = controller_kinematics(robot, model.payload)
+        # Not before a law is made: it takes time to import.
+        self.kernels = importlib.import_module("systems.servo.kernels")
+        self.kernels.warm_up()
+        self.kinematics = _kinematics(robot, model.payload)
         self._inverse = inverse_kinematics(robot, model.payload)
-        self._lower, self._upper = robot.lower.tolist(), robot.upper.tolist()
-        self.gains = [config.rotation] * 3 + [config.translation] * 3
+        self._lower, self._upper = robot.lower.copy(), robot.upper.copy()
+        self.gains = np.repeat([config.rotation, config.translation], 3)
         # From the joints of the last tick, as `joints_at` has them, to their positions at this one.
         self._prediction = np.kron([1.0, 1.5 * period, -0.5 * period], np.eye(NUM_JOINTS))
         self.angle_limit = math.radians(config.correction_limit_deg)
@@ -134,7 +139,7 @@ class ServoLaw(LeafSystem):
         return moment.position
 
     def step(self, moment: LawInput, memory: np.ndarray) -> LawOutput:
-        """One tick of the law; the memory is that of the last one."""
+        """One tick of the law; the memory is that of the last one, a copy that may be changed."""
         raise NotImplementedError
 
     def _tick(self, context: Context, discrete_state: DiscreteValues) -> None:
@@ -160,7 +165,7 @@ class ServoLaw(LeafSystem):
 
         wanted = ahead.moment(time + self._preview)
         moment = LawInput(wanted.X_WE, wanted.V_WE, joints.position, measured)
-        memory = state.value(_MEMORY)
+        memory = state.value(_MEMORY).copy()
         if self.memory_size and math.isnan(memory[0]):
             memory = self.initial_state(moment)
         try:
@@ -174,14 +179,14 @@ class ServoLaw(LeafSystem):
         discrete_state.set_value(_MEASUREMENT, np.array((last_used, refused, newest)))
         discrete_state.set_value(_MEMORY, step.memory)
 
-    def joints_at(self, X_WE: Rows, V_WE: Sequence[float], last: np.ndarray) -> np.ndarray:
+    def joints_at(self, X_WE: np.ndarray, V_WE: np.ndarray, last: np.ndarray) -> np.ndarray:
         """The joints for a pose and a twist, next to those of the last tick.
 
         The last velocities lead so close that one Newton step is enough; where they do not, or close to a
         singularity, the inverse kinematics is asked.
 
         Args:
-            X_WE, V_WE: where to be.
+            X_WE, V_WE: where to be, pose (3, 4) and twist (6,).
             last: what this function returned a tick ago, or positions and twelve zeros.
 
         Returns:
@@ -190,35 +195,23 @@ class ServoLaw(LeafSystem):
         Raises:
             UnreachableError, JointLimitError: as `followed_branch`.
         """
-        predicted = self._prediction.dot(last)
-        rows, J = self.kinematics.rows_and_jacobian(predicted)
-        twists = np.array((error_of_rows(X_WE, rows), V_WE)).T  # columns that LAPACK need not copy
-        rates = robust_solve(J, twists)
-        step = rates[:, 0]
-        left = twists[:, 0] - J.dot(step)
+        X_WE, V_WE = np.asarray(X_WE, dtype=float), np.asarray(V_WE, dtype=float)
         joints = np.empty(_JOINTS_SIZE)
-        joints[:6], joints[6:12], joints[12:] = predicted + step, rates[:, 1], last[6:12]
-        inside = zip(self._lower, joints[:6].tolist(), self._upper, strict=True)
-        if (
-            step @ step > _NEWTON_STEP**2
-            or left @ left > _DAMPED**2
-            or not all(lower <= angle <= upper for lower, angle, upper in inside)
-        ):
-            joints[:6] = followed_branch(self._inverse, np.array(X_WE), last[:6])
-            joints[6:12] = robust_solve(self.kinematics.jacobian(joints[:6]), twists[:, 1])
+        joints[:6], joints[12:] = self._prediction.dot(last), last[6:12]
+        rows, J = self.kinematics.rows_and_jacobian(joints[:6])
+        if not self.kernels.newton_step(X_WE, V_WE, rows, J, self._lower, self._upper, joints[:12]):
+            joints[:6] = followed_branch(self._inverse, X_WE, last[:6])
+            joints[6:12] = robust_solve(self.kinematics.jacobian(joints[:6]), V_WE)
         return joints
 
-    def within_limits(self, twist: list[float], correction: Sequence[float]) -> list[float]:
-        """The twist that a law adds; where the correction stands at its limit, it may only shrink."""
-        a, b, c, x, y, z = correction
-        if a * a + b * b + c * c >= self.angle_limit**2:
-            u, v, w = twist[:3]
-            if a * u + b * v + c * w > 0.0:
-                twist[:3] = 0.0, 0.0, 0.0
-        if x * x + y * y + z * z >= self.config.correction_limit**2:
-            u, v, w = twist[3:]
-            if x * u + y * v + z * w > 0.0:
-                twist[3:] = 0.0, 0.0, 0.0
+    def within_limits(self, twist: np.ndarray, correction: np.ndarray) -> np.ndarray:
+        """The twist that a law adds; where the correction stands at its limit, it may only shrink.
+
+        Args:
+            twist: (6,), which is changed.
+            correction: (6,) in rad and m, rotation first.
+        """
+        self.kernels.limit_twist(twist, correction, self.angle_limit, self.config.correction_limit)
         return twist
 
     def guard_offset(self, context: Context) -> tuple[np.ndarray, np.ndarray] | None:
@@ -237,12 +230,12 @@ class ServoLaw(LeafSystem):
         return forward(led)[:3], forward(led - deviation)[:3]
 
     def pose_error_at_exposure(
-        self, wanted: Rows, sample: PoseSample, offset: tuple[np.ndarray, np.ndarray] | None
-    ) -> tuple[Rows, Rows] | None:
-        """The pose that was wanted when a sample was exposed, and the pose that was seen.
+        self, wanted: np.ndarray, sample: PoseSample, offset: tuple[np.ndarray, np.ndarray] | None
+    ) -> tuple[np.ndarray, np.ndarray] | None:
+        """The pose that was wanted when a sample was exposed, and the pose that was seen, (3, 4) each.
 
         Args:
-            wanted: where the path was at the exposure.
+            wanted: where the path was at the exposure, (3, 4).
             sample: a valid sample.
             offset: what `guard_offset` says of the robot; it is taken to be so at the exposure already.
 
@@ -250,16 +243,20 @@ class ServoLaw(LeafSystem):
             None if the sample is too far from the path to be true.
         """
         if offset is not None:
-            wanted = _shifted_by_guard(np.array(wanted), *offset).tolist()
-        seen: Rows = sample.X_WE.GetAsMatrix34().tolist()
-        (a0, a1, a2, ax), (b0, b1, b2, bx), (c0, c1, c2, cx) = wanted
-        (d0, d1, d2, dx), (e0, e1, e2, ex), (f0, f1, f2, fx) = seen
-        gap_squared = (ax - dx) ** 2 + (bx - ex) ** 2 + (cx - fx) ** 2
-        # The trace of the rotation between them is the product of all their entries.
-        trace = a0 * d0 + a1 * d1 + a2 * d2 + b0 * e0 + b1 * e1 + b2 * e2 + c0 * f0 + c1 * f1 + c2 * f2
+            wanted = _shifted_by_guard(wanted, *offset)
+        seen = np.ascontiguousarray(sample.X_WE.GetAsMatrix34())
+        gap_squared, trace = self.kernels.distance(wanted, seen)
         if gap_squared > self._guard.largest_deviation**2 or trace < self._smallest_trace:
             return None
         return wanted, seen
+
+
+def _kinematics(robot: RobotModel, payload: float) -> "CompiledKinematics | CompliantKinematics":
+    """Of the robot as it is known; compiled here, for that needs numba."""
+    if robot.has_joint_calibration:
+        return CompliantKinematics(robot, payload)
+    compiled = importlib.import_module("robots.kinematics.compiled")
+    return compiled.CompiledKinematics(robot)
 
 
 def _shifted_by_guard(X: np.ndarray, led: np.ndarray, wished: np.ndarray) -> np.ndarray:

@@ -4,11 +4,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from robots.kinematics.forward import robust_solve
-from robots.pose import error_of_rows
 from systems.servo.law import LawInput, LawOutput, ServoLaw
 from systems.servo.law_config import LawConfig
-from systems.servo.sine_feedback import sine_feedback
 
 
 @dataclass
@@ -47,13 +44,7 @@ class NumericalIk(ServoLaw):
         twist = moment.V_WD
         if moment.measured is not None:
             gains = self.config.rotation, self.config.translation
-            feedback = sine_feedback(*moment.measured, moment.V_WD, *gains)
-            added = self.within_limits(feedback, correction.tolist())
-            twist = [wanted + more for wanted, more in zip(twist, added, strict=True)]
-        # Columns that LAPACK need not copy.
-        rates = robust_solve(J, np.array((error_of_rows(moment.X_WD, rows), twist)).T)
-        velocity = rates[:, 1]
-        q = q + 0.5 * self.period * (velocity + last_velocity)
-        following = np.empty(18)
-        following[:6], following[6:12], following[12:] = halfway + rates[:, 0], q, velocity
-        return LawOutput(q, velocity, correction, following)
+            feedback = self.kernels.sine_feedback(*moment.measured, twist, *gains)
+            twist = twist + self.within_limits(feedback, correction)
+        following = self.kernels.numerical_ik(moment.X_WD, twist, rows, J, halfway, memory, self.period)
+        return LawOutput(following[6:12], following[12:], correction, following)

@@ -7,7 +7,7 @@ import numpy as np
 
 from robots.configuration.quantity import quantity
 from robots.kinematics.forward import robust_solve
-from robots.pose import Rows, angular_velocity, error_of_rows, euler_difference, zyx_angles
+from robots.pose import angular_velocity, error_of_rows, euler_difference, zyx_angles
 from systems.servo.law import LawInput, LawOutput, ServoLaw, check_branch_continuity
 from systems.servo.law_config import LawConfig
 
@@ -40,23 +40,21 @@ class Pbvs(ServoLaw):
     def step(self, moment: LawInput, memory: np.ndarray) -> LawOutput:
         """A velocity along the path and towards it, from where the joints are."""
         rows, J = self.kinematics.rows_and_jacobian(memory)
-        # Columns that LAPACK need not copy.
-        rates = robust_solve(J, np.array((error_of_rows(moment.X_WD, rows), moment.V_WD)).T)
+        rates = self.kernels.follow_path(moment.X_WD, moment.V_WD, rows, J)
         check_branch_continuity(rates[:, 0])
         velocity = rates[:, 1]
         q_d = memory + rates[:, 0] + self.period * velocity
         rows, J = self.kinematics.rows_and_jacobian(moment.position)
-        correction = error_of_rows(rows, moment.X_WD)
+        correction = np.array(error_of_rows(rows.tolist(), moment.X_WD.tolist()))
         if moment.measured is not None:
             twist = self.within_limits(self._feedback(*moment.measured), correction)
-            added = robust_solve(J, np.array(twist))
+            added = robust_solve(J, twist)
             fastest = math.radians(self.config.correction_speed_limit_deg_s)
             largest = max(map(abs, added.tolist()))
             velocity = velocity + added * min(1.0, fastest / max(largest, 1e-12))
-        return LawOutput(moment.position + self.period * velocity, velocity, np.array(correction), q_d)
+        return LawOutput(moment.position + self.period * velocity, velocity, correction, q_d)
 
-    def _feedback(self, wanted: Rows, seen: Rows) -> list[float]:
-        zyx = zyx_angles(seen)
-        w = angular_velocity(zyx, euler_difference(zyx_angles(wanted), zyx))
-        v = (wanted_row[3] - row[3] for wanted_row, row in zip(wanted, seen, strict=True))
-        return [gain * part for gain, part in zip(self.gains, (*w, *v), strict=True)]
+    def _feedback(self, wanted: np.ndarray, seen: np.ndarray) -> np.ndarray:
+        zyx = zyx_angles(seen.tolist())
+        w = angular_velocity(zyx, euler_difference(zyx_angles(wanted.tolist()), zyx))
+        return self.gains * np.concatenate([w, wanted[:, 3] - seen[:, 3]])

@@ -8,7 +8,7 @@ import numpy as np
 from robots.configuration.quantity import choice
 from robots.description.model import NUM_JOINTS
 from robots.kinematics.forward import rotation_about
-from robots.pose import Rows, error_of_rows, rotation_vector
+from robots.pose import error_of_rows, rotation_vector
 from systems.controller_model import ControllerModel
 from systems.guard.guard import GuardConfig
 from systems.reference.paths import CartesianPath
@@ -27,14 +27,14 @@ class RotationVectorCorrection:
     however large it is. C is kept as its rotation vector in rad.
     """
 
-    def initial(self, X_WE: Rows, X_WD: Rows) -> np.ndarray:
+    def initial(self, X_WE: np.ndarray, X_WD: np.ndarray) -> np.ndarray:
         """The correction with which the command is X_WE, shape (3,)."""
         return -_error_in_tool(X_WD, X_WE)
 
     def check_path(self, path: CartesianPath) -> None:
         """Any path will do."""
 
-    def rate(self, X_WD: Rows, X_WE: Rows) -> np.ndarray:
+    def rate(self, X_WD: np.ndarray, X_WE: np.ndarray) -> np.ndarray:
         """e in rad, shape (3,)."""
         return _error_in_tool(X_WD, X_WE)
 
@@ -103,7 +103,7 @@ class PositionLevel(ServoLaw):
     def initial_state(self, moment: LawInput) -> np.ndarray:
         """c at minus the initial error, the joints where they are measured."""
         rows, _ = self.kinematics.rows_and_jacobian(moment.position)
-        shift = [row[3] - wanted[3] for row, wanted in zip(rows, moment.X_WD, strict=True)]
+        shift = rows[:, 3] - moment.X_WD[:, 3]
         turn = self._orientation.initial(rows, moment.X_WD)
         return np.concatenate([turn, shift, moment.position, np.zeros(2 * NUM_JOINTS)])
 
@@ -114,17 +114,16 @@ class PositionLevel(ServoLaw):
         if moment.measured is not None:
             wanted, seen = moment.measured
             turning = self.config.rotation * self._orientation.rate(wanted, seen)
-            moving = self.config.translation * np.array(
-                [a[3] - b[3] for a, b in zip(wanted, seen, strict=True)]
-            )
+            moving = self.config.translation * (wanted[:, 3] - seen[:, 3])
             turn = self._orientation.moved(turn, self.period * turning)
             shift = shift + self.period * moving
         turn = _limited(turn, self.angle_limit)
         shift = _limited(shift, self.config.correction_limit)
-        X_WD, V_WD = np.array(moment.X_WD), np.array(moment.V_WD)
+        X_WD, V_WD = moment.X_WD, moment.V_WD
         R_WC, w_WC, correction = self._orientation.command(turn, turning, X_WD[:, :3], V_WD[:3])
-        X_WC = np.column_stack([R_WC, X_WD[:, 3] + shift]).tolist()
-        joints = self.joints_at(X_WC, [*w_WC.tolist(), *(V_WD[3:] + moving).tolist()], memory[_JOINTS])
+        X_WC = np.empty((3, 4))
+        X_WC[:, :3], X_WC[:, 3] = R_WC, X_WD[:, 3] + shift
+        joints = self.joints_at(X_WC, np.concatenate([w_WC, V_WD[3:] + moving]), memory[_JOINTS])
         return LawOutput(
             joints[:6],
             joints[6:12],
@@ -136,9 +135,9 @@ class PositionLevel(ServoLaw):
 _CORRECTIONS = {"rotation_vector": RotationVectorCorrection, "euler": EulerCorrection}
 
 
-def _error_in_tool(X_WD: Rows, X_WE: Rows) -> np.ndarray:
+def _error_in_tool(X_WD: np.ndarray, X_WE: np.ndarray) -> np.ndarray:
     """The rotation vector of R_WE^T R_WD, (3,) in rad: the error's in the axes of the tool."""
-    return np.array(error_of_rows(X_WD, X_WE)[:3]) @ np.array(X_WE)[:, :3]
+    return np.array(error_of_rows(X_WD.tolist(), X_WE.tolist())[:3]) @ X_WE[:, :3]
 
 
 def _exp(turn: np.ndarray) -> np.ndarray:

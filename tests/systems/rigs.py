@@ -143,7 +143,7 @@ class _Wanted:
 
     def moment(self, t: float) -> PathMoment:
         X_WD, V_WD = self.path(t)
-        return PathMoment(X_WD[:3].tolist(), V_WD.tolist(), [0.0] * 6)
+        return PathMoment(X_WD[:3], V_WD, np.zeros(6))
 
 
 def assert_within_limits(robot: RobotModel, positions: np.ndarray, velocities: np.ndarray) -> None:

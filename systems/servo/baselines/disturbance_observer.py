@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from robots.pose import error_of_rows
+from robots.pose import pose_error
 from systems.controller_model import ControllerModel
 from systems.guard.guard import GuardConfig
 from systems.servo.law import LawInput, LawOutput, ServoLaw, integrate_twist
@@ -42,12 +42,12 @@ class DisturbanceObserver(ServoLaw):
         correction, rate = memory[_CORRECTION], np.zeros(6)
         if moment.measured is not None:
             in_force = memory[-6:]
-            disturbance = np.array(error_of_rows(*moment.measured)) + in_force
-            wish = np.array(self.gains) * (disturbance - correction)
-            rate = np.array(self.within_limits(wish.tolist(), correction.tolist()))
+            disturbance = pose_error(*moment.measured) + in_force
+            wish = self.gains * (disturbance - correction)
+            rate = self.within_limits(wish, correction)
         correction = correction + self.period * rate
-        X = integrate_twist(np.array(moment.X_WD), correction)
-        joints = self.joints_at(X.tolist(), (np.array(moment.V_WD) + rate).tolist(), memory[_JOINTS])
+        X = integrate_twist(moment.X_WD, correction)
+        joints = self.joints_at(X, moment.V_WD + rate, memory[_JOINTS])
         past = memory[_CORRECTION.stop : -6]
         memory = np.concatenate([joints, correction, correction, past])
         return LawOutput(joints[:6], joints[6:12], correction, memory)

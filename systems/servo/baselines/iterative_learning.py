@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from robots.pose import error_of_rows
+from robots.pose import pose_error
 from systems.controller_model import ControllerModel
 from systems.guard.guard import GuardConfig
 from systems.reference.paths import CartesianPath
@@ -63,13 +63,12 @@ class IterativeLearning(ServoLaw):
 
     def step(self, moment: LawInput, memory: np.ndarray) -> LawOutput:
         """The joints for the displaced pose."""
-        memory = memory.copy()
         commanded, learnt = memory[_HEAD:].reshape(2, self._longest, 6)[:, : self._lap]
         time = memory[_COUNT] * self.period
         correction = memory[_CORRECTION].copy()
         now, exposed = self._tick_of_path(time + self._ahead), self._tick_of_path(time - self._ago)
         last = self._lap * self._laps
-        error = None if moment.measured is None else np.array(error_of_rows(*moment.measured))
+        error = None if moment.measured is None else pose_error(*moment.measured)
         if error is not None and 0 <= exposed < last:
             place = exposed % self._lap
             learnt[place] = commanded[place] + _LEARNING * error
@@ -82,10 +81,10 @@ class IterativeLearning(ServoLaw):
             rate = (wanted - correction) / self.period
             commanded[now % self._lap] = wanted
         elif error is not None and (now < 0 or exposed >= last):
-            rate = np.array(self.within_limits((np.array(self.gains) * error).tolist(), correction.tolist()))
+            rate = self.within_limits(self.gains * error, correction)
         correction = correction + self.period * rate
-        X = integrate_twist(np.array(moment.X_WD), correction)
-        joints = self.joints_at(X.tolist(), (np.array(moment.V_WD) + rate).tolist(), memory[_JOINTS])
+        X = integrate_twist(moment.X_WD, correction)
+        joints = self.joints_at(X, moment.V_WD + rate, memory[_JOINTS])
         memory[_JOINTS], memory[_COUNT], memory[_CORRECTION] = joints, memory[_COUNT] + 1.0, correction
         return LawOutput(joints[:6], joints[6:12], correction, memory)
 

@@ -34,7 +34,7 @@ def commanded(law: str, robot: RobotModel, offset: float = 0.0, gain: float = 5.
     start = inverse_kinematics(robot).nearest(X[0], HOME) + offset
     memory, positions = None, []
     for X_WD, V_WD in zip(X, V, strict=True):
-        moment = LawInput(X_WD[:3].tolist(), V_WD.tolist(), start, None)
+        moment = LawInput(X_WD[:3], V_WD, start, None)
         memory = system.initial_state(moment) if memory is None else memory
         step = system.step(moment, memory)
         memory = step.memory

@@ -16,7 +16,7 @@ from systems.guard.guard import GuardConfig
 from systems.reference.paths import ReferenceConfig, make_path
 from systems.samples import PoseSample
 from systems.servo import LAWS, LawConfig
-from systems.servo.sine_feedback import sine_feedback
+from systems.servo.kernels import sine_feedback
 from tests.systems.rigs import PERIOD, LawRig, pose
 
 ROBOT = load_robot("irb1200")
@@ -81,7 +81,7 @@ def test_the_closed_form_of_the_feedback_is_the_corrected_law():
         L = sine_error_rate_matrix(HOME[:3, :3], seen[:, :3])
         error = sine_pose_error(HOME[:3], seen)
         expected = np.linalg.solve(L, L.T @ V[:3] + 7.0 * error[:3])
-        feedback = sine_feedback(HOME[:3].tolist(), seen.tolist(), V.tolist(), 7.0, 3.0)
+        feedback = sine_feedback(HOME[:3], seen, V, 7.0, 3.0)
         assert V[:3] + feedback[:3] == pytest.approx(expected, abs=1e-12)
         assert feedback[3:] == pytest.approx(3.0 * error[3:], abs=1e-15)
 
@@ -90,7 +90,7 @@ def test_the_closed_form_of_the_feedback_is_the_corrected_law():
 def test_far_from_the_wanted_orientation_the_feedback_still_turns_the_shorter_way(angle_deg: float):
     """At 90 degrees L cannot be inverted; from 60 degrees on the sine of the angle counts alone."""
     seen = displaced(np.array([0.0, 0.0, np.deg2rad(angle_deg), 0.0, 0.0, 0.0]))[:3]
-    feedback = sine_feedback(HOME[:3].tolist(), seen.tolist(), [1.0] * 6, 7.0, 3.0)
+    feedback = sine_feedback(HOME[:3], seen, np.ones(6), 7.0, 3.0)
     assert feedback[:3] == pytest.approx(7.0 * sine_pose_error(HOME[:3], seen)[:3], abs=1e-12)
     assert np.linalg.norm(feedback[:3]) == pytest.approx(7.0 * np.sin(np.deg2rad(angle_deg)))
 

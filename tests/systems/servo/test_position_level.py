@@ -96,5 +96,5 @@ def test_euler_angles_refuse_a_path_near_their_singular_orientation():
         law(0.0, "quaternion")
 
 
-def _rows(R: np.ndarray) -> list[list[float]]:
-    return np.column_stack([R, np.zeros(3)]).tolist()
+def _rows(R: np.ndarray) -> np.ndarray:
+    return np.column_stack([R, np.zeros(3)])

@@ -1,0 +1,145 @@
+"""What laws work out in every tick, compiled by numba. Poses are the first three rows of matrices, (3, 4).
+
+numba takes a third of a second to import: a law imports this module when it is made, not before.
+"""
+
+import math
+
+import numpy as np
+
+from robots.kinematics.kernels import compiled, robust_solve
+from systems.estimation.kernels.poses import error
+
+_SMALLEST_COSINE = math.cos(math.radians(60.0))  # L is singular at 90 degrees
+_NEWTON_STEP = 5e-5  # rad; what one such step leaves is its square, a few nanometres
+_DAMPED = 1e-10  # rad and m that a step leaves which was not damped
+
+
+@compiled
+def distance(wanted, seen):
+    """The squared distance of two poses in m^2, and the trace of the rotation between them."""
+    gap_squared = trace = 0.0
+    for i in range(3):
+        gap_squared += (wanted[i, 3] - seen[i, 3]) ** 2
+        for j in range(3):
+            trace += wanted[i, j] * seen[i, j]
+    return gap_squared, trace
+
+
+@compiled
+def limit_twist(twist, correction, angle_limit, limit):
+    """Takes from a twist (6,) what makes a correction (6,) larger that stands at its limit in rad or m."""
+    for part in range(2):
+        largest, first = (angle_limit, 0) if part == 0 else (limit, 3)
+        square = along = 0.0
+        for i in range(first, first + 3):
+            square += correction[i] ** 2
+            along += correction[i] * twist[i]
+        if square >= largest**2 and along > 0.0:
+            for i in range(first, first + 3):
+                twist[i] = 0.0
+
+
+@compiled
+def sine_feedback(wanted, seen, V_WD, rotation, translation):
+    """L^-1 (L^T V_d + K e-bar) - V_d, what feedback adds to V_d in Probst (2024) eq. (5.8), L corrected.
+
+    L has the closed-form solutions L^-1 L^T w = (R R_d^T) w and L^-1 e-bar = e-bar / cos(angle). Beyond 60
+    degrees L = I, which is its limit for small errors: the tool is then still turned the shorter way round.
+
+    Args:
+        wanted, seen: poses.
+        V_WD: the wanted twist, (6,) in rad/s and m/s.
+        rotation, translation: gains in 1/s.
+
+    Returns:
+        A twist (6,).
+    """
+    R = np.empty((3, 3))
+    for i in range(3):
+        for j in range(3):
+            R[i, j] = wanted[i, 0] * seen[j, 0] + wanted[i, 1] * seen[j, 1] + wanted[i, 2] * seen[j, 2]
+    twist = np.empty(6)
+    for i in range(3):
+        j, k = (i + 1) % 3, (i + 2) % 3
+        twist[i] = 0.5 * rotation * (R[k, j] - R[j, k])
+        twist[3 + i] = translation * (wanted[i, 3] - seen[i, 3])
+    cosine = 0.5 * (R[0, 0] + R[1, 1] + R[2, 2] - 1.0)
+    if cosine > _SMALLEST_COSINE:
+        for i in range(3):
+            turned = R[0, i] * V_WD[0] + R[1, i] * V_WD[1] + R[2, i] * V_WD[2]
+            twist[i] = twist[i] / cosine + turned - V_WD[i]
+    return twist
+
+
+@compiled
+def follow_path(X_WD, V_WD, X_WE, J):
+    """Motions of the joints as columns, (6, 2): the step in rad from X_WE to X_WD, the rates for V_WD."""
+    return robust_solve(J, _to_path(X_WD, V_WD, X_WE))
+
+
+@compiled
+def _to_path(X_WD, V_WD, X_WE):
+    twists, way = np.empty((6, 2)), np.empty(6)
+    error(X_WD, X_WE, way)
+    for i in range(6):
+        twists[i, 0], twists[i, 1] = way[i], V_WD[i]
+    return twists
+
+
+@compiled
+def newton_step(X_WD, V_WD, X_WE, J, lower, upper, joints):
+    """One step from joints where the tool is at X_WE to those for a wanted pose and twist.
+
+    Args:
+        X_WD, V_WD: where to be.
+        X_WE, J: pose and Jacobian at ``joints[:6]``.
+        lower, upper: the range of the joints, (6,) rad.
+        joints: (12,), positions in rad, to which the step is added, and velocities in rad/s, which are found.
+
+    Returns:
+        Whether the step was so small, and so exact, that another one would change nothing.
+    """
+    twists = _to_path(X_WD, V_WD, X_WE)
+    rates = robust_solve(J, twists)
+    step = left = 0.0
+    is_inside = True
+    for i in range(6):
+        joints[i] += rates[i, 0]
+        joints[6 + i] = rates[i, 1]
+        is_inside = is_inside and lower[i] <= joints[i] <= upper[i]
+        step += rates[i, 0] ** 2
+        rest = twists[i, 0]
+        for k in range(6):
+            rest -= J[i, k] * rates[k, 0]
+        left += rest**2
+    return is_inside and step <= _NEWTON_STEP**2 and left <= _DAMPED**2
+
+
+@compiled
+def numerical_ik(X_WD, V_WD, X_WE, J, halfway, memory, period):
+    """The memory of the next tick, (18,), of `systems.servo.numerical_ik.NumericalIk`.
+
+    Args:
+        X_WD, V_WD: wanted pose, and the twist towards it.
+        X_WE, J: pose and Jacobian at the joints ``halfway``, (6,) rad.
+        memory: of the last tick, (18,).
+        period: of a tick in s.
+    """
+    rates = follow_path(X_WD, V_WD, X_WE, J)
+    following = np.empty(18)
+    for i in range(6):
+        following[i] = halfway[i] + rates[i, 0]
+        following[6 + i] = memory[6 + i] + 0.5 * period * (rates[i, 1] + memory[12 + i])
+        following[12 + i] = rates[i, 1]
+    return following
+
+
+def warm_up() -> None:
+    """Calls everything once with arrays as a tick has them, so that no tick waits for a compiler."""
+    X, J, V = np.eye(4)[:3].copy(), np.eye(6), np.zeros(6)
+    distance(X, X)
+    limit_twist(sine_feedback(X, X, V, 1.0, 1.0), V, 1.0, 1.0)
+    follow_path(X, V, X, J)
+    newton_step(X, V, X, J, V, V, np.zeros(12))
+    numerical_ik(X, V, X, J, V, np.zeros(18), 1.0)
