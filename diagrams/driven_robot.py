@@ -75,16 +75,23 @@ class DrivenRobot:
         """Vector 12, where the interpolated commands are: positions (rad) and velocities (rad/s)."""
         return self.signals.setpoint
 
-    def set_at_rest(self, root_context: Context, theta: np.ndarray) -> None:
-        """Puts the motors at theta (rad, shape (6,)), everything at rest."""
+    def set_at_rest(self, root_context: Context, theta: np.ndarray, true: np.ndarray | None = None) -> None:
+        """Puts everything at rest where the drives see the motors at theta (rad, shape (6,)).
+
+        Args:
+            root_context: of the whole diagram.
+            theta: what the encoders say.
+            true: where the motors are then; None for theta.
+        """
+        true = theta if true is None else true
         context = self.plant.GetMyMutableContextFromRoot(root_context)
         train, still = self.drive_train, np.zeros(NUM_JOINTS)
-        self.links.set_at_rest(context, theta, train.wind_up if train else None)
+        self.links.set_at_rest(context, true, train.wind_up if train else None)
         self.drive.set_at_rest(root_context, theta)
         setpoint_and_integral = [theta, still, still]
         if train:
-            train.set_at_rest(root_context, theta, self._load(context))
-            setpoint_and_integral = [theta, still, *setpoint_and_integral]
+            train.set_at_rest(root_context, true, self._load(context))
+            setpoint_and_integral = [true, still, *setpoint_and_integral]
         motors = self.motors.GetMyMutableContextFromRoot(root_context)
         motors.SetContinuousState(np.concatenate(setpoint_and_integral))
 

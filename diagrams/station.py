@@ -17,7 +17,7 @@ from diagrams.scenario.scenario import StationConfig
 from diagrams.true_robot import true_robot, with_payload_centre
 from robots.description.model import NUM_JOINTS, RobotModel
 from robots.dynamics.payload_change import carried_inertia
-from systems.cell.encoders import Encoders, SteppedReading, eccentric_discs
+from systems.cell.encoders import Encoders, SteppedReading, erring_encoders
 from systems.cell.events.changing_delay import ChangingDelay, shortest_dead_time
 from systems.cell.events.displaced_view import DisplacedView
 from systems.cell.events.station_events import (
@@ -119,7 +119,7 @@ class SimulatedStation(Diagram):
             config.drive, dead_time=shortest_dead_time(config.events, config.drive.dead_time)
         )
         self._encoders = Encoders(robot, config.encoder)
-        discs = eccentric_discs(self._encoders) if self._encoders.is_eccentric else None
+        discs = erring_encoders(self._encoders) if self._encoders.have_errors else None
         config = replace(config, drive=drive_config)
         self._driven = add_driven_robot(builder, robot, self._true_robot, config, drive, discs, takes_torque)
         self.robot, self.drive = self._driven.links, self._driven.drive
@@ -210,8 +210,8 @@ class SimulatedStation(Diagram):
         return noise
 
     def set_at_rest(self, root_context: Context, theta: np.ndarray, seed: int) -> None:
-        """Puts the motors at theta (rad, shape (6,)), everything at rest, and seeds the camera's noise."""
-        self._driven.set_at_rest(root_context, theta)
+        """Puts the motors where encoders say theta (rad, (6,)), all at rest, and seeds the camera's noise."""
+        self._driven.set_at_rest(root_context, theta, self._encoders.true_position(theta))
         if self._delay:
             self._delay.set_at_rest(self._delay.GetMyMutableContextFromRoot(root_context), theta)
         if self._motion:

@@ -27,6 +27,7 @@ from robots.measurement_design.candidate_grid import own_ranges
 from robots.measurement_design.constraints import AdmissibleConfigurations
 from robots.measurement_design.design import MeasurementDesign
 from robots.measurement_design.visiting_order import visiting_order
+from systems.cell.encoders import Encoders
 
 # The source's validation set has 125 configurations, Probst (2024) section 4.3.
 VALIDATION_COUNT = 125
@@ -200,13 +201,24 @@ def refuse_the_harmful(before: ErrorStatistics | None, after: ErrorStatistics | 
 def true_values(scenario: Scenario, robot: RobotModel, identified: Identified) -> np.ndarray:
     """What a simulated station has in place of the values that were identified, (m,) in SI units.
 
-    The geometry is that of the true robot, described by the same independent parameters, exactly.
+    Geometry and errors of the joints are those of the true robot, described by the same independent
+    parameters, exactly; but for the ripple of gears, which changes with their load.
     """
     errors = scenario.station.errors
     true = ErrorKinematics(robot).robot_with_errors(errors.vector(robot)) if errors else robot
     chosen = identified.reduction.independent
-    geometry = identified.reducible.describe(Kinematics(true).forward, chosen, identified.x)
     is_elastic = scenario.station.elasticity != "rigid"
+    encoders, kinematics = Encoders(robot, scenario.station.encoder), Kinematics(true)
+    ripples = [joint.drive_train.ratio_error for joint in robot.joints] if is_elastic else []
+
+    def forward(q: np.ndarray) -> np.ndarray:
+        links = encoders.true_position(q)
+        for i, ripple in enumerate(ripples):
+            if ripple:
+                links[:, i] += ripple.part(robot.gear_ratio[i]).position_error(links[:, i])[0]
+        return kinematics.forward(links)
+
+    geometry = identified.reducible.describe(forward, chosen, identified.x)
     compliance = dict(zip(COMPLIANCE_NAMES, is_elastic / robot.joint_stiffness, strict=True))
     return np.array([*geometry, *(compliance[name] for name in identified.names[len(chosen) :])])
 

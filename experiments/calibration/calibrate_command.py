@@ -90,8 +90,8 @@ def calibrate_command(
         str,
         typer.Option(
             metavar="A,B,...",
-            help="Also identify errors that depend on joint angles: scale (of encoders), eccentricity, "
-            "coupling (of wrist axes).",
+            help="Also identify errors that depend on joint angles: scale (of encoders), eccentricity (once "
+            "per turn), motor and strain_wave (once and twice per turn of the motor), coupling (in a wrist).",
         ),
     ] = "",
     fixed: Annotated[

@@ -22,6 +22,9 @@ def in_words(name: str) -> str:
         return f"joint {kind}, scale of the encoder"
     if part in ("sine", "cosine"):
         return f"joint {kind}, eccentricity ({part})"
+    if part in ("motor", "wave"):
+        wave, _, joint = kind.partition("_")
+        return f"joint {joint}, {'once' if part == 'motor' else 'twice'} per turn of the motor ({wave})"
     if part == "coupling":
         return f"joint {kind[1]}, turned along by joint {kind[0]}"
     if part == "c":
@@ -56,7 +59,7 @@ def rounded(value: float, uncertainty: float) -> tuple[str, str]:
 def icon(name: str, robot: RobotModel) -> Markup:
     """The axes of a frame with an arrow along the one that is shifted, or around the one that is turned."""
     part, _, kind = name.partition("_")
-    if part in ("zero", "scale", "c", "sine", "cosine", "coupling"):
+    if part in ("zero", "scale", "c", "sine", "cosine", "motor", "wave", "coupling"):
         axis = "xyz"[int(np.argmax(np.abs(robot.axes[int(kind[-1]) - 1])))]
         is_turn = True
     else:

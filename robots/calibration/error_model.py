@@ -60,7 +60,7 @@ class ErrorModel:
         self.robot = robot
         self.joint_errors = names_of(joint_errors)
         self.names = _PLACED + _ZEROS + self.joint_errors
-        self._errors = JointErrors(self.joint_errors)
+        self._errors = JointErrors(self.joint_errors, robot.gear_ratio)
         poses = [
             part.pose().GetAsMatrix4()
             for part in (robot.base, *(joint.placement for joint in robot.joints), robot.tool)
@@ -74,13 +74,16 @@ class ErrorModel:
         """How many parameters there are."""
         return len(self.names)
 
-    def forward(self, q: np.ndarray, x: np.ndarray) -> np.ndarray:
-        """Tool poses X_WE, (n, 6) in rad -> (n, 4, 4). Raises ValueError for other shapes."""
-        return self._evaluate(q, x, with_regressor=False)[0].X_WE
+    def forward(self, q: np.ndarray, x: np.ndarray, read: np.ndarray | None = None) -> np.ndarray:
+        """Tool poses X_WE, (n, 6) in rad -> (n, 4, 4). Raises ValueError for other shapes.
 
-    def chain(self, q: np.ndarray, x: np.ndarray) -> Chain:
-        """Where the tool and all links stand. Raises ValueError for other shapes."""
-        return self._evaluate(q, x, with_regressor=False)[0]
+        Errors of the joints depend on the positions that are ``read``, those of the motors; None for q.
+        """
+        return self._evaluate(q, x, read, with_regressor=False)[0].X_WE
+
+    def chain(self, q: np.ndarray, x: np.ndarray, read: np.ndarray | None = None) -> Chain:
+        """Where the tool and all links stand, as `forward`. Raises ValueError for other shapes."""
+        return self._evaluate(q, x, read, with_regressor=False)[0]
 
     def forward_and_regressor(self, q: np.ndarray, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Tool poses (n, 4, 4) and regressors (n, 6, len(self)).
@@ -91,9 +94,11 @@ class ErrorModel:
         chain, Theta = self.chain_and_regressor(q, x)
         return chain.X_WE, Theta
 
-    def chain_and_regressor(self, q: np.ndarray, x: np.ndarray) -> tuple[Chain, np.ndarray]:
-        """As `forward_and_regressor`, with the places of all links."""
-        chain, Theta = self._evaluate(q, x, with_regressor=True)
+    def chain_and_regressor(
+        self, q: np.ndarray, x: np.ndarray, read: np.ndarray | None = None
+    ) -> tuple[Chain, np.ndarray]:
+        """As `forward_and_regressor`, with the places of all links; ``read`` as in `forward`."""
+        chain, Theta = self._evaluate(q, x, read, with_regressor=True)
         assert Theta is not None
         return chain, Theta
 
@@ -124,7 +129,7 @@ class ErrorModel:
         return replace(self.robot, base=corrected[0], joints=joints, tool=corrected[-1])
 
     def _evaluate(
-        self, q: np.ndarray, x: np.ndarray, with_regressor: bool
+        self, q: np.ndarray, x: np.ndarray, read: np.ndarray | None, with_regressor: bool
     ) -> tuple[Chain, np.ndarray | None]:
         q, x = np.asarray(q, dtype=float), np.asarray(x, dtype=float)
         if q.ndim != 2 or q.shape[1] != NUM_JOINTS:
@@ -132,9 +137,9 @@ class ErrorModel:
         if x.shape != (len(self),):
             raise ValueError(f"error parameters must have the shape ({len(self)},), got {x.shape}")
         placed, zeros = x[:NUM_PLACED].reshape(-1, 2, 3), x[ZEROS]
-        angles = q + zeros
+        angles, read = q + zeros, q if read is None else read
         if self.joint_errors:
-            angles = angles + self._errors.added(q, x[_NUM_DRAWN:])
+            angles = angles + self._errors.added(read, x[_NUM_DRAWN:])
         sines, versines = np.sin(angles)[..., None, None], 1.0 - np.cos(angles)[..., None, None]
         n = len(q)
         R, p = np.broadcast_to(_EYE, (n, 3, 3)), np.zeros((n, 3))
@@ -156,18 +161,18 @@ class ErrorModel:
         X = np.zeros((n, 4, 4))
         X[:, :3, :3], X[:, :3, 3], X[:, 3, 3] = R, p, 1.0
         chain = Chain(X, np.array(R_WL), np.array(origins[1:-1]), np.array(axes))
-        return chain, self._regressor(q, chain, shifts, turns, origins) if with_regressor else None
+        return chain, self._regressor(read, chain, shifts, turns, origins) if with_regressor else None
 
     def _regressor(
         self,
-        q: np.ndarray,
+        read: np.ndarray,
         chain: Chain,
         shifts: list[np.ndarray],
         turns: list[np.ndarray],
         origins: list[np.ndarray],
     ) -> np.ndarray:
         """Columns [0; b] of translations along b, [w; w x (p_WE - p_Wi)] of rotations about w, (n, 6, m)."""
-        n = len(q)
+        n = len(read)
         Theta = np.zeros((n, 6, len(self)))
         levers = chain.X_WE[:, None, :3, 3] - np.stack(origins, 1)  # (n, 8, 3)
         placed = Theta[:, :, :NUM_PLACED].reshape(n, 6, len(PLACEMENTS), 6)  # a view
@@ -180,7 +185,7 @@ class ErrorModel:
         Theta[:, 3:, ZEROS] = _cross(a, np.swapaxes(levers[:, 1:-1], 1, 2))
         if self.joint_errors:
             moved = Theta[:, :, ZEROS][:, :, self._errors.joint]
-            Theta[:, :, _NUM_DRAWN:] = moved * self._errors.effects(q)[:, None, :]
+            Theta[:, :, _NUM_DRAWN:] = moved * self._errors.effects(read)[:, None, :]
         return Theta
 
 

@@ -15,6 +15,7 @@ TRANSLATION = 10e-3  # m, standard deviation of each coordinate of a placement
 ROTATION = float(np.deg2rad(2.0))  # rad, of each rotation of a placement and of the zero of a joint
 SCALE = 1e-3  # of an encoder or a coupling: share of the angle
 ECCENTRICITY = 1e-3  # rad, amplitude of what an eccentric disc or gear does
+RIPPLE = 1e-4  # rad, of what repeats with the turns of the motor
 OWN_FRAME = 1.0  # m and rad, of the base in a frame that has nothing to do with the robot
 COMPLIANCES = 3.0  # times what the stiffness in the robot file says
 MASS = 0.05  # of the masses in a robot file and of a payload, relative
@@ -36,6 +37,8 @@ def parameter_sizes(names: Sequence[str], is_own_frame: bool = False) -> np.ndar
             sizes.append(SCALE)
         elif part in ("sine", "cosine"):
             sizes.append(ECCENTRICITY)
+        elif part in ("motor", "wave"):
+            sizes.append(RIPPLE)
         elif part == "base" and is_own_frame:
             sizes.append(OWN_FRAME)
         else:

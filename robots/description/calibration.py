@@ -5,7 +5,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from robots.configuration.quantity import numbers
-from robots.description.joint_errors import JointErrors
+from robots.description.joint_errors import check_names
 
 _JOINTS = 6
 
@@ -42,7 +42,7 @@ class Calibration:
     def problem(self) -> str:
         """Why this is no calibration, or an empty string."""
         try:
-            JointErrors(tuple(self.joint_errors))
+            check_names(tuple(self.joint_errors))
         except ValueError as error:
             return f"calibration: {error}"
         sizes = [len(self.names), len(self.values), len(self.covariance)]

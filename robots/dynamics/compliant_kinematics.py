@@ -38,7 +38,10 @@ class CompliantKinematics:
         self._rigid = Kinematics(robot)
         self._compliance = robot.compliance
         found = robot.calibration.joint_errors
-        self._errors, self._values = JointErrors(tuple(found)), np.array(list(found.values()))
+        self._errors, self._values = (
+            JointErrors(tuple(found), robot.gear_ratio),
+            np.array(list(found.values())),
+        )
         self._plant = MultibodyPlant(0.0)
         self._parts = add_robot(self._plant, robot, "rigid", payload)
         self._plant.Finalize()
@@ -58,14 +61,11 @@ class CompliantKinematics:
 
     def link_positions(self, theta: np.ndarray) -> np.ndarray:
         """Where the links stand at motor positions in rad, (..., 6) -> (..., 6)."""
-        q = theta
+        true = theta + self._errors.added(theta, self._values) if len(self._values) else theta
+        q = true
         for _ in range(_ROUNDS if self._compliance.any() else 0):
-            q = theta + self._compliance * self.gravity_torque(self._erring(q))
-        return self._erring(q)
-
-    def _erring(self, q: np.ndarray) -> np.ndarray:
-        """Where joints stand that should be at q."""
-        return q + self._errors.added(q, self._values) if len(self._values) else q
+            q = true + self._compliance * self.gravity_torque(q)
+        return q
 
     def forward(self, q: np.ndarray) -> np.ndarray:
         """Tool poses X_WE at motor positions q in rad, (..., 6) -> (..., 4, 4)."""

@@ -1,4 +1,4 @@
-"""Encoders that are not perfect: a disc off its centre, and angles in whole steps."""
+"""Encoders that are not perfect: discs off their centres, wrong scales, coupled wrists, whole steps."""
 
 from dataclasses import dataclass, field
 
@@ -7,11 +7,13 @@ from pydrake.symbolic import Expression, MakeVectorContinuousVariable, cos, sin
 from pydrake.systems.framework import BasicVector, Context, DiscreteValues, LeafSystem
 from pydrake.systems.primitives import SymbolicVectorSystem
 
-from robots.configuration.quantity import choice, quantity
+from robots.configuration.quantity import choice, quantity, vector
 from robots.description.model import NUM_JOINTS, RobotModel
 
 SIDES = ("joint", "motor")
 _MOST_BITS = 32
+_COUPLED = ((3, 4), (3, 5), (4, 5))  # of the wrist: the first turns the second along
+_ROUNDS = 30  # of a search that gains a decimal or more in each
 
 
 @dataclass
@@ -24,6 +26,10 @@ class EncoderConfig:
     # Largest error of a disc's angle, once a turn of it
     eccentricity_deg: float = quantity(0.0, 0.0, 10.0, "deg")
     phase_deg: np.ndarray = field(default_factory=lambda: np.zeros(NUM_JOINTS))  # of that error at zero
+    # By how much the joints turn more than their encoders tell, in millionths
+    scale_ppm: np.ndarray = vector((0.0,) * NUM_JOINTS, -1e5, 1e5, "ppm")
+    # By how much joint 4 turns joints 5 and 6 along, and joint 5 joint 6, unseen by encoders, in millionths
+    coupling_ppm: np.ndarray = vector((0.0,) * len(_COUPLED), -1e5, 1e5, "ppm")
 
 
 class Encoders:
@@ -47,6 +53,10 @@ class Encoders:
         self.step = 2.0 * np.pi / 2**config.bits / self.turns if config.bits else np.zeros(NUM_JOINTS)
         self.amplitude = np.deg2rad(config.eccentricity_deg) / self.turns
         self.phase = np.deg2rad(np.asarray(config.phase_deg, dtype=float))
+        self._true = np.diag(1.0 + 1e-6 * np.asarray(config.scale_ppm, dtype=float))
+        for (source, joint), ppm in zip(_COUPLED, config.coupling_ppm, strict=True):
+            self._true[joint, source] = 1e-6 * ppm
+        self.linear = np.linalg.inv(self._true)  # what discs say of true positions but for the waves
 
     @property
     def has_steps(self) -> bool:
@@ -54,13 +64,21 @@ class Encoders:
         return bool(self.step.any())
 
     @property
-    def is_eccentric(self) -> bool:
-        """Whether the discs are off their centres."""
-        return bool(self.amplitude.any())
+    def have_errors(self) -> bool:
+        """Whether they are wrong by more than their steps."""
+        return bool(self.amplitude.any() or (self._true != np.eye(NUM_JOINTS)).any())
 
     def angle(self, theta: np.ndarray) -> np.ndarray:
-        """What eccentric discs of infinitely many steps say of true motor positions in rad."""
-        return theta + self.amplitude * np.sin(self.turns * theta + self.phase)
+        """What discs of infinitely many steps say of true motor positions in rad, (..., 6)."""
+        return theta @ self.linear.T + self.amplitude * np.sin(self.turns * theta + self.phase)
+
+    def true_position(self, angle: np.ndarray) -> np.ndarray:
+        """True motor positions in rad at which the discs say these angles, the reverse of `angle`."""
+        theta = np.asarray(angle, dtype=float) @ self._true.T
+        for _ in range(_ROUNDS if self.amplitude.any() else 0):
+            waves = self.amplitude * np.sin(self.turns * theta + self.phase)
+            theta = (angle - waves) @ self._true.T
+        return theta
 
     def rounded(self, angle: np.ndarray) -> np.ndarray:
         """Angles in rad to whole steps."""
@@ -69,23 +87,24 @@ class Encoders:
         return self.step * np.round(angle / self.step)
 
 
-def eccentric_discs(encoders: Encoders) -> SymbolicVectorSystem:
+def erring_encoders(encoders: Encoders) -> SymbolicVectorSystem:
     """From the true motor state to the one that the discs say, 12 numbers each.
 
-    The drives control what the discs say, so that the motors are wrong by the error of the discs. A system of
-    Drake's own, for it is asked at every stage of every step of the integrator.
+    The drives control what the discs say, so that the motors are wrong by the errors of the encoders. A
+    system of Drake's own, for it is asked at every stage of every step of the integrator.
     """
     state = MakeVectorContinuousVariable(2 * NUM_JOINTS, "x")
     outputs = []
     for order in range(2):
+        own = [Expression(each) for each in state[order * NUM_JOINTS : (order + 1) * NUM_JOINTS]]
         for i in range(NUM_JOINTS):
             turn = float(encoders.turns[i]) * Expression(state[i]) + float(encoders.phase[i])
             amplitude = float(encoders.amplitude[i])
+            said = sum((float(encoders.linear[i, j]) * own[j] for j in range(NUM_JOINTS)), Expression(0.0))
             if order == 0:
-                outputs.append(Expression(state[i]) + amplitude * sin(turn))
+                outputs.append(said + amplitude * sin(turn))
             else:
-                slope = 1.0 + amplitude * float(encoders.turns[i]) * cos(turn)
-                outputs.append(Expression(state[NUM_JOINTS + i]) * slope)
+                outputs.append(said + amplitude * float(encoders.turns[i]) * cos(turn) * own[i])
     # Without a state of its own such a system refuses to be integrated along with others: one that rests.
     idle = MakeVectorContinuousVariable(1, "idle")
     at_rest = np.array([Expression(0.0)], dtype=object)

@@ -84,12 +84,12 @@ class Problem:
     def residuals(self, u: np.ndarray) -> np.ndarray:
         """Measured less predicted poses, (n, k)."""
         x, q = self._joints(u)[:2]
-        return self._compared(self.model.forward(q, x[: len(self.model)]))
+        return self._compared(self.model.forward(q, x[: len(self.model)], self.measurements.q))
 
     def linearise(self, u: np.ndarray) -> Linearised:
         """Residuals with their derivatives."""
         x, q, torque, by_masses = self._joints(u)
-        chain, Theta = self.model.chain_and_regressor(q, x[: len(self.model)])
+        chain, Theta = self.model.chain_and_regressor(q, x[: len(self.model)], self.measurements.q)
         whole, Theta = Theta, Theta[:, self.rows]
         J = Theta[:, :, ZEROS]
         columns = [Theta]
@@ -113,7 +113,7 @@ class Problem:
         q = theta
         for _ in range(_SAG_ROUNDS):
             # The counterbalance acts at the angle of the link, whose zero may be shifted.
-            chain = self.model.chain(q, geometry)
+            chain = self.model.chain(q, geometry, theta)
             torque, by_masses = self._loads.torque(q, chain, masses)
             q = theta + compliance * torque
         return x, q, torque, by_masses

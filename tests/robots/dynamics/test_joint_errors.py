@@ -28,8 +28,11 @@ def erring(values: dict[str, float], compliance: float = 0.0) -> RobotModel:
 
 def test_each_error_is_the_formula_of_its_name():
     values = {"scale_2": 1e-3, "sine_3": 2e-3, "cosine_4": 3e-3, "coupling_46": 4e-3}
-    added = JointErrors(tuple(values)).added(Q, np.array(list(values.values())))
-    expected = [0.0, 1e-3 * Q[1], 2e-3 * np.sin(Q[2]), 3e-3 * np.cos(Q[3]), 0.0, 4e-3 * Q[3]]
+    values |= {"motor_cosine_1": 5e-4, "wave_sine_5": 6e-4}
+    ratio = load_robot("irb1200").gear_ratio
+    added = JointErrors(tuple(values), ratio).added(Q, np.array(list(values.values())))
+    turning = [5e-4 * np.cos(ratio[0] * Q[0]), 6e-4 * np.sin(2.0 * ratio[4] * Q[4])]
+    expected = [turning[0], 1e-3 * Q[1], 2e-3 * np.sin(Q[2]), 3e-3 * np.cos(Q[3]), turning[1], 4e-3 * Q[3]]
     np.testing.assert_allclose(added, expected, atol=1e-18)
     X = controller_kinematics(erring(values)).forward(Q)
     np.testing.assert_allclose(X, Kinematics(load_robot("irb1200")).forward(Q + expected), atol=1e-15)
@@ -37,7 +40,9 @@ def test_each_error_is_the_formula_of_its_name():
 
 @pytest.mark.parametrize("compliance", [0.0, 1.0])
 def test_the_jacobian_knows_that_errors_change_with_the_angle(compliance: float):
-    kinematics = CompliantKinematics(erring(dict.fromkeys(ALL, 2e-2), compliance), 3.0)
+    fast = ("motor", "wave")  # hundreds of times in a turn: less of them, for the differences' sake
+    values = {name: 2e-5 if name.startswith(fast) else 2e-2 for name in ALL}
+    kinematics = CompliantKinematics(erring(values, compliance), 3.0)
     X, J = kinematics.forward_and_jacobian(Q)
     for joint in range(6):
         step = 1e-5 * np.eye(6)[joint]
@@ -67,7 +72,9 @@ def test_they_are_identified_kept_in_a_file_and_inverted(tmp_path):
 
 
 def test_unknown_kinds_and_names_are_refused(tmp_path):
-    with pytest.raises(ValueError, match="joint errors are scale, eccentricity, coupling, got 'backlash'"):
+    with pytest.raises(
+        ValueError, match="joint errors are scale, eccentricity, motor, strain_wave, coupling, got 'backlash'"
+    ):
         names_of(["backlash"])
     (tmp_path / "robot.yaml").write_text("extends: irb1200\ncalibration: {joint_errors: {scale_7: 1.0e-3}}\n")
     with pytest.raises(RobotFileError, match="'scale_7' is none of"):

@@ -9,7 +9,7 @@ from pydrake.systems.framework import DiagramBuilder
 from pydrake.systems.primitives import LinearSystem
 
 from robots.description.model import load_robot
-from systems.cell.encoders import EncoderConfig, Encoders, SteppedReading, eccentric_discs
+from systems.cell.encoders import EncoderConfig, Encoders, SteppedReading, erring_encoders
 
 ROBOT = load_robot("irb1200")
 PERIOD = 4e-3
@@ -29,7 +29,7 @@ def test_exact_encoders_say_what_is():
     encoders = Encoders(ROBOT, EncoderConfig())
     theta = np.linspace(-1.0, 1.0, 6)
     assert np.array_equal(encoders.rounded(encoders.angle(theta)), theta)
-    assert (encoders.has_steps, encoders.is_eccentric) == (False, False)
+    assert (encoders.has_steps, encoders.have_errors) == (False, False)
 
 
 def turning(system, rate: float, until: float) -> tuple[np.ndarray, np.ndarray]:
@@ -59,7 +59,7 @@ def test_the_velocity_of_steps_is_the_difference_of_two_readings():
 def test_an_eccentric_disc_errs_once_a_turn_and_its_velocity_is_the_derivative():
     config = EncoderConfig(side="motor", eccentricity_deg=0.5, phase_deg=np.linspace(0.0, 150.0, 6))
     encoders = Encoders(ROBOT, config)
-    state, said = turning(eccentric_discs(encoders), 0.5, 0.1)
+    state, said = turning(erring_encoders(encoders), 0.5, 0.1)
     np.testing.assert_allclose(said[:6], encoders.angle(state[:6]), atol=1e-14)
     h = 1e-6
     slope = (encoders.angle(state[:6] + h) - encoders.angle(state[:6] - h)) / (2.0 * h)
@@ -68,6 +68,28 @@ def test_an_eccentric_disc_errs_once_a_turn_and_its_velocity_is_the_derivative()
         np.linspace(0.0, 2.0 * np.pi, 2000)[:, None] / encoders.turns
     )
     assert np.rad2deg(np.abs(error).max(axis=0) * encoders.turns) == pytest.approx(0.5, rel=1e-3)
+
+
+def test_scales_and_coupled_wrists_hide_a_share_of_the_motion():
+    """A joint turns by what its encoder says, by a share of that, and by what joints before it turn it."""
+    config = EncoderConfig(
+        scale_ppm=np.linspace(100.0, 600.0, 6), coupling_ppm=np.array([2000.0, 3000.0, 4000.0])
+    )
+    encoders, said = Encoders(ROBOT, config), np.array([0.3, -0.4, 0.5, 1.1, -0.9, 2.0])
+    true = said * (1.0 + 1e-6 * config.scale_ppm)
+    true += [0.0, 0.0, 0.0, 0.0, 2e-3 * said[3], 3e-3 * said[3] + 4e-3 * said[4]]
+    np.testing.assert_allclose(encoders.true_position(said), true, atol=1e-15)
+    np.testing.assert_allclose(encoders.angle(true), said, atol=1e-15)
+    state, reading = turning(erring_encoders(encoders), 0.5, 0.1)
+    np.testing.assert_allclose(reading[:6], encoders.angle(state[:6]), atol=1e-14)
+    np.testing.assert_allclose(reading[6:], 0.5 * encoders.angle(np.ones(6)), atol=1e-12)
+
+
+def test_where_the_motors_are_follows_from_what_all_errors_make_of_it():
+    config = EncoderConfig(side="motor", eccentricity_deg=5.0, scale_ppm=np.full(6, 1e4))
+    encoders = Encoders(ROBOT, config)
+    true = np.random.default_rng(0).uniform(-3.0, 3.0, (20, 6))
+    np.testing.assert_allclose(encoders.true_position(encoders.angle(true)), true, atol=1e-14)
 
 
 @pytest.mark.parametrize(
