@@ -11,6 +11,7 @@ from robots.description.model import load_robot
 from robots.dynamics.compliant_kinematics import CompliantKinematics
 from robots.kinematics.error_kinematics import ErrorKinematics
 from robots.pose import pose_error
+from systems.cell.encoders import Encoders
 
 QUIET = ["station.camera.position_sigma=0", "station.camera.orientation_sigma_deg=0"]
 PLACES = np.deg2rad([[0, 20, 10, 0, 40, 0], [60, -20, 0, 90, -60, 30], [-50, 60, -60, -120, 70, 100]])
@@ -34,6 +35,21 @@ def test_without_noise_it_writes_down_the_statics():
     np.testing.assert_allclose(record.measured.X_WE, record.truth.X_WE, atol=2e-6)
     np.testing.assert_allclose(record.measured.q, PLACES, atol=2e-4)  # the drive yields a little to gravity
     np.testing.assert_array_equal(record.measured.payload, 7.0)
+
+
+def test_encoders_that_err_put_the_links_elsewhere():
+    """The joints are said to be where they should, and stand where the scales of their encoders lead them."""
+    errors = [
+        "station.encoder.scale_ppm=[500,-300,400,-200,600,300]",
+        "station.encoder.coupling_ppm=[800,0,0]",
+    ]
+    scenario = load_scenario("misaligned", [*QUIET, *errors, "station.encoder.eccentricity_deg=0.02"])
+    record = MeasurementRun(scenario).measure(PLACES[:1])
+    np.testing.assert_allclose(record.measured.q, PLACES[:1], atol=2e-4)
+    encoders = Encoders(load_robot(scenario.robot), scenario.station.encoder)
+    expected = statics(scenario, encoders.true_position(record.measured.q))
+    assert np.abs(pose_error(record.measured.X_WE, expected)).max() < 2e-6
+    assert np.abs(pose_error(record.measured.X_WE, statics(scenario, record.measured.q))).max() > 5e-5
 
 
 @pytest.mark.parametrize("period", [0.11, 0.7, pytest.param(1.0, marks=pytest.mark.slow)])
