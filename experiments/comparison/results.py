@@ -6,18 +6,23 @@ from typing import Any
 
 from diagrams.record.log import RunLog
 from experiments.cli.prepare import Prepared
+from experiments.cli.versions import versions_line
+from experiments.comparison.errors_table import ERRORS, write_errors
 from experiments.comparison.figure import write_figure
 from experiments.metrics.run_metrics import summary, timing
 from experiments.replay.replay import watchers, write_replay
-from experiments.report.files import write_json
+from experiments.report.files import write_json, write_text
 from experiments.report.report import write_report
 
+SCENARIO = "scenario.yaml"
 RESULTS = {
     "report.html": "errors, plots and guard events; opens offline",
     "replay.html": "the robot in motion; opens offline",
     "figure.svg": "distance of the tip over time",
     "summary.json": "the numbers; a simulation with the same seed repeats them byte for byte",
     "timing.json": "wall times and real-time factors",
+    ERRORS: "the errors of every sample",
+    SCENARIO: "the scenario, to run it again",
 }
 
 
@@ -42,5 +47,8 @@ def write_results(folder: Path, prepared: Prepared, logs: Mapping[str, Sequence[
     write_report(folder / "report.html", prepared.text, result, times, logs, prepared.true_robot)
     seen_by = watchers(prepared.scenario.station.camera, prepared.nominal_robot)
     write_replay(folder / "replay.html", prepared.true_robot, first_cycles, seen_by=seen_by)
+    write_errors(folder / ERRORS, first_cycles)
+    title, _, fields = prepared.text.partition("\n")
+    write_text(folder / SCENARIO, f"{title}\n{versions_line()}\n{fields}")
     write_figure(folder / "figure.svg", prepared.title, first_cycles)
     return result

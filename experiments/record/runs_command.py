@@ -16,6 +16,7 @@ from experiments.cli.json_output import human_console, json_output
 from experiments.cli.options import JsonOption, PictureOption
 from experiments.cli.staging import PAGE, staged_file
 from experiments.metrics.run_metrics import judged_by
+from experiments.record.runs_beside import beside_sections, kept_comparison
 from experiments.report.data import norm
 from experiments.report.plot_page import Section, sortable_table, write_plot_page
 from experiments.report.style import law_title
@@ -31,28 +32,44 @@ _NOTE = (
 
 def runs_command(
     folder: Annotated[Path, typer.Argument(metavar="DIR", help="Folder with results of compare and run.")],
+    beside: Annotated[
+        Path | None,
+        typer.Option(metavar="DIR", help="Another one: the page shows both side by side and what differs."),
+    ] = None,
     report: PictureOption = Path("out/runs.html"),
     json_file: JsonOption = None,
 ) -> None:
-    """List the runs below a folder on a page: key figures, a filter, links to their reports."""
+    """List the runs below a folder on a page, or show two of them side by side."""
     human = human_console(json_file)
     with json_output(json_file) as output, refusing(ValueError, OSError), ExitStack() as stack:
         if not folder.is_dir():
             raise ValueError(f"{folder}: is no folder")
         page = stack.enter_context(staged_file(report, *PAGE))
         stack.enter_context(output.staged())
-        with progress_bar("reading") as progress:
-            found = list(runs_below(folder, progress))
-        if not found:
-            raise ValueError(f"{folder}: there is no summary.json below it, which compare and run write")
-        rows = [_row(run, folder, report.parent) for run in found]
-        comparisons = count(len({run["folder"] for run in found}), "comparison")
-        verdict = f"{count(len(found), 'law')} in {comparisons} below {folder}."
-        table = sortable_table("runs", _HEAD, rows, has_filter=True)
-        write_plot_page(page, "Runs", verdict, [Section("Runs", _NOTE, table)])
-        output.write(found)
-    human.print(verdict)
+        if beside is not None:
+            kept = [kept_comparison(each) for each in (folder, beside)]
+            verdict, sections = beside_sections(*kept)
+            write_plot_page(page, "Two runs side by side", verdict, sections)
+            output.write({str(each.folder): each.summary for each in kept})
+        else:
+            verdict = _index(folder, report, page, output)
+    human.print(verdict, markup=False, soft_wrap=True)
     print_files(human, report)
+
+
+def _index(folder: Path, report: Path, page: Path, output: Any) -> str:
+    """Writes the page of all runs below a folder; returns its sentence."""
+    with progress_bar("reading") as progress:
+        found = list(runs_below(folder, progress))
+    if not found:
+        raise ValueError(f"{folder}: there is no summary.json below it, which compare and run write")
+    rows = [_row(run, folder, report.parent) for run in found]
+    comparisons = count(len({run["folder"] for run in found}), "comparison")
+    verdict = f"{count(len(found), 'law')} in {comparisons} below {folder}."
+    table = sortable_table("runs", _HEAD, rows, has_filter=True)
+    write_plot_page(page, "Runs", verdict, [Section("Runs", _NOTE, table)])
+    output.write(found)
+    return verdict
 
 
 def runs_below(folder: Path, progress: Any = None) -> Iterator[dict[str, Any]]:

@@ -21,18 +21,19 @@ def _tagged(loader: yaml.CSafeLoader, suffix: str, node: yaml.Node) -> dict[str,
 _AnyTag.add_multi_constructor("!", _tagged)
 
 
-def scenario_differences(text: str) -> list[tuple[str, str, str]]:
-    """Fields of a scenario whose values are not the default ones.
+def scenario_differences(text: str, other: str | None = None) -> list[tuple[str, str, str]]:
+    """Fields of a scenario whose values are not those of another one.
 
     Args:
         text: the scenario as YAML, all of its fields.
+        other: likewise; None for the default scenario.
 
     Returns:
-        Place such as ``station.camera.delay``, the value here and the default one, in the order of the text;
+        Place such as ``station.camera.delay``, the value here and in the other, in the order of the text;
         a dash for what one of the two does not have.
     """
     here = _leaves(text)
-    default = _leaves(scenario_text(Scenario()))
+    default = _leaves(scenario_text(Scenario()) if other is None else other)
     places = [*here, *(place for place in default if place not in here)]
     return [
         (place, here.get(place, "–"), default.get(place, "–"))

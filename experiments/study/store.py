@@ -9,17 +9,17 @@ import json
 import os
 import time
 from collections.abc import Mapping, Sequence
-from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any
 
 import pyarrow as pa
 import pyarrow.parquet as pq
 
+from experiments.cli.versions import installed_versions
+
 TABLE, TIMES = "study.parquet", "times.parquet"
 _PARTS, _PLAN = "parts", "plan.json"
 _FLUSH = 2.0  # s, as much work is lost at most
-_VERSIONS = ("truetip", "drake", "numpy", "scipy")
 
 
 class StudyStore:
@@ -118,17 +118,6 @@ class StudyStore:
 
 _WALL_TIME = pa.field("wall_s", pa.float64())
 _TYPES = {"number": pa.float64(), "text": pa.string(), "count": pa.int64()}
-
-
-def installed_versions() -> dict[str, str]:
-    """Of what decides about a number."""
-    found = {}
-    for name in _VERSIONS:
-        try:
-            found[name] = version(name)
-        except PackageNotFoundError:
-            found[name] = "not installed"
-    return found
 
 
 def _write(table: pa.Table, path: Path) -> None:

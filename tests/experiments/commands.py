@@ -14,7 +14,15 @@ SHORT = [
     "--set=reference.settle=0.2",
     "--set=reference.dwell=0.6",
 ]
-RESULTS = {"report.html", "replay.html", "figure.svg", "summary.json", "timing.json"}
+RESULTS = {
+    "report.html",
+    "replay.html",
+    "figure.svg",
+    "summary.json",
+    "timing.json",
+    "errors.csv",
+    "scenario.yaml",
+}
 
 
 def truetip(*arguments: object) -> Result:

@@ -6,12 +6,14 @@ from pathlib import Path
 import pytest
 
 from diagrams.record.log import RunLog
+from diagrams.scenario.scenario import load_scenario
+from experiments.comparison.errors_table import read_errors
 from experiments.metrics.run_metrics import summary
 from experiments.record.runs_command import runs_below
 from experiments.record.simulated import write_records
 from experiments.report.files import write_json
 from tests.experiments.browser import open_page
-from tests.experiments.commands import files, refusal, truetip
+from tests.experiments.commands import SHORT, files, refusal, truetip
 from tests.experiments.synthetic import comparison
 
 
@@ -74,6 +76,47 @@ def test_words_in_the_filter_hide_the_other_lines(logs: dict[str, list[RunLog]],
     opened = open_page(page, 3000)
     assert not [line for line in opened.console if "rror" in line]
     assert opened.dom.count('<tr hidden="">') == 1
+
+
+def test_two_runs_side_by_side_show_what_differs_and_by_how_much(tmp_path: Path):
+    shared = ["run", "--law=pbvs", *SHORT]
+    for name, delay in (("early", "0.004"), ("late", "0.012")):
+        assert (
+            truetip(*shared, f"--set=station.camera.delay={delay}", "--out", tmp_path / name).exit_code == 0
+        )
+    page = tmp_path / "page.html"
+    result = truetip(
+        "runs",
+        tmp_path / "early",
+        "--beside",
+        tmp_path / "late",
+        "--report",
+        page,
+        "--json",
+        tmp_path / "both.json",
+    )
+    assert result.exit_code == 0, result.output
+    both = json.loads((tmp_path / "both.json").read_text())
+    early, late = (
+        both[str(tmp_path / name)]["runs"]["pbvs"]["true"]["max_norm_mm"] for name in ("early", "late")
+    )
+    assert (
+        f"PBVS {early:.3g} → {late:.3g} mm; one field of the scenario changed, the same versions."
+        in " ".join(result.stdout.split())
+    )
+    assert "<td>station.camera.delay</td><td>0.004</td><td>0.012</td>" in page.read_text()
+    # The table of errors has the largest error of the summary, and the scenario can be run again.
+    time, distance, _ = read_errors(tmp_path / "early" / "errors.csv")["pbvs"]
+    assert distance[time >= 0.2 - 1e-9].max() == pytest.approx(early, rel=1e-5)
+    assert load_scenario(str(tmp_path / "late" / "scenario.yaml")).station.camera.delay == 0.012
+
+
+def test_a_folder_that_is_no_run_is_refused_beside_another(tmp_path: Path):
+    (tmp_path / "empty").mkdir()
+    said = refusal(
+        truetip("runs", tmp_path, "--beside", tmp_path / "empty", "--report", tmp_path / "page.html")
+    )
+    assert "there is no summary.json, which compare and run write" in said
 
 
 @pytest.mark.parametrize(
