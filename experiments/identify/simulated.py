@@ -21,6 +21,7 @@ from systems.cell.inertial_sensors import InertialLoggerConfig
 from systems.feedforward import FeedforwardConfig
 
 _STEP = 1e-3  # s, of the integrator and of the robot's log
+_ACCURACY = 2e-3  # relative, of one step
 
 
 @dataclass(frozen=True)
@@ -64,7 +65,7 @@ class CaseRun:
         context = simulator.get_mutable_context()
         station.set_at_rest(context, told[0, 0], self.seed)
         rate = station.fastest_rate(context)
-        integration = Integration(IntegratorConfig("radau3", max_step=_STEP), period, rate)
+        integration = Integration(IntegratorConfig("radau3", accuracy=_ACCURACY, max_step=_STEP), period, rate)
         integration.initialize(simulator)
         # Play and friction break the estimate of the error, which then asks for ever smaller steps.
         simulator.get_mutable_integrator().set_fixed_step_mode(True)
