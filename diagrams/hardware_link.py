@@ -1,6 +1,7 @@
 """Controller and camera at the other end of their wires, as one station with one clock."""
 
 import math
+from array import array
 from collections.abc import Callable
 
 import numpy as np
@@ -76,7 +77,7 @@ class HardwareLink:
         self.robot_clock = StampClock(ClockConfig())
         self.last: RobotReport | None = None
         self._unlearned: tuple[float, float] | None = None  # stamp and arrival of the last report, in s
-        self.turn_around: list[float] = []  # s, from a report in to its reply out
+        self.turn_around = array("d")  # s, from a report in to its reply out
         self._sample = PoseSample()
         self._phase = 0.0  # s, of the newest stamp against its tick
         self._time = PassedTime(self._period)

@@ -14,9 +14,9 @@ from diagrams.hardware import HardwareStation
 from diagrams.hardware_link import EndedOnRequest, HardwareLink, StationError, never
 from diagrams.host_lateness import HostLateness
 from diagrams.record.log import GuardEvent, RunLog
-from diagrams.record.packed_log import PackedLog
 from diagrams.record.played import measured_along, path_marks, played
 from diagrams.record.run_record import RunRecord, marks, write_event, write_tick
+from diagrams.record.spool import Spool, SpooledLog
 from diagrams.record.topics import POSE, pose_message
 from diagrams.runs.simulation import guard_events, start_position
 from diagrams.scenario.scenario import Scenario, ScenarioError
@@ -88,7 +88,7 @@ class RealTimeRun:
         ports = ["position_command", "velocity_command", "correction", "guard_status"]
         if self.servo.reference.is_slowed:
             ports.append("path_time")
-        self._log = PackedLog(builder, {name: self.servo.GetOutputPort(name) for name in ports}, self.period)
+        self._log = SpooledLog({name: self.servo.GetOutputPort(name) for name in ports})
         self.diagram: Diagram = builder.Build()
         self.diagram.set_name("truetip")
         self.path: CartesianPath = self.servo.reference.path
@@ -97,8 +97,9 @@ class RealTimeRun:
         self._context: Context = self.diagram.CreateDefaultContext()
         self._scratch = self.diagram.CreateDefaultContext()
         self._next = 0  # the tick that the context stands before
-        self._joint_rows: list[tuple[int, float, np.ndarray, np.ndarray]] = []
-        self._exposures: list[tuple[float, np.ndarray]] = []
+        self._reports = Spool(2 + 2 * NUM_JOINTS)  # tick, stamp in s, positions in rad, efforts in N m
+        self._exposures = Spool(17)  # s of the path, and the pose
+        self._last_exposure = -math.inf  # s of the path
         self._pauses: list[tuple[float, float]] = []
         self._events: list[GuardEvent] = []
         self._stream: RunRecord | None = None
@@ -158,7 +159,7 @@ class RealTimeRun:
                 if ended != REQUESTED and wire.host.worst > _WORTH_SAYING:
                     ended = f"{ended}; {wire.host.sentence(began)}"
         finally:
-            if record is not None and not self._joint_rows:
+            if record is not None and not len(self._reports):
                 record.close(law=self.law, ended="before its path")
             sys.setswitchinterval(switching)
             gc.unfreeze()
@@ -231,7 +232,7 @@ class RealTimeRun:
 
     def _why_it_stands(self) -> str:
         since = self._stands_since or 0.0
-        seen = self._exposures[-1][0] if self._exposures else 0.0
+        seen = max(self._last_exposure, 0.0)
         is_blind = self.uses_camera and since - seen >= self.scenario.servo.guard.hold_after
         why = (
             f"the camera has shown nothing usable since {seen:.1f} s"
@@ -255,7 +256,7 @@ class RealTimeRun:
         X_WE_desired = self.servo.GetOutputPort("X_WE_desired").Eval(servo).GetAsMatrix4()
         joints = report.position, effort
         write_tick(stream, time, report.time, joints, command, correction, X_WE_desired)
-        if sample.valid and (not self._exposures or sample.time > self._exposures[-1][0]):
+        if sample.valid and sample.time > self._last_exposure:
             stream.write(POSE, time, pose_message(sample.X_WE.GetAsMatrix4(), sample.time))
 
     def _note(self, tick: int, kind: str, detail: str) -> None:
@@ -272,17 +273,18 @@ class RealTimeRun:
         sample = wire.pose_at(time)
         joints = JointSample(time, report.position, wire.velocity, wire.effort, is_running)
         self.station.receive(self._context, joints, sample)
-        if not self._joint_rows:
-            self.diagram.ForcedPublish(self._context)  # here, where the log finds samples to begin with
+        if not len(self._reports):
+            self._note_ports()  # here, where the log finds samples to begin with
         self._update(self._context)
         sent = wire.send_command(*self.station.command(self._context))
         learn(self.servo, self._context)  # nobody waits for it any more
         if self._stream is not None:
             self._write(self._stream, time, report, wire.effort, sent, sample)
         self._stand_before_next()
-        self._joint_rows.append((tick, report.time, report.position, wire.effort))
-        if sample.valid and (not self._exposures or sample.time > self._exposures[-1][0]):
-            self._exposures.append((sample.time, sample.X_WE.GetAsMatrix4()))
+        self._reports.append(tick, report.time, report.position, wire.effort)
+        if sample.valid and sample.time > self._last_exposure:
+            self._last_exposure = sample.time
+            self._exposures.append(sample.time, sample.X_WE.GetAsMatrix4().ravel())
 
     def _update(self, context: Context) -> None:
         """Everything that the servo does at a tick."""
@@ -292,7 +294,10 @@ class RealTimeRun:
         """Nothing happens between two ticks, so the time of the next one may begin right after the reply."""
         self._next += 1
         self._context.SetTime(self._next * self.period)
-        self.diagram.ForcedPublish(self._context)  # logs what stands before the tick, as a simulation does
+        self._note_ports()  # logs what stands before the tick, as a simulation does
+
+    def _note_ports(self) -> None:
+        self._log.note(self.servo.GetMyContextFromRoot(self._context))
 
     def _warm_up(self) -> None:
         """Computes ticks on a context that is thrown away, so that the first reply is no slower."""
@@ -309,7 +314,7 @@ class RealTimeRun:
             )
             self._update(context)
             self.station.command(context)
-            self.diagram.ForcedPublish(context)
+            self._log.values(self.servo.GetMyContextFromRoot(context))
 
     def _warm_up_next(self) -> None:
         """Computes the next tick beforehand with the last samples, and forgets it.
@@ -323,21 +328,21 @@ class RealTimeRun:
     def _record(
         self, counters: dict[str, int], camera: PoseSource | None, wire: HardwareLink, ended: str
     ) -> RealTimeRecord:
-        times, data = self._log.read(self._context)
+        times, data = self._log.read()
         path = played(self.path, times, data)
         n = len(times)
         positions, efforts = np.full((n, NUM_JOINTS), np.nan), np.full((n, NUM_JOINTS), np.nan)
         stamps = np.full(n, np.nan)
         ticks = np.round(times / self.period).astype(int)
         row_of = {int(tick): row for row, tick in enumerate(ticks)}
-        for tick, stamp, position, effort in self._joint_rows:
-            row = row_of.get(tick)
+        for tick, stamp, *joints in self._reports.read():
+            row = row_of.get(int(tick))
             if row is not None:
-                stamps[row], positions[row], efforts[row] = stamp, position, effort
+                stamps[row], positions[row], efforts[row] = stamp, joints[:NUM_JOINTS], joints[NUM_JOINTS:]
         _fill_gaps(positions)
         _fill_gaps(efforts)
-        exposure_times = np.array([time for time, _ in self._exposures])
-        poses = np.array([X for _, X in self._exposures]).reshape(-1, 4, 4)
+        exposures = self._exposures.read()
+        exposure_times, poses = exposures[:, 0], exposures[:, 1:].reshape(-1, 4, 4)
         counts = np.round(data["guard_status"]).astype(int)
         unknown = np.full((n, 4, 4), np.nan)
         log = RunLog(
@@ -360,7 +365,7 @@ class RealTimeRun:
             calibrated=calibrated(self.servo, self._context, self.scenario.robot),
             wall_time=float(times[-1]) if n else 0.0,
         )
-        if self._stream is not None and self._joint_rows:
+        if self._stream is not None and len(self._reports):
             for event in guard_events(times, counts):
                 write_event(self._stream, event)
             self._stream.close(**marks(log, ended))

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from experiments.bench.faults import Case
+from experiments.bench.faults import run_case
 
 
 @pytest.mark.slow
@@ -16,7 +16,7 @@ from experiments.bench.faults import Case
     ],
 )
 def test_the_robot_is_never_surprised(tmp_path: Path, who: str, what: str, then: str, ended: str):
-    outcome = Case(tmp_path, who, what, then).run()
+    outcome = run_case(tmp_path, who, what, then)
     assert outcome.ended.startswith(ended), outcome
     assert outcome.recorded > 1.5
     assert outcome.at_rest

@@ -18,6 +18,15 @@ from systems.link.abb.messages import Command, EgmError, Mode, Pose, decode_repo
 from systems.link.abb.schema import CORRECTION, EgmSensor
 from systems.link.abb.session import EgmSession
 from systems.link.abb.signals import SignalCodec, SignalError, SignalLayout
+from systems.link.kuka.controller import RsiController, RsiRunConfig
+from systems.link.kuka.robot_link import RsiCodec, RsiCommand, RsiReport
+from systems.link.kuka.telegrams import (
+    RobotTelegram,
+    SensorTelegram,
+    read_sensor,
+    write_robot,
+    write_sensor,
+)
 from systems.link.qualisys.conversation import Conversation, MocapError
 from systems.link.qualisys.messages import (
     Component,
@@ -33,13 +42,15 @@ from systems.link.qualisys.messages import (
 from systems.link.qualisys.parameters import ParameterError, bodies_xml, parameters_xml, parse_bodies
 from systems.link.qualisys.session import CameraState, Session
 from systems.link.qualisys.stream_request import StreamRequest
+from systems.link.session import LinkSession
 from tests.systems.link.abb.reports import HERE, SPEED, report
 
 ROBOT = load_robot("irb1200")
 CONTROLLER = VirtualController(ROBOT, EgmRunConfig())
+RSI_CONTROLLER = RsiController(ROBOT, RsiRunConfig(restart_after=0.0))
 Q = np.array([0.1, 0.2, 0.3, 0.1, 0.5, 0.2])
 QUICK = 400  # datagrams of each decoder in every run of the tests
-MANY = 170_000  # in the slow ones: a million of all together
+MANY = 125_000  # in the slow ones: a million of all together
 CORPUS = Path(__file__).parent / "corpus"  # what has once been a problem, a file each, named by its decoder
 LONGEST = 5e-3  # s of the processor's time
 
@@ -105,6 +116,50 @@ def client(data: bytes) -> None:
     assert reply is None or isinstance(reply, bytes)
 
 
+def telegrams() -> list[bytes]:
+    """Of a controller under RSI."""
+    correction = 0.001 * np.ones(6)
+    return [
+        write_robot(RobotTelegram(8, np.zeros(6), np.zeros(6), np.zeros(6), 0, correction)),
+        write_robot(RobotTelegram(8, np.zeros(6), np.zeros(6), np.zeros(6), 0)),
+    ]
+
+
+def corrections() -> list[bytes]:
+    """To a controller under RSI."""
+    small = 1e-4 * np.ones(6)
+    return [
+        write_sensor(each)
+        for each in (SensorTelegram(4, axes=small), SensorTelegram(4, pose=small), SensorTelegram(4))
+    ]
+
+
+def rsi_cell(data: bytes) -> None:
+    """A correction to a virtual controller; what is followed is a number near where the program stands."""
+    controller = RSI_CONTROLLER
+    controller.stop(0.0)
+    for cycle in (1.0, 1.004):
+        controller.cycle(cycle, Q)
+        controller.report(1e-3 * 4, Q, Q, np.zeros(6))
+    if controller.receive(data, 1.004, Q):
+        reference, _ = controller.references
+        assert np.isnan(reference).all() or (np.abs(reference - Q) < 3.0).all()
+
+
+def rsi_client(data: bytes) -> None:
+    """A telegram of a controller to a client; the reply is finite and no faster than the axes may be."""
+    codec = RsiCodec(SPEED, 4e-3, True, "ImFree")
+    session = LinkSession[RsiReport](codec, SPEED, period=4e-3)
+    session.receive(telegrams()[0].replace(b"<IPOC>8", b"<IPOC>4"), HERE, 0.0)
+    found = session.receive(data, HERE, 4e-3)
+    assert found is None or np.isfinite(found.position).all()
+    reply = session.answer(RsiCommand(np.zeros(6), np.zeros(6)), 4e-3)
+    if reply is not None:
+        axes = read_sensor(reply).axes
+        assert axes is not None
+        assert (np.abs(axes) <= SPEED * 4e-3 + 1e-9).all()
+
+
 def signals(data: bytes) -> None:
     for layout in (SignalLayout(), SignalLayout(number="text")):
         with contextlib.suppress(SignalError):
@@ -139,6 +194,8 @@ def server(data: bytes) -> None:
 DECODERS: dict[str, tuple[Callable[[bytes], None], Callable[[], list[bytes]]]] = {
     "cell": (cell, commands),
     "client": (client, lambda: [report(2), report(2, position=0.001 * np.ones(6))]),
+    "rsi_cell": (rsi_cell, corrections),
+    "rsi_client": (rsi_client, telegrams),
     "signals": (signals, lambda: [np.arange(13.0, dtype="<f4").tobytes(), b"1.0,2.0,nan,1e400"]),
     "frame": (frame, frames),
     "camera": (camera, talk),
