@@ -105,6 +105,7 @@ class RealTimeRun:
         self._stream: RunRecord | None = None
         self._stopped_ticks = 0.0  # of the guard, until the last tick
         self._stands_since: float | None = None  # s, if the guard holds the robot at rest
+        self._seen_before = 0.0  # s of the path, what the camera had shown by then
 
     @property
     def uses_camera(self) -> bool:
@@ -227,13 +228,13 @@ class RealTimeRun:
             return 0.0
         self._stopped_ticks = stopped
         if self._stands_since is None:
-            self._stands_since = tick * self.period
+            self._stands_since, self._seen_before = tick * self.period, max(self._last_exposure, 0.0)
         return tick * self.period - self._stands_since
 
     def _why_it_stands(self) -> str:
-        since = self._stands_since or 0.0
-        seen = max(self._last_exposure, 0.0)
-        is_blind = self.uses_camera and since - seen >= self.scenario.servo.guard.hold_after
+        since, seen = self._stands_since or 0.0, self._seen_before
+        status = self.servo.GetOutputPort("guard_status").Eval(self.servo.GetMyContextFromRoot(self._context))
+        is_blind = self.uses_camera and not status[KINDS.index("no_command")]
         why = (
             f"the camera has shown nothing usable since {seen:.1f} s"
             if is_blind

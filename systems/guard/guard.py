@@ -1,30 +1,19 @@
 """Supervision of the commands: limits, missing commands, lost measurements and the smooth stop."""
 
 import math
-from dataclasses import dataclass
 
 import numpy as np
 from pydrake.common.value import Value
 from pydrake.systems.framework import BasicVector, Context, DiscreteValues, LeafSystem, ValueProducer
 
-from robots.configuration.quantity import choice, quantity
 from robots.description.model import NUM_JOINTS, RobotModel
 from robots.kinematics.forward import Kinematics, robust_solve
+from systems.guard.config import KINDS, GuardConfig
+from systems.guard.jerk_limits import JerkLimits
 from systems.guard.joint_limits import JointLimits, is_allowed
 from systems.guard.way_back import shortest_way, way_left
 from systems.samples import JointSample
 
-KINDS = (
-    "velocity_limit",  # a joint would have moved faster than it may; all joints are slowed alike
-    "acceleration_limit",  # a joint would have changed its speed faster than it may
-    "position_limit",  # a joint would have left its range
-    "correction_limit",  # the law's correction stands at its limit
-    "no_command",  # the law gave no finite command, or the joints are not known; the robot is slowed down
-    "measurement_refused",  # a sample too far from the path to be true
-    "measurement_held",  # no usable sample for a while; the law holds its correction
-    "stopped",  # no usable sample or no command for too long, or the robot does not run; it is at rest
-    "resumed",  # the robot is led from rest back to the law's command
-)
 _VELOCITY, _ACCELERATION, _POSITION, _CORRECTION, _NO_COMMAND, _REFUSED, _HELD, _STOPPED, _RESUMED = range(
     len(KINDS)
 )
@@ -32,36 +21,18 @@ _VELOCITY, _ACCELERATION, _POSITION, _CORRECTION, _NO_COMMAND, _REFUSED, _HELD, 
 # The state beside the counts: what was issued last (NaN before the first command), the velocity from which
 # a braking began, the mode, the times of the first tick and of the last command, the refused samples seen,
 # and the way back after a stop: how long it is in s, how much of it is done, where it began as seen from the
-# law's command, position and velocity, and where it is now; where the joints were at the last tick; and what
-# was issued before the last.
+# law's command, position and velocity, and where it is now; where the joints were at the last tick; what
+# was issued before the last; and the accelerations with which position and velocity came to what was issued.
 _POSITIONS, _VELOCITIES, _ISSUED, _BRAKING_FROM = slice(0, 6), slice(6, 12), slice(0, 12), slice(12, 18)
 _MODE, _FIRST_TICK, _LAST_COMMAND, _REFUSED_SEEN, _WAY, _DONE = range(18, 24)
 _OFFSET, _OFFSET_RATE, _ASIDE, _WERE_AT = slice(24, 30), slice(30, 36), slice(36, 42), slice(42, 48)
 _BEFORE = slice(48, 54)
-_WIDTH = 54
+_TURNING, _SPEEDING = slice(54, 60), slice(60, 66)
+_WIDTH = 66
 _GOING, _HOLDING, _STOPPING, _RESUMING, _IDLE, _AWAY = 0.0, 1.0, 2.0, 3.0, 4.0, 5.0
 _ABSURD = 1e6  # rad and rad/s in sum: no command, and squares of it would not be numbers
 _GRACE = 1.05  # times its limit that a correction may reach: where a law stops it, it may overshoot by a step
 _NO_DEVIATION = np.zeros(NUM_JOINTS)
-
-
-@dataclass
-class GuardConfig:
-    """Limits and time-outs of the guard; read from a scenario file."""
-
-    # Without a usable sample: the correction is held, the path goes on
-    hold_after: float = quantity(0.05, 1e-3, 10.0, "s")
-    stop_after: float = quantity(0.5, 1e-3, 60.0, "s")  # without a usable sample or command: smooth stop
-    stop_time: float = quantity(0.25, 1e-3, 10.0, "s")  # from full motion to rest
-    # Whether to go on when what caused a stop is over, be it camera, law or controller
-    resume: bool = False
-    resume_time: float = quantity(1.0, 1e-3, 60.0, "s")  # at least, from rest back to the law's command
-    speed_share: float = quantity(1.0, 0.0, 1.0, is_open=True)  # of the robot's largest joint speeds
-    # What becomes of a law that corrects by more than its limit
-    on_correction_limit: str = choice("limit", ("limit", "stop"))
-    # From the path: a sample further away is taken for a false detection
-    largest_deviation: float = quantity(0.2, 1e-4, 2.0, "m")
-    largest_deviation_deg: float = quantity(40.0, 0.01, 180.0, "deg")  # as the distance, of the orientation
 
 
 class CommandGuard(LeafSystem):
@@ -131,6 +102,7 @@ class CommandGuard(LeafSystem):
         self._is_speed_only = is_speed_only
         self._limits = JointLimits(robot, config.speed_share)
         self._rows = self._limits.rows(period)
+        self._jerk = JerkLimits(self._limits)
         self._kinematics = Kinematics(robot)
         # A hundred-thousandth below, because a law's own clipping rounds.
         self._correction_limit = (1.0 - 1e-5) * correction_limit
@@ -207,6 +179,7 @@ class CommandGuard(LeafSystem):
         if not are_joints_known:
             kinds.append(_REFUSED)
             position, state[_VELOCITIES] = [math.nan] * NUM_JOINTS, np.nan_to_num(state[_VELOCITIES])
+        last = state.copy() if self._jerk.is_given else None
         excess = self._excess(correction)
         if excess > 0.0:
             kinds.append(_CORRECTION)
@@ -235,6 +208,8 @@ class CommandGuard(LeafSystem):
                 kinds.append(_RESUMED)
                 position, velocity = self._back(state, position, velocity)
             self._follow(state, position, velocity, kinds)
+        if last is not None:
+            self._ease(state, last, kinds)
         if state[_MODE] == _HOLDING:
             kinds.append(_HELD)
         refused = measurement[1]
@@ -294,6 +269,12 @@ class CommandGuard(LeafSystem):
         start, before = self._places(state, position, velocity)
         goal, rate = np.array(position), np.array(velocity)
         excess = max(1.0, float((np.abs(rate) / limits.speed).max()))
+        if self._jerk.is_given:  # which finds the way there itself, within all limits
+            kinds += [_POSITION] if ((goal < limits.lower) | (goal > limits.upper)).any() else []
+            kinds += [_VELOCITY] if excess > 1.0 else []
+            state[_BEFORE], state[_VELOCITIES] = state[_POSITIONS], rate / excess
+            state[_POSITIONS] = np.minimum(np.maximum(goal, limits.lower), limits.upper)
+            return
         mean, faster = limits.step(start, (start - before) / period, goal, rate / excess, period)
         issued = limits.moved(start, mean, period)
         if ((goal < limits.lower) | (goal > limits.upper)).any():
@@ -310,6 +291,28 @@ class CommandGuard(LeafSystem):
         state[_POSITIONS] = issued
         state[_VELOCITIES] = np.minimum(np.maximum(rate, last - change), last + change)
         state[_BRAKING_FROM] = state[_VELOCITIES]
+
+    def _ease(self, state: np.ndarray, last: np.ndarray, kinds: list[int]) -> None:
+        """Keeps the jerk of what has been decided, ``last`` being the state before, in place."""
+        if math.isnan(last[0]) or math.isnan(last[_BEFORE][0]):
+            return
+        period, is_braking = self._period, not {_STOPPED, _NO_COMMAND}.isdisjoint(kinds)
+        position, goal, rate, both = last[_POSITIONS], state[_POSITIONS], state[_VELOCITIES], (period, period)
+        was, speeding = last[_VELOCITIES], last[_SPEEDING]
+        velocity = (self._jerk.braked if is_braking else self._jerk.eased)(was, speeding, rate, both)
+        if not self._is_speed_only:
+            speed, turning = (position - last[_BEFORE]) / period, last[_TURNING]
+            if is_braking:
+                mean = self._jerk.eased(speed, turning, 0.5 * (was + velocity), both, position)
+            else:
+                mean = self._jerk.followed(position, speed, turning, goal, rate, both)
+            if is_braking or not np.array_equal(mean, (goal - position) / period):
+                state[_POSITIONS] = self._limits.moved(position, mean, period)
+                kinds += [] if is_braking else [_ACCELERATION]
+            state[_TURNING] = (mean - speed) / period
+        state[_VELOCITIES], state[_SPEEDING] = velocity, (velocity - was) / period
+        if not is_braking:
+            state[_BRAKING_FROM] = velocity
 
     def _back(
         self, state: np.ndarray, position: list[float], velocity: list[float]
@@ -393,5 +396,5 @@ def _take_from(state: np.ndarray, joints: JointSample) -> None:
         state[_ASIDE] = 0.0
     if not math.isnan(state[0]):
         state[_ASIDE] += joints.position - state[_WERE_AT]
-    state[_POSITIONS], state[_VELOCITIES] = joints.position, 0.0
+    state[_POSITIONS], state[_VELOCITIES], state[_TURNING], state[_SPEEDING] = joints.position, 0.0, 0.0, 0.0
     state[_BEFORE] = state[_WERE_AT] = joints.position

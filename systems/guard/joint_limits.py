@@ -26,6 +26,8 @@ class JointLimits:
         """
         self.lower, self.upper = robot.lower, robot.upper
         self.speed, self.acceleration = speed_share * robot.speed, robot.acceleration
+        jerk = np.deg2rad([joint.limits.jerk_deg_s3 for joint in robot.joints])
+        self.jerk = np.where(jerk > 0.0, jerk, np.inf)
 
     def step(
         self,
@@ -59,7 +61,7 @@ class JointLimits:
         off = inside - position - rate * period
         distance = np.abs(off)
         # Along the straight line, as fast as the joint that has to brake first can still brake.
-        slope = _fastest(distance, change, period) / np.maximum(distance, 1e-300)
+        slope = fastest(distance, change, period) / np.maximum(distance, 1e-300)
         wanted = rate + min(1.0 / period, float(slope[distance > 0.0].min(initial=math.inf))) * off
         excess = float((np.abs(wanted) / self.speed).max())
         if excess > 1.0:
@@ -75,8 +77,8 @@ class JointLimits:
     ) -> np.ndarray:
         """The allowed speeds nearest to those that are wanted, joint by joint; arguments as of `step`."""
         change = self.acceleration * span
-        up = _fastest(self.upper - position, change, period)
-        down = -_fastest(position - self.lower, change, period)
+        up = fastest(self.upper - position, change, period)
+        down = -fastest(position - self.lower, change, period)
         low, high = speed - change, speed + change
         wanted = np.minimum(np.maximum(wanted, np.maximum(down, -self.speed)), np.minimum(up, self.speed))
         return np.minimum(np.maximum(wanted, low), high)
@@ -132,7 +134,7 @@ def is_allowed(
     return True
 
 
-def _fastest(distance: np.ndarray, change: np.ndarray, period: float) -> np.ndarray:
+def fastest(distance: np.ndarray, change: np.ndarray, period: float) -> np.ndarray:
     """The largest speeds (rad/s) from which joints stop within distances (rad), exactly, in steps.
 
     With a speed of (n + r) changes, 0 <= r < 1, the steps left add up to n (n + 1) / 2 + (n + 1) r changes

@@ -3,6 +3,7 @@
 import numpy as np
 
 from robots.description.model import NUM_JOINTS
+from systems.guard.jerk_limits import JerkLimits
 from systems.guard.joint_limits import JointLimits
 
 MOST_BRIDGED = 8  # periods; after a longer gap a robot may stand still, so no motion is owed to it
@@ -71,22 +72,30 @@ class MessageGuard:
             is_speed_only: whether the robot follows velocities alone.
         """
         self._limits, self._period, self._is_speed_only = limits, period, is_speed_only
+        self._jerk = JerkLimits(limits)
         self.interventions = 0
         self.forget(np.full(NUM_JOINTS, np.nan))
 
     def forget(self, position: np.ndarray) -> None:
         """The robot stands at a position, (6,) rad, whatever was sent before."""
         self._position, self._speed, self._velocity = position, np.zeros(NUM_JOINTS), np.zeros(NUM_JOINTS)
+        self._turning = self._speeding = np.zeros(NUM_JOINTS)  # accelerations of position and velocity
         self._braking_from, self._span, self._owed = self._velocity, self._period, 0.0
         self._keep(0.0)
 
     def _keep(self, passed: float) -> None:
         state = self._position, self._speed, self._velocity, self._braking_from, self._span
-        self._kept = *state, min(self._owed + passed, MOST_BRIDGED * self._period)
+        self._kept = (
+            *state,
+            self._turning,
+            self._speeding,
+            min(self._owed + passed, MOST_BRIDGED * self._period),
+        )
 
     def take_back(self) -> None:
         """What was judged last has not been sent; its time is left to the next one."""
-        self._position, self._speed, self._velocity, self._braking_from, self._span, self._owed = self._kept
+        self._position, self._speed, self._velocity, self._braking_from, self._span, *others = self._kept
+        self._turning, self._speeding, self._owed = others
 
     @property
     def knows_nothing(self) -> bool:
@@ -130,7 +139,10 @@ class MessageGuard:
         is_allowed = (np.abs(velocity - self._velocity) <= change) & (np.abs(mean - speed) <= turn)
         is_allowed &= (np.abs(velocity) <= top) & (np.abs(mean) <= top)
         is_allowed &= (position >= limits.lower) & (position <= limits.upper)
-        if not is_allowed.all():
+        if self._jerk.is_given:
+            position, velocity, mean, is_same = self._eased(position, velocity, start, speed, passed)
+            self.interventions += not (is_same and is_allowed.all())
+        elif not is_allowed.all():
             self.interventions += 1
             velocity = np.minimum(np.maximum(velocity, -limits.speed), limits.speed)
             mean, _ = limits.step(start, speed, position, velocity, passed, span)
@@ -141,6 +153,28 @@ class MessageGuard:
         self._note(position, velocity, mean, passed)
         self._braking_from = velocity
         return position, velocity
+
+    def _eased(
+        self,
+        position: np.ndarray,
+        velocity: np.ndarray,
+        start: np.ndarray,
+        speed: np.ndarray,
+        passed: float,
+    ) -> tuple[np.ndarray, np.ndarray, np.ndarray, bool]:
+        """Position and velocity within all limits, the mean speeds, and whether they are those wanted."""
+        limits = self._limits
+        goal = np.minimum(np.maximum(position, limits.lower), limits.upper)
+        rate = np.minimum(np.maximum(velocity, -limits.speed), limits.speed)
+        issued = self._jerk.eased(self._velocity, self._speeding, rate, (0.5 * (passed + self._span), passed))
+        if self._is_speed_only:
+            return position, issued, issued, np.array_equal(issued, velocity)
+        times = self._span, passed
+        mean = self._jerk.followed(start, speed, self._turning, goal, rate, times)
+        is_same = np.array_equal(mean, (position - start) / passed)
+        if not is_same:
+            position = limits.moved(start, mean, passed)
+        return position, issued, mean, is_same and np.array_equal(issued, velocity)
 
     def braking(self, passed: float, stop_time: float) -> tuple[np.ndarray, np.ndarray]:
         """What may be sent on the way to rest: all joints slow down evenly, or as fast as they may.
@@ -162,12 +196,19 @@ class MessageGuard:
             less = passed * min(1.0 / max(stop_time, 1e-6), hardest)
             share = max(0.0, float(np.abs(self._velocity).max()) / top - less)
         span, velocity = 0.5 * (passed + self._span), share * start
+        if self._jerk.is_given:
+            velocity = self._jerk.braked(self._velocity, self._speeding, velocity, (span, passed))
         mean = 0.5 * (self._velocity + velocity)
         if not self._is_speed_only:
             mean = limits.bounded(self._position, self._speed, mean, passed, span)
+            if self._jerk.is_given:
+                times = self._span, span
+                mean = self._jerk.eased(self._speed, self._turning, mean, times, self._position)
         self._note(limits.moved(self._position, mean, passed), velocity, mean, passed)
         return self._position, self._velocity
 
     def _note(self, position: np.ndarray, velocity: np.ndarray, mean: np.ndarray, passed: float) -> None:
+        self._turning = (mean - self._speed) / (0.5 * (passed + self._span))
+        self._speeding = (velocity - self._velocity) / passed
         self._position, self._velocity, self._speed = position.copy(), velocity.copy(), mean
         self._span, self._owed = passed, 0.0

@@ -6,9 +6,10 @@ import numpy as np
 
 from systems.guard.joint_limits import JointLimits
 
-_SPEED, _ACCELERATION = 0.25, 0.5  # shares of what a joint may do that the way back may add
+_SPEED, _ACCELERATION, _JERK = 0.25, 0.5, 0.5  # shares of what a joint may do that the way back may add
 # Largest slope and bend of the polynomials of `way_left` against those of a straight line.
 _STEEPEST, _BEND, _RATE_BEND = 1.875, 10.0 / math.sqrt(3.0), 3.94
+_KINK, _RATE_KINK = 60.0, 36.0  # largest third derivatives
 
 
 def shortest_way(limits: JointLimits, offset: np.ndarray, rate: np.ndarray) -> float:
@@ -22,7 +23,9 @@ def shortest_way(limits: JointLimits, offset: np.ndarray, rate: np.ndarray) -> f
     speed, acceleration = _SPEED * limits.speed, _ACCELERATION * limits.acceleration
     slope = _STEEPEST * np.abs(offset) / speed
     bend = np.sqrt(_BEND * np.abs(offset) / acceleration)
-    return float(np.max([slope, bend, _RATE_BEND * np.abs(rate) / acceleration]))
+    kink = np.cbrt(_KINK * np.abs(offset) / (_JERK * limits.jerk))
+    rate_kink = np.sqrt(_RATE_KINK * np.abs(rate) / (_JERK * limits.jerk))
+    return float(np.max([kink, rate_kink, slope, bend, _RATE_BEND * np.abs(rate) / acceleration]))
 
 
 def way_left(done: float, way: float, offset: np.ndarray, rate: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -31,7 +31,7 @@ from systems.link.qualisys.messages import PacketType, text_packet
 
 WHOM = ("client", "cell", "camera")
 _RATE, _SECONDS = 20_000, 20.0
-_SLOW = ("reference.path=circle", "reference.acceleration=0.03", "reference.settle=1", "reference.dwell=1")
+_SLOW = ("reference.path=circle", "reference.acceleration=0.012", "reference.settle=1", "reference.dwell=1")
 _BATCH = 20  # datagrams between two looks at the clock
 _CONTENTS = 500  # different ones
 

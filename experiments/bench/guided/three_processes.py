@@ -17,7 +17,7 @@ from diagrams.record.read_record import read_record
 from diagrams.runs.virtual_cell import CellRecord
 from robots.description.model import RobotModel, load_robot
 
-CIRCLE = ("reference.path=circle", "reference.acceleration=1", "reference.settle=1", "reference.dwell=1")
+CIRCLE = ("reference.path=circle", "reference.acceleration=1", "reference.settle=1", "reference.dwell=4")
 _SCENARIO = "cell"
 _PERIOD = 4.032e-3  # s
 _ON_PATH = 2.0  # s, of the path, where it is waited for

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from robots.description.model import load_robot
+from robots.description.model import RobotModel, load_robot
 from robots.kinematics.forward import Kinematics
 from systems.guard.guard import GuardConfig
 from tests.systems.rigs import PERIOD, GuardRig, assert_within_limits
@@ -34,8 +34,8 @@ sequences = st.lists(
 class Swing:
     """A law that swings all joints, and fails as it is told."""
 
-    def __init__(self, share: float, config: GuardConfig, **options) -> None:
-        self.rig = GuardRig(ROBOT, config, MIDDLE, **options)
+    def __init__(self, share: float, config: GuardConfig, robot: RobotModel = ROBOT, **options) -> None:
+        self.rig = GuardRig(robot, config, MIDDLE, **options)
         self.rate, self.share = 4.0, share
         self.positions, self.velocities = [MIDDLE, MIDDLE], [np.zeros(6), np.zeros(6)]
         self.counts: dict[Any, int] = {}
