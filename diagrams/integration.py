@@ -14,10 +14,10 @@ _EXPLICIT_RATE_LIMIT = 4000.0  # 1/s
 # and after that. Loops that runge_kutta3 is for would let it make about four steps; it would try fewer after
 # each tick and make them again.
 _MEASURED = {"runge_kutta3": (1e-3, 5, 5), "radau3": (1e-5, 5, 2)}
-# In a stiff loop the estimate of radau3's error takes the camera's noise for one and would make steps ten times
-# too small. An accuracy that allows for that, 2e-3, would solve its implicit equations as loosely, which is off
-# by 0.7 um. So the steps are those above, and the accuracy is that of the equations. Where these have no
-# solution the integrator halves the step itself.
+# In a stiff loop the estimate of radau3's error takes the camera's noise for one and would make steps ten
+# times too small. An accuracy that allows for that, 2e-3, would solve its implicit equations as loosely,
+# and be off by 0.7 um. So the steps are those above, and the accuracy is that of the equations. Where these
+# have no solution the integrator halves the step itself.
 _OF_FIXED_STEPS = ("radau3",)
 _PULLING_IN = 0.8  # s, in which a law brings the tip from centimetres away onto the path
 _MARGIN = 1.01  # so that the steps in a tick leave no rest for another

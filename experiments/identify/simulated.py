@@ -65,7 +65,8 @@ class CaseRun:
         context = simulator.get_mutable_context()
         station.set_at_rest(context, told[0, 0], self.seed)
         rate = station.fastest_rate(context)
-        integration = Integration(IntegratorConfig("radau3", accuracy=_ACCURACY, max_step=_STEP), period, rate)
+        stiff = IntegratorConfig("radau3", accuracy=_ACCURACY, max_step=_STEP)
+        integration = Integration(stiff, period, rate)
         integration.initialize(simulator)
         # Play and friction break the estimate of the error, which then asks for ever smaller steps.
         simulator.get_mutable_integrator().set_fixed_step_mode(True)
