@@ -29,12 +29,6 @@ class JerkLimits:
         self.is_given = bool(np.isfinite(limits.jerk).any())
         self._jerk = np.minimum(limits.jerk, 2.0 * limits.acceleration / _SHORTEST)
         self._limits = limits
-        self._planner = Ruckig(NUM_JOINTS, 1e-3)
-        self._plan = InputParameter(NUM_JOINTS)
-        self._plan.synchronization = Synchronization.Phase
-        self._plan.max_acceleration = limits.acceleration.tolist()
-        self._plan.max_jerk = (_SHARE * self._jerk).tolist()
-        self._plan.target_position = self._plan.target_velocity = [0.0] * NUM_JOINTS
 
     def followed(
         self,
@@ -96,7 +90,11 @@ class JerkLimits:
             rate: its speeds, (6,) rad/s.
             period: s.
         """
-        plan, top, most = self._plan, self._limits.speed, self._limits.acceleration
+        # Made anew every time: what is kept until the interpreter ends is reported as a leak.
+        plan, top, most = InputParameter(NUM_JOINTS), self._limits.speed, self._limits.acceleration
+        plan.synchronization = Synchronization.Phase
+        plan.max_acceleration, plan.max_jerk = most.tolist(), (_SHARE * self._jerk).tolist()
+        plan.target_position = plan.target_velocity = [0.0] * NUM_JOINTS
         turning = np.minimum(np.maximum(turning, -most), most)
         # Speeds are those between two commands and their changes those at a command: known is all of the last
         # but one.
@@ -109,7 +107,10 @@ class JerkLimits:
         plan.min_velocity = np.minimum(-top - rate, -_SLOWEST * top).tolist()
         trajectory = Trajectory(NUM_JOINTS)
         try:
-            if self._planner.calculate(plan, trajectory) not in (Result.Working, Result.Finished):
+            if Ruckig(NUM_JOINTS, period).calculate(plan, trajectory) not in (
+                Result.Working,
+                Result.Finished,
+            ):
                 return rate
         except RuckigError:  # of numbers that it cannot plan with
             return rate
