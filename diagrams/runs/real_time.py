@@ -109,8 +109,13 @@ class RealTimeRun:
 
     @property
     def uses_camera(self) -> bool:
-        """Whether the law needs the camera."""
+        """Whether the law stops where the camera sees nothing."""
         return self.servo.traits.uses_camera
+
+    @property
+    def begins_with_camera(self) -> bool:
+        """Whether the run does not begin before the camera sees the tool."""
+        return self.uses_camera or self.servo.traits.learns_from_camera
 
     def run(
         self,
@@ -149,7 +154,7 @@ class RealTimeRun:
                 client, camera, self.scenario, self.robot, self._is_speed_only, now, is_asked_to_end
             )
             try:
-                wire.connect(self.uses_camera)
+                wire.connect(self.begins_with_camera)
                 wire.approach(self.start)
                 began = now()
                 ended = self._follow(wire, progress or (lambda share: None), now, is_asked_to_end)

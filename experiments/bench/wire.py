@@ -1,5 +1,8 @@
 """Response time of the servo to a controller, beside an echo: ``python -m experiments.bench.wire [MINUTES]``.
 
+``python -m experiments.bench.wire learning`` compares a law that learns with one that does not: both, twice,
+in turn on the same wire, beside the same echo.
+
 A virtual cell and the servo run in real time; at the same time a metronome sends a controller's messages to
 two echoes on the same machine. One does what the smallest client of EGM does, written with a package of
 others (ABBRobotEGM): decode, answer with the joints that came. The other sends the bytes back as they are.
@@ -32,6 +35,8 @@ from systems.link.clock import steady_time
 from systems.link.udp_channel import UdpChannel
 
 LAW = "numerical_ik"
+LEARNING, NOT_LEARNING, TURNS = "self_calibrating", "open_loop", 2
+ALLOWED_LEARNING = 0.1  # ms, that a law may answer later because it learns
 PERIOD = 4.032e-3  # s
 # A machine that stands still for a moment shall cost cycles, not end the run, and neither shall a robot that
 # waits at its start for minutes.
@@ -83,6 +88,30 @@ def turn_arounds(minutes: float = 0.0) -> tuple[TurnAround, TurnAround, TurnArou
     missed, excused = missed_ticks(record.stamps, np.array(comparison.cell["crowded_at"]))
     servo = TurnAround(float(np.median(times)), float(np.percentile(times, 99)), missed, excused)
     return servo, found[0], found[1]
+
+
+def learning() -> Iterator[Row]:
+    """Rows of a law that learns beside one that does not."""
+    scenario = load_scenario("cell", [*PATIENT, "station.kind=egm", "reference.settle=3"])
+    with ExitStack() as stack:
+        echo = stack.enter_context(_Echo("egm"))
+        laws = [NOT_LEARNING, LEARNING] * TURNS
+        comparison = compare_on_station(scenario, load_robot(scenario.robot), laws, with_cell=True)
+        answered = echo.finish()
+    crowded, found = np.array(comparison.cell["crowded_at"]), {}
+    for law, records in comparison.records.items():
+        ended = {record.ended for record in records}
+        if ended != {"path"}:
+            raise RuntimeError(f"{law}: a run did not come to its end: {', '.join(ended)}")
+        times = 1e3 * np.concatenate([record.turn_around for record in records])
+        missed = [missed_ticks(record.stamps, crowded)[0] for record in records]
+        found[law] = TurnAround(float(np.median(times)), float(np.percentile(times, 99)), sum(missed))
+        yield f"turn_around_{law}", f"{law}, median", found[law].median, "ms", answered.median, "EGM echo"
+        yield f"turn_around_99_{law}", f"{law}, 99 %", found[law].late, "ms", answered.late, "EGM echo"
+        yield f"missed_{law}", f"{law}, missed", float(sum(missed)), "", float(answered.missed), "EGM echo"
+    later = found[LEARNING].median - found[NOT_LEARNING].median
+    text = f"{LEARNING}: later than {NOT_LEARNING}, median"
+    yield "turn_around_learning", text, later, "ms", ALLOWED_LEARNING, "allowed"
 
 
 def missed_ticks(stamps: np.ndarray, crowded_at: np.ndarray) -> tuple[int, int]:
@@ -214,8 +243,9 @@ def main() -> None:
     elif words[:1] == ["metronome"]:
         _metronome(int(words[1]))
     else:
-        for name, text, value, unit, yardstick, against in wire(float(words[0]) if words else 0.0):
-            print(f"{name:20s} {text:40s} {value:8.3f} {unit:3s} {against} {yardstick:.3f} {unit}")
+        rows = learning() if words == ["learning"] else wire(float(words[0]) if words else 0.0)
+        for name, text, value, unit, yardstick, against in rows:
+            print(f"{name:32s} {text:48s} {value:8.3f} {unit:3s} {against} {yardstick:.3f} {unit}")
 
 
 if __name__ == "__main__":

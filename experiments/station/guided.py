@@ -63,7 +63,7 @@ def compare_on_station(
     jobs = [(law, RealTimeRun(scenario, law, robot)) for law in laws for _ in range(cycles)]
     report = progress or (lambda share: None)
     records: dict[str, list[RealTimeRecord]] = {law: [] for law in laws}
-    needs_camera = any(run.uses_camera for _, run in jobs)
+    needs_camera = any(run.begins_with_camera for _, run in jobs)
     with station_clients(scenario, robot, with_cell, needs_camera) as station:
         for number, (law, run) in enumerate(jobs):
             record = run.run(

@@ -31,6 +31,7 @@ class LawTraits:
     title: str  # for people
     colour: str  # in reports, #rrggbb; empty to be given one
     uses_camera: bool = True  # False: a camera that sees nothing does not stop it
+    learns_from_camera: bool = False  # it goes on without samples, but a run begins with the camera
     commands_motors: bool = False  # its positions start from the motors': gears are wound up in them already
     is_compared: bool = False  # whether a comparison has it unless told otherwise
     Config: type[LawConfig] = LawConfig  # its gains and limits
@@ -52,6 +53,7 @@ def law_traits(law: type | System) -> LawTraits:
         title=getattr(kind, "title", kind.__name__),
         colour=getattr(kind, "colour", ""),
         uses_camera=getattr(kind, "uses_camera", True),
+        learns_from_camera=getattr(kind, "learns_from_camera", False),
         commands_motors=getattr(kind, "commands_motors", False),
         is_compared=getattr(kind, "is_compared", False),
         Config=config,

@@ -58,7 +58,8 @@ class SelfCalibrating(LeafSystem):
 
     title = "self-calibrating"
     colour = "#0f766e"
-    uses_camera = False  # it needs one to learn, but what it knows stays true when the camera sees nothing
+    uses_camera = False  # what it knows stays true when the camera sees nothing
+    learns_from_camera = True
     commands_motors = True
     is_compared = False
     Config = SelfCalibratingConfig
