@@ -23,6 +23,7 @@ from systems.guard.guard import GuardConfig
 from systems.reference.cartesian_path import CartesianPath
 from systems.reference.reference import PathAhead
 from systems.samples import JointSample, PoseSample
+from systems.servo.self_calibrating_ahead import NextCommand
 from systems.servo.self_calibrating_config import SelfCalibratingConfig
 from systems.servo.self_calibrating_learning import UNREST, Learning
 
@@ -80,15 +81,17 @@ class SelfCalibrating(LeafSystem):
         self._lead = ParameterLead(self.tip_model.size, config.lead_frequency, config.lead_acceleration)
         self._planner = PreviewPlanner(self.tip_model, model.period)
         self._probe = Probe(model.robot, config.probe)
-        self._layout = Layout(
-            lead=self._lead.layout,
-            planner=self._planner.layout,
-            columns=(6, len(self.tip_model.chosen)),  # of the tip, as the geometry changes
-            start_time=(1,),
-            planned=(1,),  # the last instant of the plan
-            amplitude=(2, NUM_JOINTS),  # of the probe: knock, oscillations
+        arrays = {
+            "lead": self._lead.layout,
+            "planner": self._planner.layout,
+            "columns": (6, len(self.tip_model.chosen)),  # of the tip, as the geometry changes
+            "start_time": (1,),
+            "planned": (1,),  # the last instant of the plan
+            "amplitude": (2, NUM_JOINTS),  # of the probe: knock, oscillations
             **learning.arrays,
-        )
+        }
+        self._next = NextCommand(Layout(**arrays))
+        self._layout = Layout(next=self._next.layout, **arrays)
         self._views = Views(self._layout)
         self._reference = self.DeclareAbstractInputPort("reference", Value[object]())
         self._joints = self.DeclareAbstractInputPort("joint_sample", Value(JointSample()))
@@ -212,16 +215,22 @@ class SelfCalibrating(LeafSystem):
         return calibrated_robot(self.estimator, self.memory(context).estimator, of)
 
     def learn(self, context: Context) -> None:
-        """Learns from what was heard at the last tick, which the next tick does otherwise.
+        """Learns from what was heard at the last tick, and works out the next command.
 
-        It makes no difference to any command. On a wire it is asked for when the reply is on its way, and the
-        next message finds it done.
+        The next tick does so otherwise. It makes no difference to any command. On a wire it is asked for when
+        the reply is on its way, and the next message finds it done.
 
         Args:
             context: of this system, after its tick.
         """
-        values = context.get_mutable_discrete_state(self._memory)
-        self._learning.learn(self._views(values.get_mutable_value()))
+        reference: PathAhead = self._reference.Eval(context)
+        memory = self._views(context.get_mutable_discrete_state(self._memory).get_mutable_value())
+        self._learning.learn(memory)
+        if memory.planner.started[0] and not memory.next.is_ready[0]:
+            time = (round(float(memory.heard.time[0]) / self.period) + 1) * self.period
+            self._next.keep(memory)
+            self._work_out(memory, reference, time)
+            memory.next.is_ready[0], memory.next.time[0] = 1.0, time
 
     def _tick(self, context: Context, discrete_state: DiscreteValues) -> None:
         time = context.get_time()
@@ -235,6 +244,7 @@ class SelfCalibrating(LeafSystem):
         discrete_state.set_value(int(self._outputs[4]), seen)
         if not joints.running:
             # When it runs again it starts from where it stands then.
+            self._next.take_back(memory)
             memory.planner.started[0] = 0.0
             commands = joints.position, np.zeros(NUM_JOINTS), np.zeros(NUM_JOINTS)
         else:
@@ -266,15 +276,39 @@ class SelfCalibrating(LeafSystem):
 
     def _command(
         self, memory: SimpleNamespace, reference: PathAhead, time: float, position: np.ndarray
-    ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Plans for the instant when a command of now acts, and says what to command."""
+    ) -> np.ndarray:
+        """What to command at this tick: position, velocity and torque, (3, 6)."""
+        coming = memory.next
+        if not self._next.is_for(memory, time, reference):
+            self._next.take_back(memory)
+            self._work_out(memory, reference, time, position)
+        coming.is_ready[0] = 0.0
+        self._learning.plan.append(memory.plan, float(memory.planned[0]), coming.row.all)
+        self._learning.delay.search.command(memory.delay.search, time, coming.row.theta)
+        forecast = self._forecast
+        if coming.begins_path[0] and forecast and forecast.sigma > self._config.probe.vague:
+            event = Event(PATH_UNSEEN, forecast.sigma, forecast.sigma)
+            self._learning.events.note(memory.events, time, event)
+        return coming.commands
+
+    def _work_out(
+        self, memory: SimpleNamespace, reference: PathAhead, time: float, position: np.ndarray | None = None
+    ) -> None:
+        """Plans for the instant when a command of a time acts, and works out what to command then.
+
+        Args:
+            memory: of the law.
+            reference: the path.
+            time: of the tick, s.
+            position: of the joints in rad, (6,), if the robot may just begin to run.
+        """
         instant = time + self._learning.delay.step(memory.delay, float(memory.planned[0]))
         path_start = reference.path.path_start
-        delay = memory.delay
+        delay, coming = memory.delay, memory.next
         is_steady = delay.delay[0] == delay.target[0]
         moment = reference.moment(instant, float(delay.delay[0]) if is_steady else 0.0)
-        X_WE, V_WE = np.array([*moment.X_WE, (0.0, 0.0, 0.0, 1.0)]), np.array(moment.V_WE)
-        if not memory.planner.started[0]:
+        if position is not None and not memory.planner.started[0]:
+            X_WE = np.array([*moment.X_WE, (0.0, 0.0, 0.0, 1.0)])
             J = self._planner.start(memory.planner, memory.lead.x, position, X_WE)
             memory.start_time[0] = time
             memory.planned[0] = instant - self.period
@@ -284,36 +318,30 @@ class SelfCalibrating(LeafSystem):
                 memory.delay.known[0] = 1.0  # nothing will show it
         lead, since_start = memory.lead, time - memory.start_time[0]
         self._lead.step(lead, self.estimator.x(memory.estimator), memory.columns, self.period)
-        first = memory.first[0]
+        first, last = memory.first[0], memory.planned[0]
         aside = self._probe.at(instant - first, path_start - first, memory.amplitude)
-        step = instant - memory.planned[0]
-        wanted = Wanted(X_WE, V_WE, aside)
-        plan = self._planner.step(memory.planner, (lead.x, lead.rate), wanted, since_start, step)
+        wanted = Wanted(moment.X_WE, moment.V_WE, aside)
+        plan = self._planner.step(memory.planner, (lead.x, lead.rate), wanted, since_start, instant - last)
         memory.columns[:] = plan.columns[:, 18:]
         motion = plan.theta, plan.velocity, plan.acceleration
         drives = memory.drives
         command = self._drives.command(drives, motion, plan.loads, self._model.payload)
         is_starting = since_start < _STARTING and np.abs(memory.planner.start_error).max() > 1e-3
         unrest = 0.0 if self._learning.delay.is_settled(memory.delay, instant) and not is_starting else UNREST
-        row = np.concatenate(
-            (
-                *motion,
-                plan.loads.ravel(),
-                plan.motion,
-                plan.twist,
-                lead.unrest + unrest,
-                command.columns,
-                drives.correction,
-                plan.states,
-            )
+        row = (
+            *motion,
+            plan.loads.ravel(),
+            plan.motion,
+            plan.twist,
+            lead.unrest + unrest,
+            command.columns,
+            drives.correction,
+            plan.states,
         )
-        self._learning.plan.append(memory.plan, instant, row)
-        self._learning.delay.search.command(memory.delay.search, time, plan.theta)
-        forecast, last = self._forecast, memory.planned[0]
-        if forecast and forecast.sigma > self._config.probe.vague and last < path_start <= instant:
-            self._learning.events.note(
-                memory.events, time, Event(PATH_UNSEEN, forecast.sigma, forecast.sigma)
-            )
-        memory.planned[0] = instant
+        np.concatenate(row, out=coming.row.all)
         # While the delay is corrected the path is sent faster or slower than it is to be travelled.
-        return command.position, (1.0 + memory.delay.rate[0]) * command.velocity, command.torque
+        velocity = (1.0 + memory.delay.rate[0]) * command.velocity
+        for i, part in enumerate((command.position, velocity, command.torque)):
+            coming.commands[i] = part
+        memory.planned[0], coming.path_time[0] = instant, reference.path_time(instant)
+        coming.begins_path[0] = last < path_start <= instant

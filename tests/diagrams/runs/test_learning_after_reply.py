@@ -1,10 +1,15 @@
 """On a wire a law that learns answers first: its reply does not wait for what is learnt from the message."""
 
+from types import SimpleNamespace
+from typing import Any
+
 import numpy as np
 import pytest
 
+from diagrams.hardware_link import StationError
 from diagrams.runs.real_time import RealTimeRecord, RealTimeRun
 from diagrams.scenario.scenario import load_scenario
+from systems.samples import PoseSample
 from systems.servo.self_calibrating import SelfCalibrating
 from tests.diagrams.lockstep import Lockstep
 
@@ -42,6 +47,14 @@ def test_each_reply_is_out_before_anything_is_learnt(prompt):
     assert (np.diff(sent) == 1).all()
     assert record.turn_around.max() < LEARNING
     assert len(record.log.learnt["parameters"]) > 30
+
+
+def test_a_run_begins_when_the_camera_sees_the_tool():
+    scenario = load_scenario("cell", ["station.link.connect=1"])
+    blind: Any = SimpleNamespace(poll=lambda now: PoseSample(), report=lambda: SimpleNamespace(last_error=""))
+    wire, run = Lockstep(scenario), RealTimeRun(scenario, SelfCalibrating)
+    with pytest.raises(StationError, match="it does not see the body"):
+        run.run(wire.link, blind, now=wire.now)
 
 
 def test_when_it_is_learnt_makes_no_difference_to_a_command(prompt):

@@ -1,0 +1,66 @@
+"""A command that is worked out before its message is the one that is worked out after it, whatever comes."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from pydrake.common.value import Value
+
+from diagrams.scenario.scenario import load_scenario
+from robots.description.model import load_robot
+from systems.controller_model import ControllerModel
+from systems.guard.guard import GuardConfig
+from systems.reference.path_time import PathTime
+from systems.reference.paths import make_path
+from systems.reference.reference import PathAhead
+from systems.samples import JointSample, PoseSample
+from systems.servo.self_calibrating import SelfCalibrating
+from systems.servo.self_calibrating_config import SelfCalibratingConfig
+
+PERIOD = 4e-3
+STOPPED, SLOWED, LOST = range(60, 65), 110, (150, 151)  # ticks
+START = np.array([0.1, 0.3, 0.2, 0.1, 0.9, 0.0])  # rad
+
+
+@pytest.fixture(scope="module")
+def law() -> SelfCalibrating:
+    robot = load_robot("irb1200")
+    return SelfCalibrating(ControllerModel(robot, period=PERIOD), SelfCalibratingConfig(), GuardConfig())
+
+
+def commands(law: SelfCalibrating, asks: bool) -> np.ndarray:
+    """Of every tick: the robot is stopped and started again, the path is slowed, messages are lost."""
+    ahead = PathAhead(make_path(load_scenario("misaligned").reference), PERIOD, time=PathTime(0.5))
+    context = law.CreateDefaultContext()
+    ports = {
+        name: law.GetInputPort(name).FixValue(context, value)
+        for name, value in (
+            ("reference", Value[object](ahead)),
+            ("joint_sample", Value(JointSample())),
+            ("pose_sample", Value(PoseSample())),
+        )
+    }
+    rows = []
+    for k in range(200):
+        if k in LOST:
+            continue
+        time = k * PERIOD
+        context.SetTime(time)
+        sample = JointSample(time, START + 1e-3 * np.sin(time), running=k not in STOPPED)
+        ports["joint_sample"].GetMutableData().set_value(sample)
+        if k == SLOWED:
+            assert ahead.time is not None
+            ahead = replace(ahead, time=ahead.time.changed(time - 0.5, time - 0.5, 0.3))
+            ports["reference"].GetMutableData().set_value(ahead)
+        context.SetDiscreteState(law.EvalUniquePeriodicDiscreteUpdate(context))
+        if asks:
+            law.learn(context)
+        outputs = "position_command", "velocity_command", "torque_feedforward", "look_ahead"
+        rows.append(np.concatenate([law.GetOutputPort(name).Eval(context) for name in outputs]))
+    return np.array(rows)
+
+
+def test_it_is_the_same_whatever_comes(law):
+    before, after = commands(law, asks=True), commands(law, asks=False)
+    assert np.ptp(after[STOPPED.stop :, :6], axis=0).min() > 1e-3
+    assert np.array_equal(before, after)
