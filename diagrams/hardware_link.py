@@ -288,8 +288,17 @@ class HardwareLink:
             else:
                 self._guard.take_back()
 
-    def approach(self, goal: np.ndarray) -> None:
-        """Moves the robot smoothly to joint positions and waits until it is there. Raises StationError."""
+    def approach(self, goal: np.ndarray, speed_share: float = _APPROACH_SHARE) -> None:
+        """Moves the robot smoothly to joint positions and waits until it is there.
+
+        Args:
+            goal: rad, shape (6,).
+            speed_share: of the largest joint speeds.
+
+        Raises:
+            EndedOnRequest: if somebody wanted an end.
+            StationError: if the controller stopped or the robot does not come there.
+        """
         deadline = self._now() + _LONGEST_APPROACH
         epoch, start, passed = -1, goal, 0.0
         while self._now() < deadline:
@@ -301,10 +310,10 @@ class HardwareLink:
             if report is None or not report.is_ready:
                 report = self.wait_until_ready(self._link.connect)
                 if report is None:
-                    raise StationError("the controller stopped while the robot was on its way to the start")
+                    raise StationError("the controller stopped while the robot was on its way")
             if self.epoch != epoch or self.was_interrupted:
                 epoch, start, passed = self.epoch, report.position, 0.0
-            position, velocity, left = smooth_motion(start, goal, passed, _APPROACH_SHARE * self._speed)
+            position, velocity, left = smooth_motion(start, goal, passed, speed_share * self._speed)
             if self._is_speed_only:
                 velocity = velocity + _APPROACH_GAIN * (position - report.position)
             self.send_command(position, velocity)
@@ -312,7 +321,7 @@ class HardwareLink:
             if left <= -_SETTLE and off < (_ARRIVED if left > -_PATIENCE else _NEARLY):
                 return
         off = np.rad2deg(np.abs(self.last.position - goal).max()) if self.last else math.nan
-        raise StationError(f"the robot did not reach the start of the path: a joint is {off:.2f} deg away")
+        raise StationError(f"the robot did not reach its goal: a joint is {off:.2f} deg away")
 
     def _learn_clock(self) -> None:
         """Tells the clock of the last report; after the reply, because it may take a while."""

@@ -15,6 +15,7 @@ COMMANDS = {
     "diagram": "experiments.diagram.command:diagram_command",
     "cell": "experiments.station.cell_command:cell_command",
     "latency": "experiments.station.latency_command:latency_command",
+    "record": "experiments.station.record_command:record_command",
     "log": "experiments.record.log_command:log_command",
     "report": "experiments.record.report_command:report_command",
     "runs": "experiments.record.runs_command:runs_command",

@@ -41,7 +41,7 @@ def restored(contents: Contents, name: str) -> RunLog:
     if missing:
         raise ValueError(f"{name}: no messages of {', '.join(missing)}")
     topics = contents.topics
-    seen, X_WE_seen = _exposures(topics.get(POSE))
+    seen, X_WE_seen = exposures(topics.get(POSE))
     ticks, X_WE_wanted = topics[DESIRED].time, _poses(topics[DESIRED])
     if TRUE_POSE in topics or len(seen) == 0:
         time, X_WE_desired = ticks, X_WE_wanted
@@ -90,7 +90,7 @@ def _poses(topic: Topic) -> np.ndarray:
     return X
 
 
-def _exposures(topic: Topic | None) -> tuple[np.ndarray, np.ndarray]:
+def exposures(topic: Topic | None) -> tuple[np.ndarray, np.ndarray]:
     """When poses were exposed, in s and in order, shape (m,), and the poses (m, 4, 4)."""
     if topic is None:
         return np.empty(0), np.empty((0, 4, 4))

@@ -26,6 +26,7 @@ from experiments.calibration.calibrate import (
 from experiments.calibration.instruments import calibrate_with_instruments
 from experiments.calibration.noise_option import ESTIMATE, noise_option
 from experiments.calibration.page import write_calibration_page
+from experiments.calibration.recording import recorded_measurements
 from experiments.calibration.report import calibration_json, print_calibration
 from experiments.calibration.urdf_option import urdf_robot, urdf_sag
 from experiments.cli.console import print_files, progress_bar, refusing
@@ -57,8 +58,15 @@ def calibrate_command(
         str | None,
         typer.Option(metavar="FILE.csv", help="Identify from this table instead of simulated measurements."),
     ] = None,
+    recording: Annotated[
+        str | None,
+        typer.Option(
+            metavar="FILE.mcap",
+            help="Identify from the dwells of a recorded motion: 0.5 s to settle, the mean of 1 s.",
+        ),
+    ] = None,
     validation: Annotated[
-        str | None, typer.Option(metavar="FILE.csv", help="Validate with this table; needs --measurements.")
+        str | None, typer.Option(metavar="FILE.csv", help="Validate with this table; needs measurements.")
     ] = None,
     count: Annotated[
         int | None, typer.Option(metavar="N", help="Configurations to simulate.", show_default="75")
@@ -136,12 +144,13 @@ def calibrate_command(
         compliance is True,
         fixed or [],
         tuple(filter(None, joint_errors.split(","))),
+        recording,
     )
     note = ""
     with json_output(json_file) as output, refusing(ValueError, OSError), ExitStack() as stack:
         wanted.check()
-        prepared = prepare(scenario, settings or [], robot, needs_path=not measurements)
-        if compliance is None and not measurements:
+        prepared = prepare(scenario, settings or [], robot, needs_path=not wanted.is_given)
+        if compliance is None and not wanted.is_given:
             wanted = replace(wanted, compliance=prepared.scenario.station.elasticity == "structure")
         baked = urdf_sag(urdf, urdf_payload, urdf_pose, wanted.compliance)
         if measurements and names_targets(measurements):
@@ -151,7 +160,7 @@ def calibrate_command(
             return
         if cell is not None:
             raise ValueError("--cell is for a table with a column target, instrument or distance")
-        if not measurements:  # of tables nothing but the kinematics is asked
+        if not wanted.is_given:  # of tables nothing but the kinematics is asked
             measure = "measure there (truetip design --program) and give the table with --measurements"
             simulated_only(prepared, "calibrate", measure)
             check(prepared, ["open_loop"])
@@ -159,9 +168,9 @@ def calibrate_command(
         robot_file = stack.enter_context(staged_file(write, *YAML)) if write else None
         urdf_file = stack.enter_context(staged_file(urdf, ".urdf", ".xml")) if urdf else None
         stack.enter_context(output.staged())
-        measured = _read(wanted) if measurements else _simulated(prepared, wanted)
+        measured = _read(prepared, wanted) if wanted.is_given else _simulated(prepared, wanted)
         study = _study(prepared, wanted, measured)
-        path = None if measurements else _path(prepared.scenario, study)
+        path = None if wanted.is_given else _path(prepared.scenario, study)
         output.write(calibration_json(study, path, measured.problems))
         _write_tables(stage, measured.sets)
         write_calibration_page(stage / "report.html", prepared.title, study, path, measured.problems)
@@ -189,16 +198,25 @@ class _Wanted:
     compliance: bool
     fixed: list[str]
     joint_errors: tuple[str, ...]
+    recording: str | None = None
+
+    @property
+    def is_given(self) -> bool:
+        """Whether somebody has measured already."""
+        return bool(self.measurements or self.recording)
 
     def check(self) -> None:
         """Raises ValueError if something is unknown, too small or does not go together."""
-        if self.validation and not self.measurements:
+        if self.measurements and self.recording:
+            raise ValueError("--measurements and --recording: one of them is the calibration set")
+        if self.validation and not self.is_given:
             raise ValueError("--validation needs --measurements; without it both sets are simulated")
-        if self.measurements:
+        if self.is_given:
             for option, value in (("--count", self.count), ("--criterion", self.criterion)):
                 if value is not None:
                     raise ValueError(
-                        f"{option} is for simulated measurements; with --measurements it has no effect"
+                        f"{option} is for simulated measurements; with "
+                        f"{'--measurements' if self.measurements else '--recording'} it has no effect"
                     )
         if self.count is not None:
             at_least("--count", 5, self.count)
@@ -231,10 +249,10 @@ class _Measured:
     design_seconds: float = 0.0
 
 
-def _read(wanted: _Wanted) -> _Measured:
-    """The tables that were given."""
+def _read(prepared: Prepared, wanted: _Wanted) -> _Measured:
+    """The tables that were given, or the dwells of a recording."""
     problems: list[tuple[str, RowProblem]] = []
-    tables = []
+    tables = [recorded_measurements(wanted.recording, prepared.robot)] if wanted.recording else []
     for name in filter(None, (wanted.measurements, wanted.validation)):
         table, found = read_measurements(name)
         tables.append(table)

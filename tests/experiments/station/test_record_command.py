@@ -1,0 +1,71 @@
+"""``truetip record``: goes on where it was interrupted, and refuses what it could not continue."""
+
+import numpy as np
+import pytest
+from typer.testing import CliRunner
+
+from diagrams.record.run_record import RunRecord
+from diagrams.record.topics import JOINTS, POSE, pose_message
+from experiments.main import app
+from experiments.station.measured_table import MeasuredTable, read_configurations
+from robots.calibration.measurement_file import read_measurements
+
+Q = np.deg2rad([[0, 20, 10, 0, 40, 0], [15, 10, 0, 20, 30, 10], [-20, 30, 15, -10, 50, 40]])
+HEAD = ",".join(f"q{number}_deg" for number in range(1, 7))
+
+
+def refused(*arguments: str) -> str:
+    result = CliRunner().invoke(app, list(arguments))
+    assert result.exit_code == 2
+    assert len(result.stderr.strip().splitlines()) == 1
+    return result.stderr
+
+
+@pytest.fixture
+def design(tmp_path):
+    path = tmp_path / "design.csv"
+    rows = [",".join(map(repr, row)) for row in np.rad2deg(Q).tolist()]
+    path.write_text("\n".join([HEAD, *rows]) + "\n")
+    return path
+
+
+def test_every_row_is_on_the_disk_at_once_and_the_next_run_knows_it(tmp_path, design):
+    path = tmp_path / "measured.csv"
+    q = read_configurations(design)
+    np.testing.assert_allclose(q, Q, atol=1e-12)
+    table = MeasuredTable(path, q, 2.0)
+    for number in (3, 1):
+        table.append(number, (q[number - 1] + 1e-4, np.array([0.5, 0.1, 0.2 * number]), np.eye(3)))
+    found, problems = read_measurements(path)
+    assert not problems
+    np.testing.assert_array_equal(found.position[:, 2], [0.2 * 3, 0.2])
+    assert MeasuredTable(path, q, 2.0).measured == {1, 3}
+    with pytest.raises(ValueError, match="line 2: measured at another configuration or load"):
+        MeasuredTable(path, q, 3.0)
+    with pytest.raises(ValueError, match="line 3: measured at another configuration or load"):
+        MeasuredTable(path, q[1:], 2.0)
+
+
+def test_what_cannot_be_measured_is_refused_in_one_line(tmp_path, design):
+    assert "2 or more exposures, got 0.5 s, 0.0 s" in refused("record", str(design), "--mean", "0")
+    assert "must be between 0 and 1, got 2.0" in refused("record", str(design), "--speed", "2")
+    assert "must end in .csv or .txt" in refused("record", str(design), "--out", str(tmp_path / "a.mcap"))
+    assert "nothing.csv: no such file" in refused("record", str(tmp_path / "nothing.csv"))
+    design.write_text(HEAD + "\n1,2,3,4,5,six\n")
+    assert "design.csv, line 2: not six finite joint positions" in refused("record", str(design))
+
+
+def test_a_recording_without_a_dwell_is_refused_in_one_line(tmp_path):
+    path = tmp_path / "moving.mcap"
+    record = RunRecord(path, "station: {payload: 1.0}")
+    for at in np.arange(0.0, 4.0, 0.02).tolist():
+        record.write(JOINTS, at, {"stamp": at, "position": [0.1 * at] * 6, "effort": [0.0] * 6})
+        record.write(POSE, at, pose_message(np.eye(4), at))
+    record.close()
+    out = ["--out", str(tmp_path / "calibration")]
+    assert "moving.mcap: the robot nowhere rests for 1.5 s" in refused(
+        "calibrate", "--recording", str(path), *out
+    )
+    both = ["--recording", str(path), "--measurements", str(path)]
+    assert "one of them is the calibration set" in refused("calibrate", *both)
+    assert not (tmp_path / "calibration").exists()
