@@ -1,5 +1,6 @@
 """Supervision of the commands: limits, missing commands, lost measurements and the smooth stop."""
 
+import importlib
 import math
 
 import numpy as np
@@ -10,7 +11,7 @@ from robots.description.model import NUM_JOINTS, RobotModel
 from robots.kinematics.forward import Kinematics, robust_solve
 from systems.guard.config import KINDS, GuardConfig
 from systems.guard.jerk_limits import JerkLimits
-from systems.guard.joint_limits import JointLimits, is_allowed
+from systems.guard.joint_limits import JointLimits
 from systems.guard.way_back import shortest_way, way_left
 from systems.samples import JointSample
 
@@ -32,7 +33,7 @@ _WIDTH = 66
 _GOING, _HOLDING, _STOPPING, _RESUMING, _IDLE, _AWAY = 0.0, 1.0, 2.0, 3.0, 4.0, 5.0
 _ABSURD = 1e6  # rad and rad/s in sum: no command, and squares of it would not be numbers
 _GRACE = 1.05  # times its limit that a correction may reach: where a law stops it, it may overshoot by a step
-_NO_DEVIATION = np.zeros(NUM_JOINTS)
+_NO_DEVIATION, _UNKNOWN = np.zeros(NUM_JOINTS), np.full(NUM_JOINTS, np.nan)
 
 
 class CommandGuard(LeafSystem):
@@ -104,6 +105,9 @@ class CommandGuard(LeafSystem):
         self._rows = self._limits.rows(period)
         self._jerk = JerkLimits(self._limits)
         self._kinematics = Kinematics(robot)
+        # Not before a guard is made: it takes time to import.
+        self._kernels = importlib.import_module("systems.guard.kernels")
+        self._kernels.warm_up()
         # A hundred-thousandth below, because a law's own clipping rounds.
         self._correction_limit = (1.0 - 1e-5) * correction_limit
         self._correction_angle = (1.0 - 1e-5) * np.deg2rad(correction_limit_deg)
@@ -172,15 +176,15 @@ class CommandGuard(LeafSystem):
     ) -> tuple[np.ndarray, list[int], float]:
         """What `_calc_next` says; no joints stand for a robot that runs and has been commanded before."""
         state = context.get_discrete_state(0).value().copy()
-        position, velocity, correction, measurement = (port.Eval(context).tolist() for port in self._inputs)
+        position, velocity, correction, measurement = (port.Eval(context) for port in self._inputs)
         kinds = []
         if joints is not None:
             _take_from(state, joints)
         if not are_joints_known:
             kinds.append(_REFUSED)
-            position, state[_VELOCITIES] = [math.nan] * NUM_JOINTS, np.nan_to_num(state[_VELOCITIES])
+            position, state[_VELOCITIES] = _UNKNOWN, np.nan_to_num(state[_VELOCITIES])
         last = state.copy() if self._jerk.is_given else None
-        excess = self._excess(correction)
+        excess = self._kernels.excess(correction, self._correction_angle, self._correction_limit)
         if excess > 0.0:
             kinds.append(_CORRECTION)
             if excess > _GRACE and self._config.on_correction_limit == "stop":
@@ -194,9 +198,9 @@ class CommandGuard(LeafSystem):
         elif state[_MODE] == _STOPPING:
             kinds.append(_STOPPED)
             self._brake(state)
-            if sum(map(abs, velocity)) < _ABSURD:
+            if self._kernels.is_command(_NO_DEVIATION, velocity, _ABSURD):
                 state[_ASIDE] += self._period * (state[_VELOCITIES] - velocity)
-        elif not sum(map(abs, position + velocity)) < _ABSURD:  # as no number is
+        elif not self._kernels.is_command(position, velocity, _ABSURD):
             # Before the first command a law is silent by right.
             if state[_LAST_COMMAND] > -math.inf:
                 kinds.append(_NO_COMMAND)
@@ -212,62 +216,53 @@ class CommandGuard(LeafSystem):
             self._ease(state, last, kinds)
         if state[_MODE] == _HOLDING:
             kinds.append(_HELD)
-        refused = measurement[1]
+        last_sample, refused, _ = measurement.tolist()
         if refused > state[_REFUSED_SEEN]:
             kinds.append(_REFUSED)
             state[_REFUSED_SEEN] = refused
-        return state, kinds, measurement[0]
-
-    def _excess(self, correction: list[float]) -> float:
-        """A correction as a share of its limit, if it has come there; else 0."""
-        a, b, c, x, y, z = correction
-        turn, shift = a * a + b * b + c * c, x * x + y * y + z * z
-        if turn > self._correction_angle**2 or shift > self._correction_limit**2:
-            share = max(turn / self._correction_angle**2, shift / self._correction_limit**2)
-            return math.sqrt(share) if math.isfinite(share) else math.inf
-        return 0.0
+        return state, kinds, last_sample
 
     def _within_correction(
-        self, position: list[float], velocity: list[float], correction: list[float]
-    ) -> tuple[list[float], list[float]]:
+        self, position: np.ndarray, velocity: np.ndarray, correction: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray]:
         """A command without the part of its correction that is beyond the limit; NaN if there is none."""
-        q, excess = np.array(position), np.array(correction)
-        if not (np.isfinite(q).all() and np.isfinite(excess).all()):
-            return [math.nan] * NUM_JOINTS, velocity
+        excess = correction.copy()
+        if not (np.isfinite(position).all() and np.isfinite(excess).all()):
+            return _UNKNOWN, velocity
         for part, limit in ((slice(0, 3), self._correction_angle), (slice(3, 6), self._correction_limit)):
             size = float(np.linalg.norm(excess[part]))
             excess[part] *= max(0.0, 1.0 - _GRACE * limit / size) if size else 0.0
-        too_far = robust_solve(self._kinematics.jacobian(q), excess)
+        too_far = robust_solve(self._kinematics.jacobian(position), excess)
         if self._is_speed_only:
-            return position, (np.array(velocity) - too_far / self._config.stop_time).tolist()
-        return (q - too_far).tolist(), velocity
+            return position, velocity - too_far / self._config.stop_time
+        return position - too_far, velocity
 
     def _places(
-        self, state: np.ndarray, position: list[float], velocity: list[float]
+        self, state: np.ndarray, position: np.ndarray, velocity: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray]:
         """From where the next step begins and from where the last one did, (6,) each in rad."""
         if not self._is_speed_only:
             return state[_POSITIONS], state[_BEFORE]
         # Such a law commands from where the robot is, which what was issued before does not tell.
-        now = np.array(position) - self._period * np.array(velocity)
+        now = position - self._period * velocity
         return now, now - self._period * state[_VELOCITIES]
 
-    def _may_follow(self, state: np.ndarray, position: list[float], velocity: list[float]) -> bool:
+    def _may_follow(self, state: np.ndarray, position: np.ndarray, velocity: np.ndarray) -> bool:
         start, before = self._places(state, position, velocity)
-        last = state[_VELOCITIES].tolist()
-        return is_allowed(self._rows, position, velocity, start.tolist(), before.tolist(), last)
+        return self._kernels.is_allowed(self._rows, position, velocity, start, before, state[_VELOCITIES])
 
     def _follow(
-        self, state: np.ndarray, position: list[float], velocity: list[float], kinds: list[int]
+        self, state: np.ndarray, position: np.ndarray, velocity: np.ndarray, kinds: list[int]
     ) -> None:
         """Goes to the law's command as far as the limits allow."""
         if self._may_follow(state, position, velocity):
             state[_BEFORE] = state[_POSITIONS]
-            state[_ISSUED], state[_BRAKING_FROM] = position + velocity, velocity
+            state[_POSITIONS], state[_VELOCITIES] = position, velocity
+            state[_BRAKING_FROM] = velocity
             return
         limits, period = self._limits, self._period
         start, before = self._places(state, position, velocity)
-        goal, rate = np.array(position), np.array(velocity)
+        goal, rate = position, velocity
         excess = max(1.0, float((np.abs(rate) / limits.speed).max()))
         if self._jerk.is_given:  # which finds the way there itself, within all limits
             kinds += [_POSITION] if ((goal < limits.lower) | (goal > limits.upper)).any() else []
@@ -315,16 +310,15 @@ class CommandGuard(LeafSystem):
             state[_BRAKING_FROM] = velocity
 
     def _back(
-        self, state: np.ndarray, position: list[float], velocity: list[float]
-    ) -> tuple[list[float], list[float]]:
+        self, state: np.ndarray, position: np.ndarray, velocity: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray]:
         """The law's command and what is left of the distance to it after a stop or a silence."""
-        law_position, law_velocity = np.array(position), np.array(velocity)
         if state[_MODE] != _RESUMING:
             # As it was a tick ago, when the robot was where it is.
-            offset = state[_POSITIONS] - (law_position - self._period * law_velocity)
+            offset = state[_POSITIONS] - (position - self._period * velocity)
             if self._is_speed_only:
                 offset = state[_ASIDE].copy()
-            rate = state[_VELOCITIES] - law_velocity
+            rate = state[_VELOCITIES] - velocity
             state[_OFFSET], state[_OFFSET_RATE] = offset, rate
             state[_WAY] = max(self._config.resume_time, shortest_way(self._limits, offset, rate))
             state[_DONE], state[_MODE] = 0.0, _RESUMING
@@ -333,8 +327,7 @@ class CommandGuard(LeafSystem):
         if state[_DONE] >= 1.0:
             state[_MODE] = _GOING
         state[_ASIDE] = left
-        velocity = (law_velocity + left_rate).tolist()
-        return position if self._is_speed_only else (law_position + left).tolist(), velocity
+        return position if self._is_speed_only else position + left, velocity + left_rate
 
     def _brake(self, state: np.ndarray) -> None:
         """Slows all joints down evenly, from full motion to rest in ``stop_time``, or as fast as they may."""

@@ -88,50 +88,15 @@ class JointLimits:
         low, high = np.minimum(self.lower, position), np.maximum(self.upper, position)
         return np.minimum(np.maximum(position + speed * period, low), high)
 
-    def rows(self, period: float) -> list[tuple[float, ...]]:
-        """For `is_allowed`: of each joint the range, speed, step, change of speed and change of step."""
+    def rows(self, period: float) -> np.ndarray:
+        """Of each joint lower and upper limit, speed, step, change of speed and change of step, (6, 6).
+
+        They are what `systems.guard.kernels.is_allowed` asks for.
+        """
         grown = 1.0 + _ROUNDING
         stride, change = grown * period * self.speed, grown * period * self.acceleration
         columns = (self.lower, self.upper, grown * self.speed, stride, change, period * change + _SMALLEST)
-        return list(zip(*(column.tolist() for column in columns), strict=True))
-
-
-def is_allowed(
-    rows: list[tuple[float, ...]],
-    goal: list[float],
-    rate: list[float],
-    start: list[float],
-    before: list[float],
-    velocity: list[float],
-) -> bool:
-    """Whether a command may be followed as it is. Plain floats: this runs every tick.
-
-    Args:
-        rows: of `JointLimits.rows`.
-        goal, rate: the command, six numbers each in rad and rad/s.
-        start: from where it is a step, rad.
-        before: from where the step before that was, rad.
-        velocity: of the last command, rad/s.
-    """
-    for wanted, turning, last, previous, was, (lower, upper, top, stride, change, bend) in zip(
-        goal, rate, start, before, velocity, rows, strict=True
-    ):
-        step = wanted - last
-        if not (
-            lower <= wanted <= upper
-            and -top <= turning <= top
-            and -stride <= step <= stride
-            and -change <= turning - was <= change
-            and -bend <= step - last + previous <= bend
-        ):
-            return False
-        size = step if step > 0.0 else -step
-        # What is left of the range must suffice for braking.
-        if size > bend:
-            room = upper - wanted if step > 0.0 else wanted - lower
-            if size * (size - bend) + 0.25 * bend * bend > 2.0 * bend * room:
-                return False
-    return True
+        return np.stack(columns, axis=1)
 
 
 def fastest(distance: np.ndarray, change: np.ndarray, period: float) -> np.ndarray:

@@ -1,16 +1,17 @@
-"""Compiled functions of the laws: no tick waits for the compiler."""
+"""Compiled functions of laws and guard: no tick waits for the compiler."""
 
 import pytest
 
 from diagrams.runs.simulation import Experiment
 from diagrams.scenario.scenario import load_scenario
 from robots.kinematics import kernels as of_kinematics
+from systems.guard import kernels as of_guard
 from systems.servo import kernels
 
 
 def compiled() -> dict[str, int]:
     """How often every function has been compiled, once for each kind of arguments."""
-    functions = vars(of_kinematics) | vars(kernels)
+    functions = vars(of_kinematics) | vars(of_guard) | vars(kernels)
     return {name: len(f.signatures) for name, f in functions.items() if hasattr(f, "signatures")}
 
 
