@@ -13,13 +13,13 @@ from experiments.comparison.compare import RunJob, run_job
 from robots.calibration.identification import IdentificationConfig
 from robots.calibration.identified import Identified
 from robots.calibration.measurements import MeasurementNoise, Measurements
-from robots.calibration.solver.problem import COMPLIANCE_NAMES
 from robots.calibration.validation import (
     ErrorStatistics,
     plausible_rows,
     prediction_errors,
     statistics,
 )
+from robots.calibration.yielding_joints import COMPLIANCE_NAMES
 from robots.description.model import NUM_JOINTS, RobotModel
 from robots.kinematics.error_kinematics import ErrorKinematics
 from robots.kinematics.forward import Kinematics

@@ -156,7 +156,10 @@ def calibrate_command(
         if measurements and names_targets(measurements):
             wanted.check_instruments(urdf)
             calibrated = (prepared.scenario.robot, prepared.robot)
-            calibrate_with_instruments(human, output, calibrated, (measurements, cell), out, write)
+            tables, kinds = (measurements, cell), wanted.joint_errors
+            calibrate_with_instruments(
+                human, output, calibrated, tables, out, write, kinds, wanted.compliance
+            )
             return
         if cell is not None:
             raise ValueError("--cell is for a table with a column target, instrument or distance")
@@ -227,9 +230,7 @@ class _Wanted:
         """Raises ValueError if an option has no effect on tables of targets and instruments."""
         given = {
             "--validation": self.validation,
-            "--compliance": self.compliance,
             "--fixed": self.fixed,
-            "--joint-errors": self.joint_errors,
             "--position-only": self.position_only,
             "--noise": self.noise != ESTIMATE,
             "--urdf": urdf,

@@ -8,7 +8,7 @@ import numpy as np
 from rich.console import Console
 from rich.markup import escape
 
-from experiments.calibration.words import rounded
+from experiments.calibration.words import rounded, unit
 from experiments.cli.console import print_files
 from experiments.cli.json_output import JsonOutput
 from experiments.cli.staging import YAML, staged_file, staged_folder
@@ -32,6 +32,8 @@ def calibrate_with_instruments(
     tables: tuple[str, str | None],
     out: Path,
     write: str | None,
+    joint_errors: tuple[str, ...] = (),
+    compliance: bool = False,
 ) -> None:
     """Reads, adjusts and writes.
 
@@ -42,6 +44,7 @@ def calibrate_with_instruments(
         tables: the measurements, and what is known of the cell if there is such a file.
         out: folder of the report.
         write: file of the calibrated robot.
+        joint_errors, compliance: what to identify, as for `identify_with_instruments`.
 
     Raises:
         ValueError: if a file cannot be used or the adjustment fails.
@@ -58,7 +61,7 @@ def calibrate_with_instruments(
         stage = stack.enter_context(staged_folder(out))
         robot_file = stack.enter_context(staged_file(write, *YAML)) if write else None
         stack.enter_context(output.staged())
-        found = identify_with_instruments(nominal, seen, cell)
+        found = identify_with_instruments(nominal, seen, cell, joint_errors, compliance)
         output.write(instruments_json(found, tables[0], problems))
         _write_page(stage / "report.html", found)
         if robot_file:
@@ -156,10 +159,9 @@ def _write_page(page: Path, found: InstrumentCalibration) -> None:
     parameters = []
     sigmas = np.sqrt(np.diagonal(found.covariance))
     for name, value, sigma, share in zip(found.names, found.values, sigmas, found.shares, strict=True):
-        is_length = name.endswith(("_x", "_y", "_z"))
-        factor = 1e3 if is_length else np.rad2deg(1.0)
+        label, factor = unit(name)
         shown = rounded(factor * value, _CONFIDENCE * factor * sigma)
-        parameters.append([name, *shown, "mm" if is_length else "deg", f"{100.0 * share:.1f} %"])
+        parameters.append([name, *shown, label, f"{100.0 * share:.1f} %"])
     note = (
         "All parameters with 95 % confidence: of the robot, of targets on the tool, of frames on top of "
         "where the nominal robot puts them, of anchors. What the data do not show has its prior."

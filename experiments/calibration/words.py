@@ -37,6 +37,8 @@ def unit(name: str) -> tuple[str, float]:
     """The unit in which a parameter is shown, and how many of it are one in SI units."""
     if name.startswith("c_"):
         return "rad / N m", 1.0
+    if name.startswith("mass_"):
+        return "%", 100.0
     if name.startswith(("scale_", "coupling_")):
         return "ppm", 1e6
     return ("mm", 1e3) if name.endswith(("_x", "_y", "_z")) else ("deg", 180.0 / math.pi)

@@ -15,13 +15,7 @@ from robots.calibration.identified import Identified
 from robots.calibration.instrument_frame import instrument_frame
 from robots.calibration.loads import Loads
 from robots.calibration.measurements import MeasurementNoise, Measurements
-from robots.calibration.prior import (
-    CENTRE_OF_MASS,
-    MASS,
-    compliance_sizes,
-    mass_sizes,
-    parameter_sizes,
-)
+from robots.calibration.prior import CENTRE_OF_MASS, MASS, parameter_sizes
 from robots.calibration.reduction import ReducibleModel
 from robots.calibration.solver.levenberg_marquardt import Fit, minimise
 from robots.calibration.solver.noise_model import FLOOR, JOINT, POSITION, ROTATION, NoiseModel, row_shape
@@ -33,6 +27,7 @@ from robots.calibration.solver.variance_components import (
     parameter_factor,
     variance_components,
 )
+from robots.calibration.yielding_joints import yielding_sizes
 from robots.description.model import NUM_JOINTS, RobotModel
 from robots.metrology.least_squares import UndeterminedError
 from robots.pose import zyx_from_rotation
@@ -137,9 +132,7 @@ def _problem(
     if config.compliance:
         loads = Loads(robot, measurements.payload)
         geometry = len(model)
-        sizes = np.concatenate(
-            [sizes, compliance_sizes(robot), mass_sizes(config.mass, config.centre_of_mass)]
-        )
+        sizes = np.concatenate([sizes, yielding_sizes(robot, config.mass, config.centre_of_mass)])
         free = np.concatenate([free, np.arange(geometry, len(sizes))])
     return Problem(model, measurements, sizes, free, loads), reducible
 

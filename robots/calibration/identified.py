@@ -8,7 +8,7 @@ import numpy as np
 from robots.calibration.error_model import ErrorModel
 from robots.calibration.measurements import MeasurementNoise, Measurements
 from robots.calibration.reduction import ReducibleModel, Reduction
-from robots.calibration.solver.problem import COMPLIANCE_NAMES
+from robots.calibration.yielding_joints import COMPLIANCE_NAMES
 from robots.description.calibration import Calibration
 from robots.description.model import NUM_JOINTS, RobotModel
 from robots.pose import zyx_from_rotation

@@ -14,6 +14,7 @@ from robots.calibration.instruments.problem import InstrumentProblem, Setting, S
 from robots.calibration.solver.levenberg_marquardt import Fit, minimise
 from robots.calibration.solver.noise_model import FLOOR
 from robots.calibration.solver.variance_components import parameter_factor, variance_components
+from robots.calibration.yielding_joints import COMPLIANCE_NAMES
 from robots.description.calibration import Calibration
 from robots.description.model import RobotModel
 from robots.metrology.least_squares import UndeterminedError
@@ -43,6 +44,7 @@ class InstrumentCalibration:
     covariance: np.ndarray  # (f, f)
     shares: np.ndarray  # (f,) of what is known of each, how much comes from the data: 0 to 1
     x: np.ndarray  # parameters of the error model
+    compliance: np.ndarray  # (6,) of the joints in rad / (N m), zeros if they are taken as stiff
     setting: Setting  # targets, frames and anchors
     before: np.ndarray  # (m, 3) m, measured less predicted with the nominal robot, NaN where nothing was
     residuals: np.ndarray  # (m, 3) m, with the calibrated one
@@ -60,20 +62,28 @@ class InstrumentCalibration:
         """The robot as it is, in its own world; ``of`` is the one that was calibrated."""
         robot = self.model.robot_with_errors(self.x)
         instruments = ", ".join(self.observations.instruments)
-        inside = [k for k, name in enumerate(self.names) if name in self.model.names]
+        known = (*self.model.names, *COMPLIANCE_NAMES)
+        inside = [k for k, name in enumerate(self.names) if name in known]
         covariance = self.covariance[np.ix_(inside, inside)]
+        errors = self.model.joint_errors
         calibration = Calibration(
             of,
+            self.compliance.tolist(),
             source=f"identified from {int(self.used.sum())} lines of {instruments}",
             names=[self.names[k] for k in inside],
             values=self.values[inside].tolist(),
             covariance=[row[: i + 1].tolist() for i, row in enumerate(covariance)],
+            joint_errors=dict(zip(errors, self.x[len(self.x) - len(errors) :].tolist(), strict=True)),
         )
         return replace(robot, name=f"{self.robot.name}, calibrated", calibration=calibration)
 
 
 def identify_with_instruments(
-    robot: RobotModel, observations: Observations, cell: MeasuringCell | None = None
+    robot: RobotModel,
+    observations: Observations,
+    cell: MeasuringCell | None = None,
+    joint_errors: tuple[str, ...] = (),
+    compliance: bool = False,
 ) -> InstrumentCalibration:
     """Finds the errors of a robot, the unknown targets, frames and anchors, and the noise.
 
@@ -81,6 +91,8 @@ def identify_with_instruments(
         robot: the nominal robot.
         observations: lines of all instruments.
         cell: what is known before.
+        joint_errors: kinds of `robots.description.joint_errors` that are parameters, too.
+        compliance: whether the joints yield to the robot's weight and its loads; their compliances are found.
 
     Raises:
         IdentificationError: if nothing says where an instrument stands, or the search does not converge.
@@ -90,8 +102,9 @@ def identify_with_instruments(
             f"calibration of {robot.name}: it is calibrated already; start from the nominal robot"
         )
     cell = cell or MeasuringCell({}, {}, {}, {})
-    model = ErrorModel(robot)
-    problem = InstrumentProblem(model, observations, cell, _start(model, observations, cell))
+    model = ErrorModel(robot, joint_errors)
+    start = _start(model, observations, cell)
+    problem = InstrumentProblem(model, observations, cell, start, compliance)
     return _Adjustment(problem, cell).result(robot)
 
 
@@ -167,8 +180,8 @@ class _Adjustment:
         problem.active = self._everything
         values = problem.parameters(fit.u)
         seen = self._everything
-        nominal = problem.parameters(fit.u)
-        nominal[: len(problem.model)] = 0.0
+        found_by_name = dict(zip(problem.names, values.tolist(), strict=True))
+        nominal = np.where(problem.is_of_robot, 0.0, values)
         before = problem.gathered(problem.residuals(nominal[problem.columns] / sizes))
         return InstrumentCalibration(
             robot=robot,
@@ -179,6 +192,7 @@ class _Adjustment:
             covariance=covariance,
             shares=np.clip(1.0 - np.diagonal(covariance) / sizes**2, 0.0, 1.0),
             x=values[: len(problem.model)],
+            compliance=np.array([found_by_name.get(name, 0.0) for name in COMPLIANCE_NAMES]),
             setting=problem.setting(values),
             before=np.where(seen, before, np.nan),
             residuals=np.where(seen, problem.gathered(problem.residuals(fit.u)), np.nan),
@@ -262,6 +276,8 @@ class _Adjustment:
                 theta = found.theta
             noise = noise.with_variances(theta)
             fit = self._fit(fit.u, noise)
+            if float(np.sqrt(np.mean(fit.at.residuals**2))) < _ROUNDING:
+                fit = replace(fit, is_converged=True)  # nothing is left to explain
             if is_settled:
                 break
         return fit, noise, found

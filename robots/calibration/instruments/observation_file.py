@@ -3,7 +3,8 @@
 Columns: ``q1_rad`` ... ``q6_rad`` or ``_deg``; ``target`` and ``instrument``, names (one target ``tool``, one
 instrument, where the columns are missing); ``x_m``, ``y_m``, ``z_m`` or ``_mm``, empty where a coordinate was
 not seen; ``distance_m`` or ``_mm`` in place of them; ``sigma_m`` or ``_mm`` if the line's standard deviation
-is known. Lines that follow each other with the same joint positions are one configuration.
+is known; ``payload_kg`` at the flange, none where the column is missing. Lines that follow each other with
+the same joint positions and the same load are one configuration.
 """
 
 import math
@@ -18,7 +19,7 @@ from robots.description.model import NUM_JOINTS
 from robots.pose import rotation_from_zyx
 from robots.text_table import TextTable, TextTableError, finite_number, parse_fields, read_text
 
-_UNITS = {"rad": 1.0, "deg": math.pi / 180.0, "m": 1.0, "mm": 1e-3}
+_UNITS = {"kg": 1.0, "rad": 1.0, "deg": math.pi / 180.0, "m": 1.0, "mm": 1e-3}
 _JOINTS = tuple(f"q{number}" for number in range(1, NUM_JOINTS + 1))
 _KEYS = {"targets": "places", "frames": "frames", "anchors": "anchors", "sigma_mm": "sigmas"}
 
@@ -43,18 +44,21 @@ def read_observations(path: str | Path) -> tuple[Observations, list[RowProblem]]
     except TextTableError as error:
         raise MeasurementFileError(f"measurements {error}") from error
     columns = _Columns(table)
-    q, kept, problems = [], [], []
+    q, loads, kept, problems = [], [], [], []
     for line, row in zip(table.lines[1:], table.rows[1:], strict=True):
         try:
-            kept.append((line, *columns.values(row)))
-            q.append(columns.joints(row))
+            found = columns.values(row), columns.joints(row), columns.payload(row)
+            kept.append((line, *found[0]))
+            q.append(found[1])
+            loads.append(found[2])
         except ValueError as error:
             problems.append(RowProblem(line, str(error)))
     if not kept:
         raise MeasurementFileError(f"measurements {path}: no usable row; {[p.what for p in problems][:1]}")
     lines, targets, instruments, positions, distances, sigmas = zip(*kept, strict=True)
-    joints = np.array(q)
-    is_new = np.append(True, np.any(np.diff(joints, axis=0) != 0.0, axis=1))
+    joints, payload = np.array(q), np.array(loads)
+    is_other = np.any(np.diff(joints, axis=0) != 0.0, axis=1) | (np.diff(payload) != 0.0)
+    is_new = np.append(True, is_other)
     target_names, instrument_names = (tuple(dict.fromkeys(names)) for names in (targets, instruments))
     try:
         seen = Observations(
@@ -68,6 +72,7 @@ def read_observations(path: str | Path) -> tuple[Observations, list[RowProblem]]
             np.array(lines),
             target_names,
             instrument_names,
+            payload[is_new],
         )
     except ValueError as error:
         raise MeasurementFileError(f"measurements {path}: {error}") from error
@@ -86,6 +91,7 @@ class _Columns:
         self._xyz = [self._find(name, ("m", "mm"), False) for name in "xyz"]
         self._distance = self._find("distance", ("m", "mm"), False)
         self._sigma = self._find("sigma", ("m", "mm"), False)
+        self._payload = self._find("payload", ("kg",), False)
         if all(place is None for place in (*self._xyz, self._distance)):
             raise MeasurementFileError(
                 f"measurements {table.name}: there are neither coordinates nor distances"
@@ -106,6 +112,13 @@ class _Columns:
         if np.isnan(values).any():
             raise ValueError("a joint position is missing")
         return values
+
+    def payload(self, row: list[str]) -> float:
+        """The mass at the flange in kg, zero where nothing stands. Raises ValueError."""
+        value = self._number(row, self._payload)
+        if value < 0.0:
+            raise ValueError(f"payload_kg must not be negative, got {value:g}")
+        return 0.0 if math.isnan(value) else value
 
     def values(self, row: list[str]) -> tuple[str, str, list[float], float, float]:
         """Target, instrument, coordinates, distance and sigma of a row in m. Raises ValueError."""

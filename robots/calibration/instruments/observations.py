@@ -25,6 +25,7 @@ class Observations:
     lines: np.ndarray  # (m,) where they stand in a file
     targets: tuple[str, ...]  # names
     instruments: tuple[str, ...]
+    payload: np.ndarray | None = None  # (n,) kg at the flange; None for none
 
     def __post_init__(self) -> None:
         """Checks that every instrument measures one kind of thing, and every line something.
@@ -45,6 +46,11 @@ class Observations:
     def __len__(self) -> int:
         """How many lines there are, m."""
         return len(self.row)
+
+    @property
+    def loads(self) -> np.ndarray:
+        """Masses at the flange in kg, (n,)."""
+        return np.zeros(len(self.q)) if self.payload is None else self.payload
 
     def is_bar(self, instrument: int) -> bool:
         """Whether an instrument measures distances."""

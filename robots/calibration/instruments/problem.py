@@ -1,7 +1,8 @@
 """The lines of all instruments and the parameters that are to explain them, in one adjustment.
 
 The parameters are those of the error model, then the places of targets on the tool, the frames of
-instruments (a shift and a turn on top of where they stand at first) and the anchors of distances. The lines
+instruments (a shift and a turn on top of where they stand at first), the anchors of distances, and, where the
+joints are to yield, compliances and errors of masses. The lines
 of one configuration belong together, because they share the noise of its joints; where configurations have
 different numbers of lines, what is missing is filled with zeros that weigh nothing.
 """
@@ -12,8 +13,10 @@ import numpy as np
 
 from robots.calibration.error_model import ZEROS, ErrorModel, exponential
 from robots.calibration.instruments.observations import COORDINATES, MeasuringCell, Observations
+from robots.calibration.loads import Loads
 from robots.calibration.prior import OWN_FRAME, parameter_sizes
 from robots.calibration.solver.problem import Linearised
+from robots.calibration.yielding_joints import YIELDING_NAMES, Sag, YieldingJoints, yielding_sizes
 
 PLACE, ANCHOR = 0.5, 1.0  # m, standard deviations before the measurement
 
@@ -41,8 +44,14 @@ class InstrumentProblem:
     """Predicts lines from free parameters u in units of their prior."""
 
     def __init__(
-        self, model: ErrorModel, observations: Observations, cell: MeasuringCell, start: Start
+        self,
+        model: ErrorModel,
+        observations: Observations,
+        cell: MeasuringCell,
+        start: Start,
+        is_yielding: bool = False,
     ) -> None:
+        """Puts the parts together; ``is_yielding`` adds compliances of the joints and errors of masses."""
         self.model, self.observations, self._start = model, observations, start
         bars = [observations.is_bar(i) for i in range(len(observations.instruments))]
         blocks: list[tuple[list[str], np.ndarray, bool]] = [
@@ -57,10 +66,18 @@ class InstrumentProblem:
         for name, is_bar in zip(observations.instruments, bars, strict=True):
             names = [f"anchor_{name}_{axis}" for axis in "xyz"]
             blocks.append((names, np.full(3, ANCHOR), is_bar and name not in cell.anchors))
+        self._placed = sum(len(names) for names, _, _ in blocks)
+        self._yielding = None
+        if is_yielding:
+            self._yielding = YieldingJoints(model, Loads(model.robot, observations.loads))
+            blocks.append((list(YIELDING_NAMES), yielding_sizes(model.robot), True))
         self.names = tuple(name for names, _, _ in blocks for name in names)
         self.sizes = np.concatenate([sizes for _, sizes, _ in blocks])
         free = np.concatenate([np.full(len(sizes), is_free) for _, sizes, is_free in blocks])
         self.columns = np.flatnonzero(free)
+        # Those of the robot itself, not of what stands around it.
+        number = np.arange(len(self.sizes))
+        self.is_of_robot = (number < len(model)) | (number >= self._placed)
         self._values = observations.numbers
         self.active = np.isfinite(self._values)  # (m, 3) what is compared
         # Lines of a configuration stand beside each other: line m is number slot[m] of row[m].
@@ -84,7 +101,7 @@ class InstrumentProblem:
 
     def setting(self, x: np.ndarray) -> Setting:
         """Targets, frames and anchors at all parameters."""
-        rest = x[len(self.model) :]
+        rest = x[len(self.model) : self._placed]
         targets, instruments = len(self._start.places), len(self._start.frames)
         places, frames, anchors = np.split(rest, [3 * targets, 3 * targets + 6 * instruments])
         moved, turning = self._start.frames.copy(), np.tile(np.eye(3), (instruments, 1, 1))
@@ -99,7 +116,8 @@ class InstrumentProblem:
         """Measured less predicted numbers, (n, k), zeros where nothing was measured."""
         x = self.parameters(u)
         seen = self.observations
-        X = self.model.forward(seen.q, x[: len(self.model)])[seen.row]
+        sag = self._sag(x)
+        X = self.model.forward(sag.q if sag else seen.q, x[: len(self.model)], seen.q)[seen.row]
         at = self.setting(x)
         p = _turned(X[:, :3, :3], at.places[seen.target]) + X[:, :3, 3]
         return self.spread(self._compared(p, at))
@@ -107,14 +125,16 @@ class InstrumentProblem:
     def linearise(self, u: np.ndarray) -> Linearised:
         """Residuals with their derivatives, (n, k), (n, k, m) and (n, k, 6)."""
         x, seen = self.parameters(u), self.observations
-        X, Theta = self.model.forward_and_regressor(seen.q, x[: len(self.model)])
-        at = self.setting(x)
+        sag, model = self._sag(x), len(self.model)
+        chain, Theta = self.model.chain_and_regressor(sag.q if sag else seen.q, x[:model], seen.q)
+        X, at = chain.X_WE, self.setting(x)
         lever = _turned(X[seen.row, :3, :3], at.places[seen.target])
         p = lever + X[seen.row, :3, 3]
-        whole = Theta[seen.row]
         dp = np.zeros((len(seen), 3, len(self.sizes)))  # of the target in the world
-        model = len(self.model)
-        dp[:, :, :model] = whole[:, 3:] + np.cross(whole[:, :3], lever[:, :, None], axis=1)
+        if sag and self._yielding:
+            Theta, by_y = self._yielding.columns(chain, Theta, x[self._placed :], sag)
+            dp[:, :, self._placed :] = _of_points(by_y[seen.row], lever)
+        dp[:, :, :model] = _of_points(Theta[seen.row], lever)
         for target in range(len(at.places)):
             lines = np.flatnonzero(seen.target == target)
             begin = model + 3 * target
@@ -123,6 +143,12 @@ class InstrumentProblem:
         A = dy[:, :, self.columns] * self.sizes[self.columns]
         A[~self.active], dy[~self.active] = 0.0, 0.0
         return Linearised(self.spread(self._compared(p, at)), self.spread(A), self.spread(dy[:, :, ZEROS]))
+
+    def _sag(self, x: np.ndarray) -> Sag | None:
+        """What bends the joints; None for stiff ones."""
+        if self._yielding is None:
+            return None
+        return self._yielding.sag(self.observations.q, x[: len(self.model)], x[self._placed :])
 
     def spread(self, values: np.ndarray) -> np.ndarray:
         """Values of lines, (m, 3, ...), beside each other in their configurations, (n, k, ...)."""
@@ -174,6 +200,11 @@ class InstrumentProblem:
         """Where the world's origin is in a frame that has been turned and not yet shifted."""
         turn = at.frames[i, :3, :3] @ self._start.frames[i, :3, :3].T
         return turn @ self._start.frames[i, :3, 3]
+
+
+def _of_points(Theta: np.ndarray, lever: np.ndarray) -> np.ndarray:
+    """Derivatives of points from those of poses (m, 6, c), at levers from their origins (m, 3): (m, 3, c)."""
+    return Theta[:, 3:] + np.cross(Theta[:, :3], lever[:, :, None], axis=1)
 
 
 def _turned(R: np.ndarray, v: np.ndarray) -> np.ndarray:

@@ -6,13 +6,10 @@ from typing import Protocol
 import numpy as np
 
 from robots.calibration.error_model import ZEROS, ErrorModel
-from robots.calibration.loads import CENTRE_NAMES, MASS_NAMES, NUM_MASSES, Loads
+from robots.calibration.loads import Loads
 from robots.calibration.measurements import Measurements
-from robots.description.model import NUM_JOINTS
+from robots.calibration.yielding_joints import YIELDING_NAMES, Sag, YieldingJoints
 from robots.pose import pose_error
-
-COMPLIANCE_NAMES = tuple(f"c_{number}" for number in range(1, NUM_JOINTS + 1))
-_SAG_ROUNDS = 3  # a joint yields by a thousandth of a radian, its torque changes by a thousandth of that
 
 
 @dataclass(frozen=True)
@@ -61,10 +58,10 @@ class Problem:
         """
         self.model, self.measurements, self.sizes = model, measurements, sizes
         self.columns = np.arange(len(sizes)) if columns is None else columns
-        self._loads = loads
+        self._yielding = YieldingJoints(model, loads) if loads else None
         self._X_measured = measurements.X_WE
         self.rows = slice(3, 6) if measurements.rotation is None else slice(0, 6)
-        self.names = (*model.names, *((*COMPLIANCE_NAMES, *MASS_NAMES, *CENTRE_NAMES) if loads else ()))
+        self.names = (*model.names, *(YIELDING_NAMES if loads else ()))
 
     @property
     def width(self) -> int:
@@ -83,40 +80,28 @@ class Problem:
 
     def residuals(self, u: np.ndarray) -> np.ndarray:
         """Measured less predicted poses, (n, k)."""
-        x, q = self._joints(u)[:2]
-        return self._compared(self.model.forward(q, x[: len(self.model)], self.measurements.q))
+        x = self.parameters(u)
+        theta, sag = self.measurements.q, self._sag(x)
+        q = sag.q if sag else theta
+        return self._compared(self.model.forward(q, x[: len(self.model)], theta))
 
     def linearise(self, u: np.ndarray) -> Linearised:
         """Residuals with their derivatives."""
-        x, q, torque, by_masses = self._joints(u)
-        chain, Theta = self.model.chain_and_regressor(q, x[: len(self.model)], self.measurements.q)
-        whole, Theta = Theta, Theta[:, self.rows]
-        J = Theta[:, :, ZEROS]
-        columns = [Theta]
-        if torque is not None and by_masses is not None:
-            assert self._loads is not None
-            compliance, masses = np.split(x[len(self.model) :], [NUM_JOINTS])
-            by_geometry = self._loads.by_geometry(chain, whole, masses)
-            columns = [Theta + J @ (compliance[:, None] * by_geometry)]
-            columns += [J * torque[:, None, :], J @ (compliance[:, None] * by_masses)]
-        A = np.concatenate(columns, axis=-1) if len(columns) > 1 else Theta
-        A = A[:, :, self.columns] * self.sizes[self.columns]
+        x = self.parameters(u)
+        theta, sag = self.measurements.q, self._sag(x)
+        q = sag.q if sag else theta
+        chain, Theta = self.model.chain_and_regressor(q, x[: len(self.model)], theta)
+        J, A = Theta[:, self.rows, ZEROS], Theta
+        if sag and self._yielding:
+            A = np.concatenate(self._yielding.columns(chain, Theta, x[len(self.model) :], sag), axis=-1)
+        A = A[:, self.rows][:, :, self.columns] * self.sizes[self.columns]
         return Linearised(self._compared(chain.X_WE), A, J)
 
-    def _joints(self, u: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray | None, np.ndarray | None]:
-        """Parameters, link positions, and what bends them."""
-        x, theta = self.parameters(u), self.measurements.q
-        if self._loads is None:
-            return x, theta, None, None
-        geometry, rest = x[: len(self.model)], x[len(self.model) :]
-        compliance, masses = rest[:NUM_JOINTS], rest[NUM_JOINTS : NUM_JOINTS + NUM_MASSES]
-        q = theta
-        for _ in range(_SAG_ROUNDS):
-            # The counterbalance acts at the angle of the link, whose zero may be shifted.
-            chain = self.model.chain(q, geometry, theta)
-            torque, by_masses = self._loads.torque(q, chain, masses)
-            q = theta + compliance * torque
-        return x, q, torque, by_masses
+    def _sag(self, x: np.ndarray) -> Sag | None:
+        """What bends the joints; None for stiff ones."""
+        if self._yielding is None:
+            return None
+        return self._yielding.sag(self.measurements.q, *np.split(x, [len(self.model)]))
 
     def _compared(self, X: np.ndarray) -> np.ndarray:
         if self.width == 3:

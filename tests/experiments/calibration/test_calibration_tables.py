@@ -113,5 +113,5 @@ def test_a_table_of_targets_and_instruments_becomes_a_robot(tmp_path: Path):
     p, p_true = (each[:, :3, :3] @ a + each[:, :3, 3] for each, a in zip((X, X_true), places, strict=True))
     steps, true_steps = (np.linalg.norm(np.diff(each, axis=0), axis=1) for each in (p, p_true))
     assert np.abs(steps - true_steps).max() < 1e-10  # m, wherever the world of the robot is
-    refused = truetip("calibrate", *arguments, "--compliance", "--out", tmp_path / "no")
-    assert "--compliance has no effect on a table of targets and instruments" in refusal(refused)
+    refused = truetip("calibrate", *arguments, "--position-only", "--out", tmp_path / "no")
+    assert "--position-only has no effect on a table of targets and instruments" in refusal(refused)

@@ -1,5 +1,7 @@
 """A robot that two instruments and a ball bar have seen, made of matrix products."""
 
+from collections.abc import Callable
+
 import numpy as np
 from scipy.spatial.transform import Rotation
 
@@ -8,6 +10,7 @@ from tests.robots.calibration.matrix_robot import MatrixRobot, homogeneous
 
 PLACES = {"a": np.array([0.0, 0.0, 0.1]), "b": np.array([0.08, 0.0, 0.05]), "c": np.array([0.0, -0.07, 0.12])}
 ANCHOR = np.array([0.6, 0.4, 0.2])
+LOAD = 7.0  # kg
 FACTORS = {"tracker": 1.0, "camera": 5.0, "bar": 0.1}  # of their noise
 
 
@@ -18,11 +21,13 @@ def observed(
     noise: float = 0.0,
     joint: float = 0.0,
     instruments: tuple[str, ...] = ("tracker", "camera", "bar"),
+    loaded: Callable[[MatrixRobot, np.ndarray, float], np.ndarray] | None = None,
 ) -> tuple[MatrixRobot, Observations]:
     """Every third configuration is seen by the camera if there is one; every second has a distance, too.
 
-    In every seventh configuration one coordinate of each target is missing.
-    """  # fmt: skip
+    In every seventh configuration one coordinate of each target is missing. ``loaded`` gives the poses of the
+    robot with a mass at its flange, 7 kg in every second configuration; None for a stiff robot without one.
+    """
     rng = np.random.default_rng(seed)
     true = MatrixRobot(name).displaced(rng)
     frames = {
@@ -30,7 +35,10 @@ def observed(
         "camera": homogeneous(Rotation.random(rng=rng), np.array([-1.0, 2.0, 0.5])),
     }
     q = true.configurations(count, rng)
-    X = true.forward(q + joint * rng.normal(size=q.shape))
+    theta, payload = q + joint * rng.normal(size=q.shape), np.where(np.arange(count) % 2, LOAD, 0.0)
+    X = true.forward(theta)
+    if loaded:
+        X = np.array([loaded(true, each[None], mass)[0] for each, mass in zip(theta, payload, strict=True)])
     lines = []  # configuration, target, instrument, coordinates, distance
     for i in range(count):
         by = "camera" if "camera" in instruments and i % 3 == 0 else "tracker"
@@ -47,5 +55,6 @@ def observed(
     row, target, instrument, position, distance = map(np.array, zip(*lines, strict=True))
     unknown, numbers = np.full(len(lines), np.nan), np.arange(2, len(lines) + 2)
     return true, Observations(
-        q, row, target, instrument, position, distance, unknown, numbers, tuple(PLACES), instruments
-    )
+        q, row, target, instrument, position, distance, unknown, numbers, tuple(PLACES), instruments,
+        payload if loaded else None,
+    )  # fmt: skip
