@@ -1,0 +1,34 @@
+"""A station at the other end of a wire: when its camera saw what, on the clock of the path."""
+
+import numpy as np
+import pytest
+
+from diagrams.hardware_link import HardwareLink
+from diagrams.scenario.scenario import load_scenario
+from robots.description.model import load_robot
+from tests.diagrams.lockstep import Lockstep
+
+
+def ages(seconds: float, catches_up: bool, messages: int = 180) -> np.ndarray:
+    """How old samples seem at each message (n,) in s, when the cell stands still before the hundredth."""
+    scenario = load_scenario("cell")
+    wire = Lockstep(scenario)
+    link = HardwareLink(wire.link, wire.camera(), scenario, load_robot(scenario.robot), False, wire.now)
+    link.connect(needs_camera=True)
+    wire.halts = [(wire.cell.time + 100 * scenario.station.period, seconds, catches_up)]
+    found = []
+    for _ in range(messages):
+        if link.next_report() is not None:
+            sample = link.pose_at(0.0)
+            found.append(-sample.time if sample.valid else np.nan)
+    return np.array(found)
+
+
+@pytest.mark.parametrize(("seconds", "catches_up"), [(0.08, False), (0.7, False), (0.7, True)])
+def test_a_clock_that_stood_still_misleads_for_a_moment_only(seconds: float, catches_up: bool):
+    """A sample of the future would be the newest one until then, and the law blind."""
+    found = ages(seconds, catches_up)
+    usual = np.nanmedian(found[:90])
+    np.testing.assert_allclose(found[-40:], usual, atol=8e-3)  # a period of the camera and one of the robot
+    assert np.nanmin(found) > -0.1
+    assert np.isnan(found).sum() < 60
