@@ -31,6 +31,7 @@ _EXPLAINED = 0.15  # what a cause leaves of the mean error if it is the cause
 TOOL_DISPLACED, LOAD_CHANGED = "tool displaced", "load changed"
 DEAD_TIME_CHANGED, CLOCK_DRIFTS = "dead time changed", "clock drifts"
 FOREIGN_FRAME = "camera frame is another"
+CAMERA_MOVED = "camera moved"
 PATH_UNSEEN = "path needs more than was shown"
 _UNITS = {LOAD_CHANGED: "kg", DEAD_TIME_CHANGED: "s", CLOCK_DRIFTS: "s/s", FOREIGN_FRAME: "rad"}  # others: m
 
@@ -57,7 +58,15 @@ class EventLog:
     """The last events with their times, for whoever asks what happened."""
 
     _LENGTH = 8
-    _KINDS = TOOL_DISPLACED, LOAD_CHANGED, DEAD_TIME_CHANGED, CLOCK_DRIFTS, FOREIGN_FRAME, PATH_UNSEEN
+    _KINDS = (
+        TOOL_DISPLACED,
+        LOAD_CHANGED,
+        DEAD_TIME_CHANGED,
+        CLOCK_DRIFTS,
+        FOREIGN_FRAME,
+        PATH_UNSEEN,
+        CAMERA_MOVED,
+    )
 
     def __init__(self) -> None:
         """Lays out the memory."""
@@ -220,6 +229,11 @@ class Innovations:
         memory.error[:], memory.spread[:] = 0.0, 0.0
         memory.outliers[0], memory.held[0], memory.doubtful[0] = 0.0, 0.0, 0.0
 
+    def rest(self, memory: SimpleNamespace) -> None:
+        """Begins anew after an event, and finds none for a while."""
+        self.forget(memory)
+        memory.pause[0] = _PAUSE
+
     def explain(self, memory: SimpleNamespace, H: np.ndarray, model: TipModel) -> Event:
         """Says what the step among the last samples looks like, and begins anew."""
         before = 1 + int(_with_step(self._in_sigmas(memory)).argmin())
@@ -228,8 +242,7 @@ class Innovations:
         by_load = H[:, model.M] / np.sqrt(self._variances)[:, None]
         change = np.linalg.lstsq(by_load[:, :1], whitened, rcond=None)[0]
         left = whitened - by_load[:, :1] @ change
-        self.forget(memory)
-        memory.pause[0] = _PAUSE
+        self.rest(memory)
         size = float(np.linalg.norm(error[3:]))
         if left @ left < _EXPLAINED * (whitened @ whitened):
             return Event(LOAD_CHANGED, float(change[0] * model.sigma[model.M][0]), size)

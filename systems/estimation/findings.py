@@ -26,7 +26,7 @@ def findings(estimator: TipEstimator, memory: SimpleNamespace) -> dict[str, Any]
         what is believed for the compliance of ``gear_i`` and ``bearing_a_i``, ``bearing_b_i``.
     """
     model = estimator.model
-    x = estimator.x(memory)
+    x = estimator.x_robot(memory)
     sigma = model.sigma * np.sqrt(np.diag(estimator.covariance(memory)))
     names = _names(estimator)
     return {
@@ -48,7 +48,7 @@ def calibrated_robot(estimator: TipEstimator, memory: SimpleNamespace, of: str) 
         of: the robot that was calibrated, as `robots.description.model.load_robot` takes it.
     """
     model, names = estimator.model, _names(estimator)
-    x, count = estimator.x(memory), len(names)
+    x, count = estimator.x_robot(memory), len(names)
     covariance = (np.outer(model.sigma, model.sigma) * estimator.covariance(memory))[:count, :count]
     known = names, x[:count], covariance
     return learnt_robot(model.robot, model.geometric_errors(x), x[model.K], known, of)

@@ -10,7 +10,14 @@ import numpy as np
 from robots.description.model import NUM_JOINTS
 from systems.estimation import kernels
 from systems.estimation.arm_geometry import Constants
-from systems.estimation.events import CLOCK_DRIFTS, LOAD_CHANGED, Event, Innovations
+from systems.estimation.camera_or_tool import CameraOrTool
+from systems.estimation.events import (
+    CAMERA_MOVED,
+    CLOCK_DRIFTS,
+    LOAD_CHANGED,
+    Event,
+    Innovations,
+)
 from systems.estimation.gear_errors import NUM_SHAPES
 from systems.estimation.keyframes import Keyframes, keyframe_row
 from systems.estimation.memory import Layout
@@ -20,6 +27,7 @@ _AGAIN = 500  # samples, in which a second event says that the first was explain
 _OF_THE_LOAD = 0.1  # of its spread, when a tool was displaced
 _DOUBT = 3.0  # times wider, what is known of everything, where it does not hold
 _TRUST = 0.02  # m or rad, the largest step from where the past was read
+_KEEP_EVERY = 25  # samples, between two notes of what is known
 _DRIFT_EVERY = 50  # samples, between two looks whether the clock drifts
 _LEAST_DRIFT, _DRIFT_SIGMAS = (
     1e-4,
@@ -70,6 +78,7 @@ class TipEstimator:
         self.weights = 1.0 / variances
         self._keyframes = Keyframes(model, self.weights)
         self._innovations = Innovations(variances)
+        self._camera_or_tool = CameraOrTool(variances, model.size)
         n = model.size
         self.layout = Layout(
             xi=(n,),
@@ -92,6 +101,12 @@ class TipEstimator:
             sum_H=(6, n),
             keyframes=self._keyframes.layout,
             innovations=self._innovations.layout,
+            camera=Layout(  # what of the unknowns is not of the robot but of a camera that was moved
+                xi=(n,),  # of all moves but the last
+                xi_before=(n,),  # the unknowns before the last move
+                gain=(6, n),  # from what they have changed by since then to the move
+            ),
+            after_step=self._camera_or_tool.layout,
         )
         self._constants: Constants | None = None
 
@@ -106,6 +121,13 @@ class TipEstimator:
     def x(self, memory: SimpleNamespace) -> np.ndarray:
         """The unknowns in their units, shape (n,)."""
         return self.model.full(memory.xi)
+
+    def x_robot(self, memory: SimpleNamespace) -> np.ndarray:
+        """The unknowns of the robot where it stands, (n,): without what only a moved camera sees."""
+        if not memory.camera.gain.any():
+            return self.x(memory)
+        xi = memory.xi - memory.camera.xi - self._of_the_camera(memory, memory.xi)
+        return self.model.full(xi)
 
     def clock_offset(self, memory: SimpleNamespace, time: float) -> float:
         """What is to be added to a stamp of the camera in s."""
@@ -133,8 +155,8 @@ class TipEstimator:
         return self._constants
 
     def predict(self, memory: SimpleNamespace, pair: Pair) -> Prediction:
-        """The tip of one pair at the estimate."""
-        x = self.x(memory)
+        """The tip of one pair at the estimate, as a camera sees it that was not moved."""
+        x = self.x_robot(memory)
         shapes = self.model.gear_shapes(x, pair.theta, pair.loads, pair.states)
         return self.model.predict(
             self._constants_at(memory, x),
@@ -178,11 +200,20 @@ class TipEstimator:
                 return None  # a few samples later it is known what they mean
             if verdict.has_jumped and weight > 0.2:
                 event = self._innovations.explain(innovations, H, self.model)
+                self._camera_or_tool.begin(memory.after_step)
                 self._widen(memory, event)
             elif verdict.has_drifted and weight > 0.2:
                 self._innovations.forget(innovations)
+                self._camera_or_tool.begin(memory.after_step)
                 if memory.was_settled[0]:
                     self._doubt(memory)
+            elif verdict.is_calm and not memory.after_step.samples[0] and memory.count[0] % _KEEP_EVERY == 0:
+                known = memory.keyframes.A + memory.A_open
+                self._camera_or_tool.keep(memory.after_step, known, memory.xi)
+            elif memory.after_step.samples[0]:
+                before = r + H @ (memory.xi - memory.after_step.xi_before)
+                if self._camera_or_tool.is_camera(memory.after_step, before, pair.X_WE):
+                    return self._take_back(memory, pair.X_WE)
         sums = memory.A_open, memory.b_open, memory.sum_y, memory.sum_H
         kernels.information.add_sample(r, H, memory.xi, self.weights, weight, *sums)
         means = [pair.theta, gears, pair.motion, pair.twist, (since_first,)]
@@ -292,6 +323,31 @@ class TipEstimator:
         A = 0.5 * (A + A.T)
         self._keyframes.reset(memory.keyframes, A, memory.xi)
         self._forget_open(memory)
+
+    def _take_back(self, memory: SimpleNamespace, X_WE: np.ndarray) -> Event:
+        """It was the camera: what was known before it moved holds of the robot, but not of where it is seen.
+
+        A move of the camera and one of the robot's base look the same. So the unknowns follow what is seen,
+        as after a move of the base. What of that was the camera's is E(c | x) = S B^T (P + B S B^T)^-1 (x -
+        x_before), with the covariance P from before, the columns B of a move and its spread S.
+        """
+        before, camera, model = memory.after_step, memory.camera, self.model
+        camera.xi += self._of_the_camera(memory, before.xi_before)
+        B = model.world_directions()
+        P = np.linalg.inv(before.A_before)
+        A = np.linalg.inv(P + B @ B.T)
+        A = 0.5 * (A + A.T)
+        camera.gain[:], camera.xi_before[:] = B.T @ A, before.xi_before
+        self._innovations.rest(memory.innovations)
+        memory.xi[:] = before.xi_before
+        self._keyframes.reset(memory.keyframes, A, before.xi_before)
+        self._forget_open(memory)
+        return Event(CAMERA_MOVED, self._camera_or_tool.size(before, X_WE[:3, 3]), 0.0)
+
+    def _of_the_camera(self, memory: SimpleNamespace, xi: np.ndarray) -> np.ndarray:
+        """What of the change since the camera was moved last is the camera's, (n,)."""
+        camera = memory.camera
+        return self.model.world_directions() @ (camera.gain @ (xi - camera.xi_before))
 
     @staticmethod
     def _forget_open(memory: SimpleNamespace) -> None:

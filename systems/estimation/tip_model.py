@@ -18,6 +18,7 @@ from systems.estimation.learnt_robot import known_before
 
 HELD = 1e5  # information on the drift of a clock as long as nothing shows that there is one
 _NO_SHAPES = np.empty((0, 6))
+_BASE = 0  # the body whose placement in the world it is
 _STAYS = 0.02  # of the spread, by which what was measured of a robot may have changed since
 
 
@@ -96,7 +97,7 @@ class TipModel:
         self.sigma[g + 19 : g + 22] = spread.payload_centre * max(model.payload, 0.1)
         self.sigma[self.C], self.sigma[self.D] = spread.clock, spread.clock_drift
         self.sigma[self.E] = spread.gear_error
-        self._tool = self._tool_directions()
+        self._tool, self._world = self._directions(TOOL), self._directions(_BASE)
         self.prior = np.eye(self.size)  # information, in units of the spreads
         self.prior[self.D, self.D] = HELD
         known = known_before(robot, drawn, chosen) if robot.is_calibrated else None
@@ -285,12 +286,16 @@ class TipModel:
         """A displaced tool in units of the spreads: columns for 2 mm along x, y, z and 5 mrad about them."""
         return self._tool
 
-    def _tool_directions(self) -> np.ndarray:
+    def world_directions(self) -> np.ndarray:
+        """A displaced base in units of the spreads: columns as of the tool, about axes of the world."""
+        return self._world
+
+    def _directions(self, body: int) -> np.ndarray:
         found = self.identifiable
         independent, dependent = found.independent.tolist(), found.dependent.tolist()
         columns = []
         for i, entry in enumerate(self.parameters):
-            if entry.body != TOOL:
+            if entry.body != body:
                 continue
             column = np.zeros(self.size)
             size = 2e-3 if entry.unit == "m" else 5e-3

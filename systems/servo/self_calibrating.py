@@ -317,7 +317,7 @@ class SelfCalibrating(LeafSystem):
             if not memory.amplitude.any():
                 memory.delay.known[0] = 1.0  # nothing will show it
         lead, since_start = memory.lead, time - memory.start_time[0]
-        self._lead.step(lead, self.estimator.x(memory.estimator), memory.columns, self.period)
+        self._lead.step(lead, self.estimator.x_robot(memory.estimator), memory.columns, self.period)
         first, last = memory.first[0], memory.planned[0]
         aside = self._probe.at(instant - first, path_start - first, memory.amplitude)
         wanted = Wanted(moment.X_WE, moment.V_WE, aside)

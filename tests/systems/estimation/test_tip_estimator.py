@@ -106,6 +106,42 @@ def test_a_displaced_tool_is_seen_and_learnt(shift):
     assert np.linalg.norm(left[3:]) < 40e-6
 
 
+@pytest.mark.parametrize(
+    ("turn", "shift"), [((0.0, 0.0, 0.0), (0.5e-3, 0.0, 0.0)), ((1e-3, 0.0, -1e-3), (0.0, 0.4e-3, 0.3e-3))]
+)
+def test_a_camera_that_was_moved_is_told_from_a_tool_and_moves_nothing(turn, shift):
+    session = Session(3)
+    session.learn(8.0)
+
+    def displaced(pair):
+        p = pair.X_WE[:3, 3]
+        twist = np.concatenate((turn, np.cross(turn, p) + shift))
+        return pair._replace(X_WE=moved(pair.X_WE[None], twist[None])[0])
+
+    session.learn(2.0, change=displaced)
+    assert [event.kind for event in session.events] == [
+        "tool displaced",
+        "camera moved",
+    ]  # it looks like one at first
+    assert session.error(seen=True) < 60e-6  # of the true tip, not of what is seen
+    session.learn(4.0, change=displaced)
+    assert len(session.events) == 2
+    assert session.error(seen=True) < 40e-6
+
+
+def test_a_tool_that_was_displaced_stays_one():
+    session = Session(3)
+    session.learn(3.0)
+
+    def displaced(pair):
+        step = np.concatenate((np.zeros(3), pair.X_WE[:3, :3] @ np.array([0.5e-3, 0.0, 0.0])))
+        return pair._replace(X_WE=moved(pair.X_WE[None], step[None])[0])
+
+    session.learn(3.0, change=displaced)
+    assert "camera moved" not in [event.kind for event in session.events]
+    assert not session.memory.camera.gain.any()
+
+
 def test_a_load_that_is_picked_up_is_named():
     session = Session(4)
     session.learn(3.0)
