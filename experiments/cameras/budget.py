@@ -39,7 +39,7 @@ class Budget:
     @property
     def position(self) -> np.ndarray:
         """Combined standard uncertainty of the position in m, all three coordinates together, (p,)."""
-        return np.sqrt(sum(np.trace(part[:, 3:, 3:], axis1=1, axis2=2) for part in self.by_cause.values()))
+        return _position(self.by_cause)
 
     @property
     def rotation(self) -> np.ndarray:
@@ -72,6 +72,10 @@ class Budget:
             "shares": shares,
             "simulated_deviation": self.largest_deviation(),
         }
+
+
+def _position(by_cause: dict[str, np.ndarray]) -> np.ndarray:
+    return np.sqrt(sum(np.trace(part[:, 3:, 3:], axis1=1, axis2=2) for part in by_cause.values()))
 
 
 @dataclass(frozen=True)
@@ -132,14 +136,16 @@ def budget(
     cameras = setup.cell.camera_model(setup.robot.base.pose())
     anchor_W = setup.robot.base.pose().translation()
     motion = motion_of_record(record, len(setup.path.q)) if record else motion_on_path(prepared, setup.path)
-    seen = _seen(cameras, setup.cell.windows, setup.body, motion.places, setup.robot)
+    seen = lone_markers(cameras, setup.cell.windows, setup.body, motion.places, setup.robot)
     poses = [MeasuredPose(*each) for each in zip(motion.places.X_WE, motion.V_WE, seen, strict=True)]
     parts = [covariances(cameras, setup.body.p_E, anchor_W, pose, given) for pose in poses]
     by_cause = {name: np.array([part[name] for part in parts]) for name in parts[0]}
     visible = np.flatnonzero(np.isfinite(by_cause[next(iter(by_cause))][:, 0, 0]))
     if not len(visible):
         raise ValueError("budget: the cameras see the tool nowhere on the path")
-    checked = np.unique(visible[np.linspace(0, len(visible) - 1, _CHECKED).astype(int)])
+    worst = int(np.nanargmax(_position(by_cause)))
+    even = visible[np.linspace(0, len(visible) - 1, _CHECKED - 1).astype(int)]
+    checked = np.unique([*even, worst])
     rng, simulated = np.random.default_rng(prepared.scenario.seed), []
     for number, k in enumerate(checked, 1):
         errors = simulated_errors(cameras, setup.body.p_E, anchor_W, poses[k], given, draws, rng)
@@ -149,7 +155,7 @@ def budget(
     return Budget(motion.time, speed, by_cause, checked, np.array(simulated))
 
 
-def _seen(
+def lone_markers(
     cameras: Cameras, windows: np.ndarray, body: DetectionBody, places: Places, robot: RobotModel
 ) -> np.ndarray:
     """Markers that stand alone in the window of a camera and not behind the arm, (p, n, m)."""

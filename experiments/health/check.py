@@ -26,11 +26,20 @@ class CameraTurn:
 
 
 @dataclass(frozen=True)
+class BentArm:
+    """An arm of the simulated marker body is bent, or its sphere is gone."""
+
+    marker: int
+    shift: float  # m along x of the tool; infinite for a sphere that is gone
+
+
+@dataclass(frozen=True)
 class Check:
     """What one check has measured."""
 
     X_WE: np.ndarray  # of the poses, (6, 4, 4)
     rotations: np.ndarray  # of the cameras in blocks, rad, (blocks, n, 3)
+    images: np.ndarray  # of the markers on the body at the poses, means in px, (6, n, m, 2)
 
 
 def measure_check(
@@ -39,7 +48,8 @@ def measure_check(
     cameras: Cameras,
     markers: ReferenceMarkers,
     p_W: np.ndarray,
-    turn: CameraTurn | None,
+    p_E: np.ndarray,
+    changed: CameraTurn | BentArm | None,
     seed: int,
     progress: Callable[[float], None],
 ) -> Check:
@@ -51,7 +61,8 @@ def measure_check(
         cameras: as they were calibrated.
         markers: fixed in the cell.
         p_W: where these are in m, (m, 3).
-        turn: of a camera; None for none.
+        p_E: the markers on the body in m, (k, 3).
+        changed: a camera or an arm of the body; None for none.
         seed: of the noise.
         progress: is called with the share that is done.
 
@@ -67,9 +78,16 @@ def measure_check(
     X[:, :3, :3], X[:, :3, 3] = measured.rotation, measured.position
     rng = np.random.default_rng((seed, 1))
     pixels = np.tile(markers.pixels, (BLOCKS, 1, 1, 1))
-    if turn is not None:
-        R = cameras.R_WC.copy()
-        R[turn.camera] = Rotation.from_rotvec(turn.angle * R[turn.camera][:, 1]).as_matrix() @ R[turn.camera]
-        pixels[round(turn.at * FRAME_RATE / PER_BLOCK) :] = replace(cameras, R_WC=R).project(p_W)
+    true, body = cameras, p_E.copy()
+    if isinstance(changed, CameraTurn):
+        R, k = cameras.R_WC.copy(), changed.camera
+        R[k] = Rotation.from_rotvec(changed.angle * R[k][:, 1]).as_matrix() @ R[k]
+        true = replace(cameras, R_WC=R)
+        pixels[round(changed.at * FRAME_RATE / PER_BLOCK) :] = true.project(p_W)
+    elif changed is not None:
+        body[changed.marker, 0] += changed.shift
     pixels += PIXEL_SIGMA / np.sqrt(PER_BLOCK) * rng.standard_normal(pixels.shape)
-    return Check(X, markers.rotations(pixels))
+    with np.errstate(invalid="ignore"):
+        images = np.array([true.project(body @ pose[:3, :3].T + pose[:3, 3]) for pose in record.truth.X_WE])
+    images += PIXEL_SIGMA / np.sqrt(PER_BLOCK) * rng.standard_normal(images.shape)
+    return Check(X, markers.rotations(pixels), images)

@@ -38,7 +38,7 @@ def health_command(
         typer.Option(
             metavar="KIND:...",
             help="Change the simulated station: joint:3:40 (mdeg), tool:0.2 (mm), "
-            "camera:04:50 (microradians).",
+            "camera:04:50 (microradians), marker:5:0.1 (mm), marker:5:lost.",
         ),
     ] = None,
     change_at: Annotated[
@@ -92,6 +92,8 @@ def _in_words(alarm: dict[str, Any]) -> str:
     size, unit = _shown(alarm["size"], alarm["kind"])
     sigma, _ = _shown(alarm["sigma"], alarm["kind"])
     day = alarm["onset_s"] / DAY
+    if not alarm["sigma"]:  # whether, not by how much
+        return f"{alarm['what']} since day {day:.5g}: {alarm['suggestion']}"
     said = f"{alarm['what']} changed by {abs(size):.3g} ± {sigma:.1g} {unit} on day {day:.5g}"
     return f"{said}: {alarm['suggestion']}"
 
@@ -100,7 +102,7 @@ def _shown(size: float, kind: str) -> tuple[float, str]:
     """A size in the unit in which people think of it."""
     if kind == "camera":
         return 1e6 * size, "microradians"
-    if kind == TOOL:
+    if kind in (TOOL, "marker"):
         return 1e3 * size, "mm"
     return float(1e3 * np.rad2deg(size)), "mdeg"
 

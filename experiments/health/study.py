@@ -7,11 +7,14 @@ from typing import Any
 import numpy as np
 
 from diagrams.scenario.scenario import Scenario
+from experiments.cameras.accuracy import Places
+from experiments.cameras.budget import lone_markers
 from experiments.health.check import (
     BLOCKS,
     FRAME_RATE,
     PER_BLOCK,
     PIXEL_SIGMA,
+    BentArm,
     CameraTurn,
     Check,
     measure_check,
@@ -23,21 +26,27 @@ from robots.metrology.change_detection import cusum_changes
 from robots.metrology.daily_check import TOOL, CheckNoise, check_poses, find_drift
 from robots.pose import pose_error
 from systems.vision.camera_rig import load_cell
+from systems.vision.marker_body import load_body
+from systems.vision.marker_displacement import check_markers
 from systems.vision.reference_markers import SHIPPED, ReferenceMarkers
 
 DAY = 86400.0  # s
 NOISE = CheckNoise(position=30e-6, rotation=np.deg2rad(0.005))  # of a pose at rest; assumed
+_MISFIT = 8.0  # standard deviations, from which residuals of the body are no noise
 _SUGGESTIONS = {
     "camera": "recalibrate the camera",
     "joint zero": "run the full calibration",
     "tool": "check the tool for a collision or a change",
+    "marker": "straighten or replace it and measure the body anew",
 }
-KINDS = ("joint", "tool", "camera")
 
 
 @dataclass(frozen=True)
 class Injected:
-    """A change of the simulated station: joint:3:40 (mdeg), tool:0.2 (mm) or camera:04:50 (microradians)."""
+    """A change of the simulated station.
+
+    joint:3:40 (mdeg), tool:0.2 (mm), camera:04:50 (microradians), marker:5:0.1 (mm) or marker:5:lost.
+    """
 
     kind: str
     what: str
@@ -47,9 +56,9 @@ class Injected:
     def parse(cls, text: str, cameras: tuple[str, ...]) -> "Injected":
         """Reads what an option says. Raises ValueError if it says nothing that can be simulated."""
         kind, *rest = text.split(":")
-        form = "joint:N:MDEG, tool:MM or camera:NAME:MICRORADIANS"
+        form = "joint:N:MDEG, tool:MM, camera:NAME:MICRORADIANS or marker:N:MM|lost"
         try:
-            size = float(rest[-1])
+            size = float(np.inf if [kind, rest[-1]] == ["marker", "lost"] else rest[-1])
         except (IndexError, ValueError):
             raise ValueError(f"--change must be {form}, got '{text}'") from None
         if kind == "tool" and len(rest) == 1:
@@ -60,6 +69,8 @@ class Injected:
             if rest[0] not in cameras:
                 raise ValueError(f"--change {text}: the cameras are {', '.join(cameras)}, got '{rest[0]}'")
             return cls(kind, rest[0], 1e-6 * size)
+        if kind == "marker" and len(rest) == 2 and rest[0].isdigit():
+            return cls(kind, rest[0], 1e-3 * size)
         raise ValueError(f"--change must be {form}, got '{text}'")
 
     def station(self, scenario: Scenario) -> Scenario:
@@ -88,6 +99,7 @@ class HealthStudy:
         self._p_W = SHIPPED @ X_WB.rotation().matrix().T + X_WB.translation()
         self._markers = ReferenceMarkers(self._cameras, self._p_W, PIXEL_SIGMA)
         self._q = check_poses(robot, AdmissibleConfigurations(robot))
+        self._rig, self._body = rig, load_body("probst")
 
     def begun(self) -> History:
         """A history without a check."""
@@ -124,18 +136,15 @@ class HealthStudy:
             number = len(history.time) + 1
             has_changed = injected is not None and number >= change_at
             scenario = injected.station(self._scenario) if injected and has_changed else self._scenario
-            turn = None
-            if injected and has_changed and injected.kind == "camera":
-                at = 1.0 if number == change_at else 0.0
-                turn = CameraTurn(self.names.index(injected.what), injected.size, at)
+            changed = self._changed(injected, number == change_at) if injected and has_changed else None
             check = measure_check(
-                scenario, self._q, self._cameras, self._markers, self._p_W, turn,
+                scenario, self._q, self._cameras, self._markers, self._p_W, self._body.p_E, changed,
                 self._scenario.seed + number, lambda share, done=k: progress((done + share) / checks),
             )  # fmt: skip
             time = DAY * (number - 1)
-            history = history.appended(
-                time, check.X_WE, check.rotations.mean(axis=0), self._camera_alarms(check, time)
-            )
+            # A camera that has turned spoils residuals of the body: it is named first.
+            alarms = self._camera_alarms(check, time) or self._marker_alarms(check, time)
+            history = history.appended(time, check.X_WE, check.rotations.mean(axis=0), alarms)
         return history
 
     def alarms(self, history: History) -> list[dict[str, Any]]:
@@ -150,6 +159,32 @@ class HealthStudy:
             onset = float(history.time[drift.onset])
             found[drift.what] = _alarm(kind, drift.what, onset, drift.size, drift.sigma)
         return list(found.values())
+
+    def _changed(self, injected: Injected, is_new: bool) -> CameraTurn | BentArm | None:
+        """What of cameras and body is changed. Raises ValueError for a marker that is not there."""
+        if injected.kind == "camera":
+            return CameraTurn(self.names.index(injected.what), injected.size, 1.0 if is_new else 0.0)
+        if injected.kind != "marker":
+            return None
+        if not 1 <= int(injected.what) <= len(self._body):
+            raise ValueError(f"--change: the body has markers 1 to {len(self._body)}, got {injected.what}")
+        return BentArm(int(injected.what) - 1, injected.size)
+
+    def _marker_alarms(self, check: Check, time: float) -> list[dict[str, Any]]:
+        """A sphere that is gone, an arm that is bent, or a body that does not fit at all."""
+        places = Places(check.X_WE, self._q)
+        expected = lone_markers(self._cameras, self._rig.windows, self._body, places, self._robot)
+        sigma = PIXEL_SIGMA / np.sqrt(PER_BLOCK)
+        found = check_markers(self._cameras, self._body.p_E, check.X_WE, check.images, sigma, expected)
+        alarms = [
+            _alarm("marker", f"marker {each.marker + 1}", time, each.size, each.sigma)
+            if not each.is_lost
+            else _alarm("marker", f"marker {each.marker + 1} (not seen)", time, 0.0, 0.0)
+            for each in found.changes
+        ]
+        if not alarms and found.misfit > _MISFIT:
+            alarms = [_alarm("marker", "marker body (several markers)", time, 0.0, 0.0)]
+        return alarms
 
     def _camera_alarms(self, check: Check, time: float) -> list[dict[str, Any]]:
         """The cameras that have turned, in the order in which that was known."""
@@ -173,7 +208,7 @@ def deviations(history: History) -> np.ndarray:
 
 
 def _alarm(kind: str, what: str, onset: float, size: float, sigma: float) -> dict[str, Any]:
-    unit = "m" if kind == TOOL else "rad"
+    unit = "m" if kind in (TOOL, "marker") else "rad"
     return {
         "kind": kind,
         "what": what,

@@ -82,7 +82,7 @@ def test_a_slow_camera_gives_no_exposure_from_motion():
 @pytest.mark.slow
 def test_a_calibration_over_a_bad_wire_equals_the_simulated_one_within_its_standard_deviations():
     scenario = load_scenario("cell", FAULTS)
-    design = design_measurements(ROBOT, 20, admissible=AdmissibleConfigurations(ROBOT))
+    design = design_measurements(ROBOT, 12, admissible=AdmissibleConfigurations(ROBOT))
     over_wire, _ = recorded(scenario, design.configurations)
     first, second = (
         identify(ROBOT, table) for table in (over_wire, simulated(scenario, design.configurations))

@@ -30,6 +30,17 @@ def test_a_camera_that_turns_is_named_and_the_check_is_in_the_history(tmp_path: 
 
 
 @pytest.mark.slow
+def test_a_bent_arm_and_a_lost_sphere_are_named(tmp_path: Path):
+    (bent,) = health(tmp_path, "--change", "marker:5:0.1")["alarms"]
+    assert (bent["kind"], bent["what"]) == ("marker", "marker 5")
+    assert abs(bent["size"] - 1e-4) < 5.0 * bent["sigma"]
+    (tmp_path / "h.parquet").unlink()
+    (lost,) = health(tmp_path, "--change", "marker:7:lost")["alarms"]
+    assert lost["what"] == "marker 7 (not seen)"
+    assert "marker 7 (not seen) since day 0" in (tmp_path / "h.html").read_text()
+
+
+@pytest.mark.slow
 def test_a_history_goes_on_and_a_joint_that_drifts_is_named(tmp_path: Path):
     assert health(tmp_path, "--checks", "2")["alarms"] == []
     worn = health(tmp_path, "--change", "joint:3:40", "--checks", "2")
@@ -42,7 +53,7 @@ def test_a_history_goes_on_and_a_joint_that_drifts_is_named(tmp_path: Path):
     ("arguments", "message"),
     [
         (["--checks", "0"], "--checks must be at least 1, got 0"),
-        (["--change", "joint:7:1"], "--change must be joint:N:MDEG, tool:MM or camera:NAME:MICRORADIANS"),
+        (["--change", "joint:7:1"], "--change must be joint:N:MDEG, tool:MM, camera:NAME:MICRORADIANS"),
         (["--change", "camera:99:1"], "the cameras are 01, 02"),
         (["--change-at", "2"], "--change-at needs --change"),
         (["--set", "station.kind=egm"], "health does not drive a real station"),
