@@ -29,7 +29,6 @@ _CLOSE = 3e-4  # s about the time at which it is due: a frame of the camera woul
 _WATCH = 1e-3  # s after it was due, until which one looks all the time: who sleeps wakes late and cold
 _CYCLE_TOLERANCE = 5e-3  # relative
 _CLOCK_STEP = 0.02  # s by which stamps may run ahead of arrivals: jitter, and a stall before
-_BEHIND = 32  # messages in a row that are late by more than that: the controller's clock stood still
 _AHEAD = 0.1  # s by which a sample may seem to be exposed after the report that it is used with
 _SAME_COUNT = 1000  # messages; four seconds: whose number is further ahead is of another count
 _RESTS = 25  # messages at rest that end a stop
@@ -79,7 +78,6 @@ class HardwareLink:
         self.robot_clock = StampClock(ClockConfig())
         self.last: RobotReport | None = None
         self._unlearned: tuple[float, float] | None = None  # stamp and arrival of the last report, in s
-        self._behind = 0  # messages in a row that came late
         self.turn_around = array("d")  # s, from a report in to its reply out
         self._sample = PoseSample()
         self._phase = 0.0  # s, of the newest stamp against its tick
@@ -334,13 +332,6 @@ class HardwareLink:
             stamp, arrived = self._unlearned
             self.robot_clock.observe(round(1e6 * stamp), arrived)
             self._unlearned = None
-            # Messages that are late once are followed by others in time, unless the clock is another one now.
-            lag = arrived - self.robot_clock.station_time(round(1e6 * stamp))
-            self._behind = self._behind + 1 if lag > _CLOCK_STEP else 0
-            if self._behind >= _BEHIND:
-                self._behind = 0
-                self.robot_clock.restart()
-                self.robot_clock.observe(round(1e6 * stamp), arrived)
 
     def _poll_camera(self) -> None:
         self._client.poll_aside()

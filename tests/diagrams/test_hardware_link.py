@@ -9,7 +9,7 @@ from robots.description.model import load_robot
 from tests.diagrams.lockstep import Lockstep
 
 
-def ages(seconds: float, catches_up: bool, messages: int = 180) -> np.ndarray:
+def ages(seconds: float, catches_up: bool, messages: int = 480) -> np.ndarray:
     """How old samples seem at each message (n,) in s, when the cell stands still before the hundredth."""
     scenario = load_scenario("cell")
     wire = Lockstep(scenario)
@@ -24,11 +24,12 @@ def ages(seconds: float, catches_up: bool, messages: int = 180) -> np.ndarray:
     return np.array(found)
 
 
-@pytest.mark.parametrize(("seconds", "catches_up"), [(0.08, False), (0.7, False), (0.7, True)])
-def test_a_clock_that_stood_still_misleads_for_a_moment_only(seconds: float, catches_up: bool):
-    """A sample of the future would be the newest one until then, and the law blind."""
-    found = ages(seconds, catches_up)
+@pytest.mark.parametrize("catches_up", [False, True])
+def test_a_clock_that_stood_still_puts_no_sample_into_the_future(catches_up: bool):
+    """It would be the newest one until then, and the law blind; in a second the clock is known again."""
+    found = ages(0.7, catches_up)
+    assert np.nanmin(found) > -0.1
+    assert np.isfinite(found[:90]).mean() > 0.9
+    assert np.isfinite(found[-40:]).all()
     usual = np.nanmedian(found[:90])
     np.testing.assert_allclose(found[-40:], usual, atol=8e-3)  # a period of the camera and one of the robot
-    assert np.nanmin(found) > -0.1
-    assert np.isnan(found).sum() < 60
