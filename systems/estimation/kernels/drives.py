@@ -6,7 +6,7 @@ import numpy as np
 
 from systems.estimation.kernels.geometry import place_links
 from systems.estimation.kernels.loads import hold
-from systems.estimation.kernels.poses import compiled
+from systems.estimation.kernels.poses import compiled, inner
 
 
 @compiled
@@ -21,7 +21,7 @@ def features(v, a, filtered, Phi):
         Phi[i, 37] = filtered[18 + i]
 
 
-@compiled
+@inner
 def _behind(v, a, filtered, beta, i):
     """The row of a joint times the parameters."""
     total = v * beta[0] + v * beta[1 + i] + 1e-2 * a * beta[7 + i]
@@ -105,7 +105,7 @@ def learn(P, beta, Phi, y, variance):
             P[j, i] = P[i, j]
 
 
-@compiled
+@inner
 def _filter(step, z, last, w):
     """e = G w for the torques of one joint, exact for torques that change evenly within a period."""
     for k in range(len(z)):

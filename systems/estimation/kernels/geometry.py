@@ -5,10 +5,10 @@ import math
 import numpy as np
 
 from systems.estimation.kernels.arrays import SHIFTS, TURNS_BEFORE, TURNS_BEHIND
-from systems.estimation.kernels.poses import compiled, multiply
+from systems.estimation.kernels.poses import compiled, inner, multiply
 
 
-@compiled
+@inner
 def _turn(R, axis, angle):
     """R exp(axis~ angle) for a coordinate axis, in place."""
     i, j = (axis + 1) % 3, (axis + 2) % 3
@@ -18,7 +18,7 @@ def _turn(R, axis, angle):
         R[k, i], R[k, j] = c * a + s * b, c * b - s * a
 
 
-@compiled
+@inner
 def _reset(R, origin):
     for i in range(3):
         origin[i] = 0.0
@@ -26,7 +26,7 @@ def _reset(R, origin):
             R[i, j] = 1.0 if i == j else 0.0
 
 
-@compiled
+@inner
 def _note(column, R, axis, origin, axes, points):
     if column >= 0:
         for k in range(3):
@@ -90,7 +90,7 @@ def fill_constants(drawing, c):
         c.way[j, 2] = a[1] * b[0] - a[0] * b[1]
 
 
-@compiled
+@inner
 def place_links(c, q, X_WE, frames):
     """The poses of `place` without its columns."""
     step = np.empty((3, 4))

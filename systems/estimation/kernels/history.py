@@ -1,9 +1,9 @@
 """Rows of numbers found by time in a ring."""
 
-from systems.estimation.kernels.poses import compiled
+from systems.estimation.kernels.poses import compiled, inner
 
 
-@compiled
+@inner
 def around(count, times, time):
     """`History.around` of the first ``count`` rows, of which a ring keeps the last."""
     length = len(times)
@@ -24,7 +24,7 @@ def around(count, times, time):
     return before, behind, (time - times[before]) / (times[behind] - times[before])
 
 
-@compiled
+@inner
 def between(rows, before, behind, share, out):
     """The row between two; the first one if the share is zero."""
     for k in range(len(out)):

@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 
-from systems.estimation.kernels.poses import compiled
+from systems.estimation.kernels.poses import compiled, inner
 
 
 @compiled
@@ -30,7 +30,7 @@ def add_sample(r, H, xi, weights, weight, A, b, sum_y, sum_H):
     add_squares(H, shares, errors, A, b)
 
 
-@compiled
+@inner
 def add_squares(H, weights, y, A, b):
     """``A += H^T W H`` and ``b += H^T W y``, of a symmetric A."""
     n = len(b)

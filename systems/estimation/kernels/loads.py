@@ -4,24 +4,24 @@ import math
 
 import numpy as np
 
-from systems.estimation.kernels.poses import compiled
+from systems.estimation.kernels.poses import compiled, inner
 
 GRAVITY = 9.81  # m/s^2, as Drake has it
 
 
-@compiled
+@inner
 def _turned(R, v, out):
     for i in range(3):
         out[i] = R[i, 0] * v[0] + R[i, 1] * v[1] + R[i, 2] * v[2]
 
 
-@compiled
+@inner
 def _turned_back(R, v, out):
     for i in range(3):
         out[i] = R[0, i] * v[0] + R[1, i] * v[1] + R[2, i] * v[2]
 
 
-@compiled
+@inner
 def _add_cross(a, b, out):
     """``out += a x b``."""
     out[0] += a[1] * b[2] - a[2] * b[1]
@@ -29,13 +29,13 @@ def _add_cross(a, b, out):
     out[2] += a[0] * b[1] - a[1] * b[0]
 
 
-@compiled
+@inner
 def _copy(a, out):
     for i in range(3):
         out[i] = a[i]
 
 
-@compiled
+@inner
 def _acceleration(w, alpha, r, out):
     """What a way r from the origin of a turning body adds to the acceleration, alpha x r + w x (w x r)."""
     x, y, z = w[1] * r[2] - w[2] * r[1], w[2] * r[0] - w[0] * r[2], w[0] * r[1] - w[1] * r[0]
@@ -45,7 +45,7 @@ def _acceleration(w, alpha, r, out):
     out[2] += w[0] * y - w[1] * x
 
 
-@compiled
+@inner
 def _body(masses, k, frame, motion, total, room):
     """Adds force and moment about the world's origin, (2, 3), that a body k needs.
 
@@ -79,7 +79,7 @@ def _body(masses, k, frame, motion, total, room):
         total[1, i] += turned[i]
 
 
-@compiled
+@inner
 def _counterbalance(spring, q):
     """`robots.drivetrain.counterbalance.Counterbalance.torque` at rest."""
     preload, stiffness, base, arm = spring[1], spring[0], spring[2], spring[3]

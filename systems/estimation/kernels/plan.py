@@ -6,11 +6,11 @@ import numpy as np
 
 from systems.estimation.kernels.geometry import place
 from systems.estimation.kernels.loads import load
-from systems.estimation.kernels.poses import compiled, error
+from systems.estimation.kernels.poses import compiled, error, inner
 from systems.estimation.kernels.tip import deflect, move_by_geometry
 
 
-@compiled
+@inner
 def invert(columns, inverse):
     """The inverse of the first six columns, by Gauss and Jordan with the largest pivots."""
     n = 6
@@ -39,7 +39,7 @@ def invert(columns, inverse):
                     inverse[i, j] -= factor * inverse[k, j]
 
 
-@compiled
+@inner
 def _newton(c, x, q, wanted, frames, columns, inverse):
     """One step towards a pose, in place; the arm is the one before it. Returns its size in rad."""
     X, r, largest = np.empty((4, 4)), np.empty(6), 0.0

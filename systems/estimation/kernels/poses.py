@@ -7,10 +7,12 @@ from numba import njit
 
 _HALF_TURN_SINE = 1e-2  # as in `robots.pose`: below, the sine of an angle near pi does not show its axis
 
-compiled = njit(cache=True, error_model="numpy")
+compiled = njit(cache=True, error_model="numpy", no_cfunc_wrapper=True)
+# What only other loops call: its way into Python need not be compiled.
+inner = njit(cache=True, error_model="numpy", no_cfunc_wrapper=True, no_cpython_wrapper=True)
 
 
-@compiled
+@inner
 def multiply(A, B, out):
     """``out = A B`` for the leading 3 x 3 parts."""
     for i in range(3):

@@ -5,7 +5,7 @@ import numpy as np
 from systems.estimation.kernels.arrays import SeenOnce
 from systems.estimation.kernels.geometry import place
 from systems.estimation.kernels.loads import load
-from systems.estimation.kernels.poses import compiled, error, move
+from systems.estimation.kernels.poses import compiled, error, inner, move
 
 
 @compiled
@@ -17,7 +17,7 @@ def largest_change(x, y, first):
     return largest
 
 
-@compiled
+@inner
 def deflect(unknowns, g, loads, unit, yields):
     """Deflections in rad for a factor of one, and with the factors of now, (18,) each."""
     x = unknowns.x
@@ -29,7 +29,7 @@ def deflect(unknowns, g, loads, unit, yields):
         yields[j] = x[g + j] * unit[j]
 
 
-@compiled
+@inner
 def _error_of_gear(unknowns, g, shapes, j):
     total, first = 0.0, g + 24
     for k in range(len(shapes)):
@@ -37,7 +37,7 @@ def _error_of_gear(unknowns, g, shapes, j):
     return total
 
 
-@compiled
+@inner
 def move_by_geometry(c, x, columns, X_WE, step):
     """Moves the tip from the geometry of the constants to that of the unknowns; ``step`` is room for six."""
     for i in range(6):
@@ -47,7 +47,7 @@ def move_by_geometry(c, x, columns, X_WE, step):
     move(X_WE, step)
 
 
-@compiled
+@inner
 def _complete(unknowns, g, loads, unit, yields, seen, columns, X_WE, H):
     """Adds the tilting bearings and the clock to a pose, and makes the columns."""
     x, sigma = unknowns.x, unknowns.sigma
@@ -76,7 +76,7 @@ def _complete(unknowns, g, loads, unit, yields, seen, columns, X_WE, H):
     move(X_WE, step)
 
 
-@compiled
+@inner
 def predict_one(c, unknowns, theta, loads, seen, X_WE, H, gears):
     """`predict` for one instant, with `SeenOnce`."""
     g = len(c.chosen)
@@ -116,7 +116,7 @@ def innovation(c, unknowns, theta, loads, seen, X_seen, r, H, gears):
     error(X_seen, X_WE, r)
 
 
-@compiled
+@inner
 def predict_one_anew(c, unknowns, masses, theta, gears, motion, seen, X_WE, H):
     """`predict_anew` for one instant, with `SeenOnce`."""
     g = len(c.chosen)
