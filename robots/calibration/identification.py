@@ -32,6 +32,7 @@ from robots.description.model import NUM_JOINTS, RobotModel
 from robots.metrology.least_squares import UndeterminedError
 from robots.pose import zyx_from_rotation
 
+_UPRIGHT = 3.0  # deg, as far as the base of a robot may itself be off
 _ELSEWHERE = (0.1, float(np.deg2rad(10.0)))  # m, rad: farther is no error of the base but another frame
 _PERFECT = 1e-9  # m or rad, rms of residuals that are rounding
 _NO_NOISE = 0.01  # share of the assumed sigma below which residuals are no noise
@@ -86,6 +87,8 @@ def identify(
             f"{robot.calibration.of or 'the one that was calibrated'}"
         )
     robot, frame = _in_frame_of_instrument(robot, measurements)
+    if config.compliance and frame is not None:
+        _refuse_tilted(frame)
     problem, reducible = _problem(robot, measurements, config, frame is not None)
     if len(measurements) * problem.width < problem.width + NUM_JOINTS:
         raise IdentificationError(f"{len(measurements)} measurements are too few to identify anything")
@@ -112,6 +115,17 @@ def _in_frame_of_instrument(
         source=f"in the frame of the instrument; {robot.base.source}",
     )
     return replace(robot, base=base), X
+
+
+def _refuse_tilted(frame: np.ndarray) -> None:
+    """Raises IdentificationError if the instrument's z is not up: gravity acts along it in what follows."""
+    tilt = float(np.rad2deg(np.arccos(np.clip(frame[2, 2], -1.0, 1.0))))
+    if tilt > _UPRIGHT:
+        raise IdentificationError(
+            f"compliances need measurements in an upright frame, and the z axis of the instrument is "
+            f"{tilt:.0f} degrees off the vertical; give the table a column instrument, whose frame is found "
+            f"beside the robot, or turn it"
+        )
 
 
 def _problem(

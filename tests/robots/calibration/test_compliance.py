@@ -6,9 +6,10 @@ import numpy as np
 import pytest
 from pydrake.multibody.plant import MultibodyPlant
 from scipy.optimize import root
+from scipy.spatial.transform import Rotation
 
 from robots.calibration.error_model import ErrorModel
-from robots.calibration.identification import IdentificationConfig, identify
+from robots.calibration.identification import IdentificationConfig, IdentificationError, identify
 from robots.calibration.identified import Identified
 from robots.calibration.loads import NUM_MASSES, Loads
 from robots.calibration.measurements import SOURCE_NOISE, Measurements
@@ -138,6 +139,22 @@ def test_sag_is_left_by_the_geometry_and_explained_by_compliances():
     stiffness = 1.0 / both.compliance[1:3]
     np.testing.assert_allclose(stiffness, ROBOT.joint_stiffness[1:3], rtol=0.03)
     assert "c_1" not in both.names  # its axis stands upright: gravity does not turn it
+
+
+def test_compliances_are_refused_in_the_frame_of_an_instrument_that_is_not_upright():
+    """There gravity does not act along z; turned about the vertical and shifted it does."""
+    table = Measurements(configurations(75, 8), *poses_seen(Rotation.from_euler("ZY", [1.0, 0.5])))
+    with pytest.raises(IdentificationError, match="z axis of the instrument is 29 degrees off the vertical"):
+        identify(ROBOT, table, BOTH)
+    level = Measurements(configurations(75, 8), *poses_seen(Rotation.from_euler("Z", [1.0])))
+    assert identify(ROBOT, level, BOTH).frame is not None
+
+
+def poses_seen(turn: Rotation) -> tuple[np.ndarray, np.ndarray]:
+    """Of the nominal robot, from a place 3 m away that is turned."""
+    X = Kinematics(ROBOT).forward(configurations(75, 8))
+    R = np.asarray(turn.as_matrix()).reshape(3, 3)
+    return X[:, :3, 3] @ R.T + [3.0, 0.0, 0.5], R @ X[:, :3, :3]
 
 
 def test_statistics_of_known_errors():
