@@ -19,7 +19,7 @@ from experiments.plan.study import OBJECTIVES, LegResult, Plan, joint_table, pla
 from experiments.report.files import write_text
 from robots.description.model import RobotModel, load_robot
 from robots.kinematics.forward import Kinematics
-from robots.planning.limits import DUTY, motion_limits
+from robots.planning.limits import DUTY, RESERVE, motion_limits
 from robots.planning.path_dynamics import DYNAMICS
 from systems.reference.planned_file import planned_text
 
@@ -64,6 +64,14 @@ def plan_command(
     duty: Annotated[
         float, typer.Option(metavar="SHARE", help="Of a cycle that is motion, for the heat of the motors.")
     ] = DUTY,
+    may_ring: Annotated[
+        bool,
+        typer.Option("--may-ring", help="No time or energy is given away to ring as little as usual."),
+    ] = False,
+    reserve: Annotated[
+        float,
+        typer.Option(metavar="SHARE", help="Of every limit, left for a law that corrects the motion."),
+    ] = RESERVE,
     write: Annotated[
         str | None, typer.Option(metavar="FILE.csv", help="The motion, for reference.path=!Planned.")
     ] = None,
@@ -77,9 +85,9 @@ def plan_command(
     with json_output(json_file) as output, refusing(ValueError, OSError), ExitStack() as stack:
         model = load_robot(robot)
         mass = model.payload.largest_mass if payload is None else payload
-        limits = motion_limits(model, tool_speed, tool_acceleration, duty)
+        limits = motion_limits(model, tool_speed, tool_acceleration, duty).with_reserve(reserve)
         true = None if plant is None else load_robot(plant)
-        plan = Plan(model, mass, path, objective, dynamics, limits, recuperation, true)
+        plan = Plan(model, mass, path, objective, dynamics, limits, recuperation, true, may_ring)
         page = stack.enter_context(staged_file(report, *PAGE))
         table = stack.enter_context(staged_file(write, *TABLE)) if write else None
         stack.enter_context(output.staged())

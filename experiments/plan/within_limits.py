@@ -14,7 +14,7 @@ from robots.planning.limits import JOINT_LIMITS, MotionLimits
 _MARGIN = 0.99  # of every limit: what a planner may use at first
 _ROUNDS = 8
 _STEP = 0.995  # beyond what a motion was too much
-_ROUNDING = 1e-6
+ROUNDING = 1e-6
 
 T = TypeVar("T", bound=Timing)
 
@@ -43,11 +43,11 @@ def kept_in_plant(make: Callable[[MotionLimits], T], driver: PlantDriver, limits
         timing = make(margins)
         run = driver.run(timing)
         shares = exceeded(run, limits)
-        keeps = max(each.max() for each in shares.values()) <= 1.0 + _ROUNDING
+        keeps = largest_share(run, limits) <= 1.0 + ROUNDING
         kept = Kept(timing, run, keeps, margins)
         if keeps:
             break
-        if shares["gear_torque_rate"].max() > 1.0 + _ROUNDING:
+        if shares["gear_torque_rate"].max() > 1.0 + ROUNDING:
             shares = {"gear_torque_rate": shares["gear_torque_rate"]}
         margins = replace(
             margins,
@@ -68,3 +68,8 @@ def exceeded(run: PlantRun, limits: MotionLimits) -> dict[str, np.ndarray]:
         if name != "continuous_torque"
     }
     return {**shares, "continuous_torque": run.use(limits).mean_torque[:NUM_JOINTS]}
+
+
+def largest_share(run: PlantRun, limits: MotionLimits) -> float:
+    """Of any limit of joints at any time."""
+    return float(max(each.max() for each in exceeded(run, limits).values()))

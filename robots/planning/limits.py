@@ -17,6 +17,8 @@ JOINT_LIMITS = {
     "gear_torque_rate": ("N m/s", "rate of gear torque"),
 }
 
+_OF_MOTORS = ("speed", "acceleration", "jerk", "motor_torque")
+RESERVE = 0.1  # of them, for a law: what its corrections take on top of a motion
 
 DUTY = 0.6  # of a cycle that is motion, as in the rating S3 60 %; in between brakes hold the arm
 
@@ -38,6 +40,16 @@ class MotionLimits:
     def scaled(self, share: float) -> "MotionLimits":
         """All of them times a share."""
         return replace(self, **{each.name: share * getattr(self, each.name) for each in fields(self)})
+
+    def with_reserve(self, share: float) -> "MotionLimits":
+        """What is left where a law that corrects the motion needs a share of what motors can.
+
+        Raises:
+            ValueError: if it is no share.
+        """
+        if not 0.0 <= share < 1.0:
+            raise ValueError(f"--reserve must be at least 0 and below 1, got {share:g}")
+        return replace(self, **{name: (1.0 - share) * getattr(self, name) for name in _OF_MOTORS})
 
 
 def motion_limits(

@@ -1,6 +1,6 @@
 """The quickest or most frugal motion along a path within all limits: a spline s(t), found by IPOPT."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import casadi as ca
 import numpy as np
@@ -10,13 +10,14 @@ from robots.planning.joint_path import PathError
 from robots.planning.limit_use import OVER_TIME, energy
 from robots.planning.limits import MotionLimits
 from robots.planning.path_dynamics import ORDERS, PathDynamics
+from robots.planning.ringing import ringing_rows
 from robots.planning.spline_program import PointProgram, Solution, solve
 from robots.planning.time_spline import AT_REST, TimeSpline, at_rest, bases, points, weights
 
 OBJECTIVES = ("time", "energy")
 ITERATIONS = 60  # of IPOPT, at most
 # Weight of the fourth derivative: without it limits are used in ways that a drive of 4 ms cannot follow.
-_SMOOTH = {"time": 5e-7, "energy": 1e-8}
+_SMOOTH = {"time": 5e-7, "energy": 1e-8, "calm": 1e-9}
 _ROUNDED = 0.03  # of the mean power at the start, below which the magnitude of a power is rounded
 _SLOWEST = 2.5  # times the duration of the start: beyond that the optimiser is lost
 _NEAR = 0.45  # use of a limit at the start, from which on the optimiser looks at it
@@ -36,6 +37,27 @@ class Optimum:
     def is_solved(self) -> bool:
         """Whether the optimiser has converged."""
         return self.status in ("Solve_Succeeded", "Solved_To_Acceptable_Level")
+
+
+@dataclass(frozen=True)
+class _Aim:
+    """What a motion is optimised for.
+
+    Attributes:
+        objective: of `OBJECTIVES`, or ``calm``.
+        recuperation: whether braking gives energy back.
+        duration: s, or None if it is free.
+        smoother: times the weight that keeps the motion smooth.
+        band: frequencies in Hz at which a motion shall have little; it needs a duration.
+        calm: twice what it costs to have as much there as the start.
+    """
+
+    objective: str
+    recuperation: bool
+    duration: float | None
+    smoother: float = 1.0
+    band: tuple[float, float] | None = None
+    calm: float = 1.0
 
 
 def optimum(
@@ -66,11 +88,47 @@ def optimum(
         raise ValueError(f"--objective must be one of {', '.join(OBJECTIVES)}, got '{objective}'")
     if objective == "energy" and duration is None:
         raise ValueError("planning: the least energy needs a duration, or the motion would take forever")
+    return _found(dynamics, limits, start, _Aim(objective, recuperation, duration, smoother))
+
+
+def calmed(
+    dynamics: PathDynamics,
+    limits: MotionLimits,
+    found: Optimum,
+    band: tuple[float, float],
+    slower: float = 0.0,
+    energy_weight: float | None = None,
+    recuperation: bool = False,
+) -> Optimum:
+    """The motion that makes the arm ring least, where a quickest or most frugal one gives a little away.
+
+    Args:
+        dynamics: robot and path.
+        limits: that are kept.
+        found: the quickest or most frugal motion within them.
+        band: lowest and highest frequency in Hz at which the arm rings, see `ringing_band`.
+        slower: share of its duration that is added.
+        energy_weight: of twice its energy: what it costs to ring like it; None where energy does not count.
+        recuperation: whether braking gives energy back.
+
+    Raises:
+        PathError: if the limits admit no such motion.
+    """
+    start = TimeSpline(found.motion.coefficients, (1.0 + slower) * found.motion.duration)
+    objective = "calm" if energy_weight is None else "energy"
+    weight = 1.0 if energy_weight is None else energy_weight
+    calm = _found(
+        dynamics, limits, start, _Aim(objective, recuperation, start.duration, band=band, calm=weight)
+    )
+    return replace(calm, iterations=max(found.iterations, calm.iterations))
+
+
+def _found(dynamics: PathDynamics, limits: MotionLimits, start: TimeSpline, aim: _Aim) -> Optimum:
     iterations = 0
     rows = _used(dynamics, limits, start) > _NEAR
     motion = start
     for _ in range(_ROUNDS):
-        found, motion = _solved(dynamics, limits, motion, rows, (objective, recuperation, duration, smoother))
+        found, motion = _solved(dynamics, limits, motion, rows, aim)
         iterations += found.iterations
         if "Infeasible" in found.status:
             break
@@ -98,9 +156,9 @@ def _solved(
     limits: MotionLimits,
     start: TimeSpline,
     rows: np.ndarray,
-    aim: tuple[str, bool, float | None, float],
+    aim: _Aim,
 ) -> tuple[Solution, TimeSpline]:
-    count, unit, duration = len(start.coefficients), start.duration, aim[2]
+    count, unit, duration = len(start.coefficients), start.duration, aim.duration
     free = slice(AT_REST, count - AT_REST)
     splines, x, held = bases(count), points(count), at_rest(count)
     # y of a point: s and four derivatives by the share of the duration, then the duration over that at first.
@@ -112,6 +170,12 @@ def _solved(
     first = 1.0 if duration is None else duration / unit
     low, high = (0.02, _SLOWEST) if duration is None else (first, first)
     inside = np.ones(count - 2 * AT_REST)
+    squares = None
+    if aim.band is not None:
+        assert duration is not None
+        A = ringing_rows(count, duration, aim.band)
+        A *= np.sqrt(aim.calm) / np.linalg.norm(A @ start.coefficients)  # the cost of the start is calm / 2
+        squares = np.column_stack([A[:, free], np.zeros(len(A))]), A @ held
     found = solve(
         _program(dynamics, limits, start, rows, aim),
         ca.sparsify(ca.DM(matrix.reshape(-1, matrix.shape[-1]))),
@@ -120,6 +184,7 @@ def _solved(
         np.append(start.coefficients[free], first),
         (np.append(-0.5 * inside, low), np.append(1.5 * inside, high)),
         ITERATIONS,
+        squares,
     )
     coefficients = held.copy()
     coefficients[free] = found.x[:-1]
@@ -131,10 +196,9 @@ def _program(
     limits: MotionLimits,
     start: TimeSpline,
     rows: np.ndarray,
-    aim: tuple[str, bool, float | None, float],
+    aim: _Aim,
 ) -> PointProgram:
-    objective, recuperation, _, smoother = aim
-    unit = start.duration
+    objective, smoother, unit = aim.objective, aim.smoother, start.duration
     y, w = ca.SX.sym("y", ORDERS + 1), ca.SX.sym("w")
     T = y[ORDERS]
     rates = ca.vertcat(*[y[d] / (T * unit) ** d for d in range(ORDERS)])
@@ -144,16 +208,15 @@ def _program(
     speed, torque = values[:NUM_JOINTS], values[3 * NUM_JOINTS : 4 * NUM_JOINTS]
     lasting = [int(joint) for joint in np.flatnonzero(np.isfinite(limits.continuous_torque))]
     means = [(torque[joint] / float(limits.continuous_torque[joint])) ** 2 for joint in lasting]
-    cost = w * T + smoother * _SMOOTH[objective] * w * y[ORDERS - 1] ** 2
+    smooth = smoother * _SMOOTH[objective] * w * y[ORDERS - 1] ** 2
+    cost = w * T + smooth if objective == "time" else smooth
     if objective == "energy":
         times = points(len(start.coefficients)) * unit
         of_start = energy(dynamics.demand(start.rates(times)), times)
         power = torque * speed
-        if not recuperation:
+        if not aim.recuperation:
             power = ca.sqrt(power**2 + (_ROUNDED * of_start / unit) ** 2)
-        cost = (
-            w * ca.sum1(power) * T * unit / of_start + smoother * _SMOOTH[objective] * w * y[ORDERS - 1] ** 2
-        )
+        cost = w * ca.sum1(power) * T * unit / of_start + smooth
     return PointProgram(
         ca.Function("bounded", [y], [ca.vertcat(*bounded)]),
         np.append([-1.0 if row < 6 * NUM_JOINTS else -0.1 for row in chosen], 0.0),

@@ -51,6 +51,7 @@ def solve(
     start: np.ndarray,
     bounds: tuple[np.ndarray, np.ndarray],
     iterations: int,
+    squares: tuple[np.ndarray, np.ndarray] | None = None,
 ) -> Solution:
     """Minimises the cost within the bounds.
 
@@ -62,6 +63,7 @@ def solve(
         start: x to begin with, shape (size,).
         bounds: of x, shape (size,) each.
         iterations: at most.
+        squares: A, shape (k, size), and b, shape (k,): the cost has half the sum of squares of A x + b.
     """
     size, count = matrix.shape[1], len(weights)
     n, r, m = program.bounded.size1_in(0), len(program.lower), program.means.size1_out(0)
@@ -80,7 +82,12 @@ def solve(
     multipliers = ca.reshape(of_g[: r * count], r, count)
     of_each = ca.repmat(of_g[r * count :], 1, count)
     curvature = parts["curvature"].map(count)(y, w, multipliers, of_each, ca.repmat(of_f, 1, count))
-    hessian = ca.triu(matrix.T @ _blocks(curvature, n) @ matrix)
+    full = matrix.T @ _blocks(curvature, n) @ matrix
+    if squares is not None:
+        A = ca.DM(squares[0])
+        f = f + 0.5 * ca.sumsqr(A @ x + ca.DM(squares[1]))
+        full = full + of_f * (A.T @ A)
+    hessian = ca.triu(full)
     options = {
         "print_time": False,
         "ipopt.print_level": 0,

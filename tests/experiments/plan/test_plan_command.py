@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from typer.testing import Result
 
+from experiments.plan.study import STILL
 from systems.reference.paths import ReferenceConfig, make_path
 from systems.reference.shapes import Planned
 from tests.experiments.browser import open_page
@@ -14,6 +15,11 @@ from tests.experiments.commands import files, refusal, truetip
 
 SMALL = (
     "x_mm, y_mm, z_mm, alpha_deg, beta_deg, gamma_deg\n1100, -40, 900, 0, 180, 0\n1100, 60, 900, 0, 180, 0\n"
+)
+# 604 mm across, level.
+LINE = (
+    "x_mm, y_mm, z_mm, alpha_deg, beta_deg, gamma_deg\n"
+    "1421.85, -301.87, 1105.9, 180, 0, 180\n1421.85, 301.87, 1105.9, 180, 0, 180\n"
 )
 
 
@@ -26,7 +32,7 @@ def run(folder: Path, *arguments: str) -> Result:
 def test_a_motion_of_three_axes_is_better_than_the_best_jerk_profile(
     tmp_path: Path, objective: str, saved: float
 ):
-    result = run(tmp_path, "--path=joints", f"--objective={objective}", "--json=-")
+    result = run(tmp_path, "--path=joints", f"--objective={objective}", "--reserve=0", "--json=-")
     assert result.exit_code == 0, result.output
     found = json.loads(result.stdout)
     assert found["limits_kept"]
@@ -54,6 +60,27 @@ def test_a_line_is_written_as_a_path_from_pose_to_pose(tmp_path: Path):
     assert ends == pytest.approx(np.array([[1.1, -0.04, 0.9], [1.1, 0.06, 0.9]]), abs=1e-6)
     times = np.linspace(0.0, path.dwell_start, 50)
     assert np.abs(path.sample(times)[0][:, [0, 2], 3] - [1.1, 0.9]).max() < 1e-6  # straight
+
+
+@pytest.mark.slow
+def test_a_law_keeps_to_a_planned_line_that_leaves_it_the_usual_reserve(tmp_path: Path):
+    """It is late, as on any fast path without feedforward, but it stays with the motion and ends on it."""
+    table, motion = tmp_path / "line.csv", tmp_path / "motion.csv"
+    table.write_text(LINE)
+    result = run(tmp_path, f"--path={table}", f"--write={motion}", "--json=-")
+    assert result.exit_code == 0, result.output
+    plan = json.loads(result.stdout)
+    assert plan["limits_kept"]
+    assert plan["time_s"] < plan["baseline_s"]
+    assert plan["criterion"] <= max(plan["baseline_criterion"], STILL)
+    driven = truetip(
+        *("compare", f"--plan={motion}", "--robot=kr16", "--set=station.payload=16", "--cycles=1"),
+        *("--laws=pbvs,position_level", f"--out={tmp_path / 'out'}", "--json=-"),
+    )
+    assert driven.exit_code == 0, driven.output
+    for law in json.loads(driven.stdout)["runs"].values():
+        assert law["true"]["max_norm_mm"] < 40.0
+        assert max(law["true"]["static_mm"]) < 0.3
 
 
 TABLES = {
@@ -88,6 +115,7 @@ REFUSED = {
     "dynamics": ("--dynamics=soft", "--dynamics must be one of rigid, flexible_joint, elastic_structure"),
     "tool speed": ("--tool-speed=0", "the speed of the tool must be positive, got 0"),
     "duty": ("--duty=0", "the duty must be above 0 and at most 1, got 0"),
+    "reserve": ("--reserve=1", "--reserve must be at least 0 and below 1, got 1"),
     "payload": ("--payload=17", "payload of KUKA KR 16-2 must be between 0 and 16"),
 }  # fmt: skip
 
