@@ -65,7 +65,7 @@ def _index(folder: Path, report: Path, page: Path, output: Any) -> str:
         raise ValueError(f"{folder}: there is no summary.json below it, which compare and run write")
     rows = [_row(run, folder, report.parent) for run in found]
     comparisons = count(len({run["folder"] for run in found}), "comparison")
-    verdict = f"{count(len(found), 'law')} in {comparisons} below {folder}."
+    verdict = f"{count(len(found), 'law')} in {comparisons} below {folder.resolve()}."
     table = sortable_table("runs", _HEAD, rows, has_filter=True)
     write_plot_page(page, "Runs", verdict, [Section("Runs", _NOTE, table)])
     output.write(found)

@@ -132,7 +132,8 @@ def _refuse_impossible(found: Latency) -> None:
         if delay is not None and jitter > max(delay, found.cycle):
             raise ImpossibleDelayError(
                 f"the measurement failed: half of the messages of the {line} come {1e3 * jitter:.1f} ms "
-                f"later than the quickest, but its whole delay would be {1e3 * delay:.1f} ms"
+                f"later than the quickest, but its whole delay would be {1e3 * delay:.1f} ms: is this "
+                "machine busy with other work?"
             )
 
 

@@ -67,7 +67,7 @@ def screenshot(path: Path, image: Path, width: int, height: int, milliseconds: i
         _run(frame, [f"--screenshot={image}", size, f"--virtual-time-budget={milliseconds}"])
 
 
-def _run(path: Path, arguments: list[str], timeout: float = 120.0) -> subprocess.CompletedProcess[str]:
+def _run(path: Path, arguments: list[str], timeout: float = 300.0) -> subprocess.CompletedProcess[str]:
     with tempfile.TemporaryDirectory(ignore_cleanup_errors=True) as profile:
         command = [chromium(), *FLAGS, f"--user-data-dir={profile}", *arguments, path.resolve().as_uri()]
         # Chromium starts helpers; its own session lets a browser that hangs be ended with all of them.

@@ -57,6 +57,7 @@ def replay(logs, tmp_path_factory):
     return path
 
 
+@pytest.mark.slow  # drawing all figures twice, for screen and paper
 def test_the_report_draws_every_plot_without_an_error(opened, logs):
     assert not [line for line in opened.console if SERIOUS.search(line)]
     for plot in PLOTS:
@@ -77,12 +78,14 @@ def test_a_page_is_small_enough_to_be_mailed(report):
     assert report.stat().st_size < 2.5e6
 
 
+@pytest.mark.slow
 def test_no_figure_can_be_uploaded(opened):
     """The library's own button would send what the robot did to its maker."""
     assert 'data-title="Download plot' in opened.dom  # there are buttons
     assert 'data-title="Share' not in opened.dom
 
 
+@pytest.mark.slow
 @pytest.mark.slow
 def test_every_plot_has_a_picture_for_printing_with_its_whole_width_and_a_legend(opened, logs):
     """A browser prints neither what WebGL has drawn nor a plot that is wider than the paper."""
