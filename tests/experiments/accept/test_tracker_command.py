@@ -1,0 +1,63 @@
+"""``truetip accept tracker``: the camera that is wrong is named, and other tables are refused."""
+
+import json
+
+import numpy as np
+import pytest
+from typer.testing import CliRunner
+
+from diagrams.record.run_record import RunRecord
+from diagrams.record.topics import JOINTS, POSE, pose_message
+from experiments.main import app
+from robots.description.model import load_robot
+from robots.kinematics.forward import Kinematics
+
+
+@pytest.fixture
+def files(tmp_path):
+    """A record whose camera errs by a wave of 0.2 mm, and what a tracker saw of the same motion."""
+    time = np.arange(0.0, 8.0, 0.01)
+    q = 0.3 * np.sin(np.outer(time, [0.9, 1.3, 0.7, 1.1, 1.7, 2.3])) + [0.0, 0.3, 0.2, 0.0, 0.8, 0.0]
+    X = Kinematics(load_robot("irb1200")).forward(q)
+    record = RunRecord(tmp_path / "run.mcap", "")
+    wave = 2e-4 * np.column_stack([np.sin(5 * time), np.cos(6 * time), np.sin(4 * time)])
+    for t, joints, pose, error in zip(time.tolist(), q, X, wave, strict=True):
+        record.write(JOINTS, t, {"stamp": t, "position": joints.tolist(), "effort": [0.0] * 6})
+        seen = pose.copy()
+        seen[:3, 3] += error
+        record.write(POSE, t, pose_message(seen, t))
+    record.close()
+    table = np.column_stack([time + 0.2, 1e3 * X[:, :3, 3][:, [1, 2, 0]] + 50.0])
+    np.savetxt(tmp_path / "seen.csv", table, delimiter=";")
+    return tmp_path / "run.mcap", tmp_path / "seen.csv"
+
+
+def invoked(*arguments: object):
+    return CliRunner().invoke(app, ["accept", "tracker", *map(str, arguments)])
+
+
+def test_the_camera_that_is_wrong_is_named(files, tmp_path):
+    result = invoked(*files, "--out", tmp_path / "t.html", "--json", "-")
+    assert result.exit_code == 0, result.stderr
+    found = json.loads(result.stdout)
+    assert found["lag_s"] == pytest.approx(0.2, abs=1e-3)
+    assert found["explained_by"] == "camera"
+    assert found["rms_mm"] == pytest.approx(0.2 * np.sqrt(1.5), rel=0.15)
+    assert "Along the motion" in (tmp_path / "t.html").read_text()
+
+
+def test_what_cannot_be_compared_is_refused_in_one_line(files, tmp_path):
+    record, seen = files
+    (tmp_path / "three.csv").write_text("0 1 2\n1 2 3\n")
+    lines = seen.read_text().splitlines()
+    (tmp_path / "back.csv").write_text("\n".join([*lines[:300], lines[100], *lines[300:]]))
+    for table, message in (
+        ("three.csv", "four numbers a line are needed, time and x, y, z, there are 3"),
+        ("back.csv", "back.csv, line 301: the time does not rise"),
+        ("none.csv", "none.csv: no such file"),
+    ):
+        result = invoked(record, tmp_path / table, "--out", tmp_path / "t.html")
+        assert result.exit_code == 2
+        assert message in result.stderr
+        assert len(result.stderr.strip().splitlines()) == 1
+    assert not (tmp_path / "t.html").exists()
