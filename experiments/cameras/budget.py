@@ -18,9 +18,9 @@ from robots.kinematics.arm_capsules import ArmCapsules
 from systems.reference.paths import make_path
 from systems.vision.camera_model import Cameras
 from systems.vision.marker_body import DetectionBody
-from systems.vision.pose_uncertainty import MeasuredPose, Uncertainties, covariances
-from systems.vision.simulated_poses import simulated_errors
 from systems.vision.tracking.marker_images import marker_diameters, touching
+from systems.vision.uncertainty.pose_uncertainty import MeasuredPose, Uncertainties, covariances
+from systems.vision.uncertainty.simulated_poses import simulated_errors
 from systems.vision.visibility import in_window, occluded
 
 _CHECKED = 5  # poses that are simulated

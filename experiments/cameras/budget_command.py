@@ -18,7 +18,14 @@ from experiments.cli.prepare import prepare
 from experiments.cli.staging import PAGE, staged_file
 from experiments.report.figure_style import COLORS
 from experiments.report.plot_page import Section, html_table, write_plot_page
-from systems.vision.pose_uncertainty import CAMERAS, IMAGES, TEMPERATURE, TIME, TOOL, Uncertainties
+from systems.vision.uncertainty.pose_uncertainty import (
+    CAMERAS,
+    IMAGES,
+    TEMPERATURE,
+    TIME,
+    TOOL,
+    Uncertainties,
+)
 
 _GIVEN = Uncertainties()
 _COVERAGE = 2.0  # of the expanded uncertainty

@@ -8,7 +8,7 @@ from scipy.spatial.transform import Rotation
 
 from systems.vision.camera_rig import load_cell
 from systems.vision.marker_body import load_body
-from systems.vision.pose_uncertainty import (
+from systems.vision.uncertainty.pose_uncertainty import (
     CAMERAS,
     IMAGES,
     TEMPERATURE,
@@ -18,7 +18,7 @@ from systems.vision.pose_uncertainty import (
     Uncertainties,
     covariances,
 )
-from systems.vision.simulated_poses import simulated_errors
+from systems.vision.uncertainty.simulated_poses import simulated_errors
 
 CELL, BODY = load_cell("probst"), load_body("probst")
 RIG = CELL.camera_model()

@@ -7,8 +7,8 @@ from scipy.spatial.transform import Rotation
 
 from robots.pose import pose_error
 from systems.vision.camera_model import Cameras
-from systems.vision.pose_uncertainty import MeasuredPose, Uncertainties
 from systems.vision.tracking.pose_refinement import linearize
+from systems.vision.uncertainty.pose_uncertainty import MeasuredPose, Uncertainties
 
 _STEPS = 2  # of Gauss and Newton from the true pose; the second changes it by nothing that counts
 
@@ -26,7 +26,7 @@ def simulated_errors(
 
     Images are taken by cameras that stand where they truly are and of a body that has truly grown, and the
     pose is the best fit with what is believed. Other arguments as of
-    `systems.vision.pose_uncertainty.covariances`.
+    `systems.vision.uncertainty.pose_uncertainty.covariances`.
     """
     errors, n = np.empty((draws, 6)), len(cameras)
     for k in range(draws):
