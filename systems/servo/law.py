@@ -76,7 +76,7 @@ class ServoLaw(LeafSystem):
 
     What a law is stands on its class, see `systems.servo.contract.LawTraits`. What it works with:
         ``kinematics``  of the robot as the controller knows it, compliant if that knows its compliances
-        ``kernels``     `systems.servo.kernels`, compiled functions
+        ``kernels``     `systems.servo.kernels.steps`, compiled functions
         ``config``      gains and limits, ``gains`` of the six parts of an error (rotation first) in 1/s
         ``period``      of a tick in s
         ``angle_limit`` of the correction in rad
@@ -108,7 +108,7 @@ class ServoLaw(LeafSystem):
         robot, period, preview = model.robot, model.period, model.preview
         self.config, self.period = config, period
         # Not before a law is made: it takes time to import.
-        self.kernels = importlib.import_module("systems.servo.kernels")
+        self.kernels = importlib.import_module("systems.servo.kernels.steps")
         self.kernels.warm_up()
         self.kinematics = _kinematics(robot, model.payload)
         self._inverse = inverse_kinematics(robot, model.payload)

@@ -6,7 +6,7 @@ from diagrams.runs.simulation import Experiment
 from diagrams.scenario.scenario import load_scenario
 from robots.kinematics import kernels as of_kinematics
 from systems.guard import kernels as of_guard
-from systems.servo import kernels
+from systems.servo.kernels import steps as kernels
 
 
 def compiled() -> dict[str, int]:
