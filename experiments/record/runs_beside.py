@@ -8,13 +8,13 @@ from typing import Any
 import plotly.graph_objects as go
 from plotly.subplots import make_subplots
 
+from diagrams.scenario.differences import scenario_differences
 from experiments.cli.versions import versions_in
 from experiments.comparison.errors_table import ERRORS, Course, read_errors
 from experiments.comparison.results import SCENARIO
 from experiments.metrics.run_metrics import judged_by
 from experiments.report.data import norm
 from experiments.report.plot_page import Section, html_table, sortable_table
-from experiments.report.scenario_differences import scenario_differences
 from experiments.report.style import law_colors, law_title
 
 FIGURES = {

@@ -4,13 +4,13 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
+from diagrams.scenario.differences import scenario_differences
 from experiments.metrics.run_metrics import Comparison, best_law, judged_by
 from experiments.report.data import norm, plot_data
 from experiments.report.error_panels import error_panels
 from experiments.report.error_rows import AXES, KINDS, error_row, format_cell, is_best, smallest_of_columns
 from experiments.report.joint_panels import joint_panels
 from experiments.report.page import write_page
-from experiments.report.scenario_differences import scenario_differences
 from experiments.report.style import law_colors, law_title
 from experiments.report.worst_instant import worst_instants
 from robots.description.model import RobotModel

@@ -1,7 +1,7 @@
 """What a scenario changes against the default one, in a table."""
 
+from diagrams.scenario.differences import scenario_differences
 from diagrams.scenario.scenario import Scenario, load_scenario, scenario_text
-from experiments.report.scenario_differences import scenario_differences
 
 
 def test_the_default_scenario_changes_nothing():
