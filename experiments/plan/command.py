@@ -13,14 +13,16 @@ from diagrams.scenario.scenario import StationConfig
 from experiments.cli.console import print_files, progress_bar, refusing
 from experiments.cli.json_output import human_console, json_output
 from experiments.cli.options import JsonOption, PayloadOption, StudiedRobotOption
-from experiments.cli.staging import PAGE, TABLE, staged_file
+from experiments.cli.staging import PAGE, TABLE, staged_file, staged_folder
 from experiments.plan.plots import TABLE_HEAD, table_rows, verdict, write_plan_page
+from experiments.plan.program_option import check_language, program_files
 from experiments.plan.study import OBJECTIVES, LegResult, Plan, joint_table, plan_json, study_plan
 from experiments.report.files import write_text
 from robots.description.model import RobotModel, load_robot
 from robots.kinematics.forward import Kinematics
 from robots.planning.limits import DUTY, RESERVE, motion_limits
 from robots.planning.path_dynamics import DYNAMICS
+from robots.programs.planned_moves import MOVES
 from systems.reference.planned_file import planned_text
 
 
@@ -75,6 +77,13 @@ def plan_command(
     write: Annotated[
         str | None, typer.Option(metavar="FILE.csv", help="The motion, for reference.path=!Planned.")
     ] = None,
+    program: Annotated[
+        str | None,
+        typer.Option(
+            metavar="|".join(MOVES),
+            help="The motions as a program beside the page, timed as controllers do.",
+        ),
+    ] = None,
     report: Annotated[Path, typer.Option("--report", metavar="FILE.html", help="The picture.")] = Path(
         "out/plan.html"
     ),
@@ -83,6 +92,7 @@ def plan_command(
     """Plan the quickest or most frugal motion within limits of drives and gears, and try it in the plant."""
     human = human_console(json_file)
     with json_output(json_file) as output, refusing(ValueError, OSError), ExitStack() as stack:
+        check_language(program)
         model = load_robot(robot)
         mass = model.payload.largest_mass if payload is None else payload
         limits = motion_limits(model, tool_speed, tool_acceleration, duty).with_reserve(reserve)
@@ -90,16 +100,23 @@ def plan_command(
         plan = Plan(model, mass, path, objective, dynamics, limits, recuperation, true, may_ring)
         page = stack.enter_context(staged_file(report, *PAGE))
         table = stack.enter_context(staged_file(write, *TABLE)) if write else None
+        code = stack.enter_context(staged_folder(report.parent)) if program else None
+        written: list[Path] = []
         stack.enter_context(output.staged())
         with progress_bar(f"{objective}, {dynamics}") as progress:
             results = study_plan(plan, progress)
         write_plan_page(page, plan, results)
         if table:
             write_text(table, _motion_text(model, results))
+        if code:
+            files = program_files(str(program), model, results)
+            for name, text in files.items():
+                write_text(code / name, text)
+            written += [report.parent / name for name in files]
         output.write(plan_json(plan, results))
     human.print(_table(plan, results))
     human.print(escape(verdict(plan, results)))
-    print_files(human, report, write)
+    print_files(human, report, write, *written)
 
 
 def _motion_text(robot: RobotModel, results: list[LegResult]) -> str:

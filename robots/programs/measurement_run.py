@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-_EXTERNAL = "[9E9,9E9,9E9,9E9,9E9,9E9]"
+EXTERNAL = "[9E9,9E9,9E9,9E9,9E9,9E9]"
 _PULSE = 0.1  # s, of the trigger
 _EXPOSURE = 0.3  # s, for which the robot stands still after it
 _COORDINATES = ("x_mm", "y_mm", "z_mm", "alpha_deg", "beta_deg", "gamma_deg")
@@ -56,10 +56,10 @@ def rapid_run(run: MeasurementRun) -> dict[str, str]:
         "    VAR jointtarget here;",
     ]
     for number, q in enumerate(np.rad2deg(run.q), 1):
-        lines.append(f"    CONST jointtarget m{number} := [[{_numbers(q)}],{_EXTERNAL}];")
+        lines.append(f"    CONST jointtarget m{number} := [[{listed(q)}],{EXTERNAL}];")
     for number, way in enumerate(run.ways, 1):
         for k, q in enumerate(np.rad2deg(way), 1):
-            lines.append(f"    CONST jointtarget v{number}_{k} := [[{_numbers(q)}],{_EXTERNAL}];")
+            lines.append(f"    CONST jointtarget v{number}_{k} := [[{listed(q)}],{EXTERNAL}];")
     lines += [
         f"    PROC {run.name}_run()",
         f'        Open "HOME:"\\File:="{run.name}_joints.csv", table\\Write;',
@@ -114,7 +114,7 @@ def krl_run(run: MeasurementRun) -> dict[str, str]:
         first = 1 + np.cumsum([0, *(len(way) for way in run.ways)])
         data += [f"F[{number}]={k}" for number, k in enumerate(first, 1)]
     for name, rows in (("M", run.q), ("V", vias)):
-        data += [f"{name}[{number}]={_axes(q)}" for number, q in enumerate(np.rad2deg(rows), 1)]
+        data += [f"{name}[{number}]={krl_axes(q)}" for number, q in enumerate(np.rad2deg(rows), 1)]
     return {f"{run.name}.src": "\n".join(source), f"{run.name}.dat": "\n".join([*data, "ENDDAT", ""])}
 
 
@@ -122,7 +122,7 @@ def table_to_fill(run: MeasurementRun, position_only: bool = False) -> str:
     """The table of the run, as `truetip calibrate` reads it: joints as commanded, poses still empty."""
     coordinates = _COORDINATES[:3] if position_only else _COORDINATES
     head = [*(f"q{joint}_deg" for joint in range(1, 7)), *coordinates]
-    rows = [[*(_number(value) for value in q), *[""] * len(coordinates)] for q in np.rad2deg(run.q)]
+    rows = [[*(spelled(value) for value in q), *[""] * len(coordinates)] for q in np.rad2deg(run.q)]
     comment = "# Put in what the controller noted of the joints, and where the instrument saw the tool."
     return "\n".join([comment, *(",".join(row) for row in [head, *rows])]) + "\n"
 
@@ -130,16 +130,18 @@ def table_to_fill(run: MeasurementRun, position_only: bool = False) -> str:
 RUNS = {"rapid": rapid_run, "krl": krl_run}
 
 
-def _axes(q: np.ndarray) -> str:
+def krl_axes(q: np.ndarray) -> str:
     """Joint positions in degrees as KRL writes them."""
-    axes = ",".join(f"A{joint} {_number(value)}" for joint, value in enumerate(q, 1))
+    axes = ",".join(f"A{joint} {spelled(value)}" for joint, value in enumerate(q, 1))
     return f"{{{axes},E1 0.0,E2 0.0,E3 0.0,E4 0.0,E5 0.0,E6 0.0}}"
 
 
-def _numbers(values: np.ndarray) -> str:
-    return ",".join(_number(value) for value in values)
+def listed(values: np.ndarray) -> str:
+    """Numbers as both languages write them, with commas between."""
+    return ",".join(spelled(value) for value in values)
 
 
-def _number(value: float) -> str:
+def spelled(value: float) -> str:
+    """A number with at most five digits behind the point."""
     text = f"{value:.5f}".rstrip("0").rstrip(".")
     return "0" if text == "-0" else text
