@@ -26,9 +26,9 @@ def watch_command(
     images: Annotated[
         str | None,
         typer.Option(
-            metavar="FOLDER",
+            metavar="FOLDER|VIDEO",
             help="Recorded images in place of a simulation: joints.csv, and a folder of pictures or a video "
-            "of each camera.",
+            "of each camera; or a video of all side by side, with its table NAME.csv.",
         ),
     ] = None,
     empty: Annotated[

@@ -1,5 +1,8 @@
 """Recorded images of a cell: a folder with a folder of pictures or a video of each camera, and the joints.
 
+Or a single video in which every frame is a set: the images of all cameras side by side, row by row in the
+order of the cell, with the joints in a table of its name, NAME.csv.
+
 ``joints.csv`` has the columns ``time_s`` and ``q1_rad`` to ``q6_rad`` and a line for each set of images. A
 camera is a folder of its name with pictures in the order of their names, or a video NAME.mp4, .avi or .mkv. A
 camera that ends before the joints do is blind from then on.
@@ -26,7 +29,7 @@ class Recording:
         """Opens a folder.
 
         Args:
-            folder: that holds the recording.
+            folder: that holds the recording, or a single video.
             cameras: names of the cameras of the cell, in its order.
             size: width and height of an image in px.
 
@@ -34,15 +37,17 @@ class Recording:
             ValueError: if something is missing or cannot be read; one line that says what and where.
         """
         folder = Path(folder)
-        if not folder.is_dir():
+        is_video = folder.suffix.lower() in _VIDEOS and folder.is_file()
+        if not (folder.is_dir() or is_video):
             raise ValueError(
                 f"--images {folder}: must be a folder with {JOINTS} and a folder of pictures or a video of "
-                "each camera"
+                "each camera, or a video of all of them"
             )
-        table = _joints(folder / JOINTS)
+        table = _joints(folder.with_suffix(".csv") if is_video else folder / JOINTS)
         self.times, self.joints = table[:, 0], table[:, 1:]
         self._cameras, self._size = list(cameras), size
-        self._sources = [_source(folder, name) for name in cameras]
+        self._video = folder if is_video else None
+        self._sources = [] if is_video else [_source(folder, name) for name in cameras]
         self.ended: dict[str, int] = {}  # cameras whose images ended before the joints, with their number
 
     def __len__(self) -> int:
@@ -55,6 +60,9 @@ class Recording:
             ValueError: if an image has another size or cannot be read.
         """
         width, height = self._size
+        if self._video is not None:
+            yield from self._tiles(self._video)
+            return
         streams = [_frames(source) for source in self._sources]
         for number in range(len(self)):
             images = np.zeros((len(streams), height, width, 3), np.uint8)
@@ -71,6 +79,27 @@ class Recording:
                     raise ValueError(f"{where}: images must be {width} x {height} px, got {seen} px")
                 images[i] = image
             yield images
+
+    def _tiles(self, video: Path) -> Iterator[np.ndarray]:
+        """The sets of a single video; after its end all cameras are blind."""
+        width, height = self._size
+        frames, n = _frames(video), len(self._cameras)
+        for number in range(len(self)):
+            found = next(frames, None)
+            if found is None:
+                self.ended = self.ended or dict.fromkeys(self._cameras, number)
+                yield np.zeros((n, height, width, 3), np.uint8)
+                continue
+            where, image = found
+            assert image is not None
+            columns, rows = image.shape[1] // width, image.shape[0] // height
+            if image.shape[:2] != (rows * height, columns * width) or columns * rows < n:
+                raise ValueError(
+                    f"{where}: must be made of {n} images of {width} x {height} px, "
+                    f"got {image.shape[1]} x {image.shape[0]} px"
+                )
+            tiles = image.reshape(rows, height, columns, width, 3).swapaxes(1, 2)
+            yield np.ascontiguousarray(tiles.reshape(-1, height, width, 3)[:n])
 
 
 def _source(folder: Path, name: str) -> Path | list[Path]:
