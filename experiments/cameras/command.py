@@ -9,6 +9,7 @@ from typing import Annotated
 import numpy as np
 import typer
 
+from experiments.cameras.body_command import body_command
 from experiments.cameras.budget_command import budget_command
 from experiments.cameras.calibration import (
     CamerasFound,
@@ -48,6 +49,7 @@ SIMULATED = "simulated"
 cameras_app = command_app("Calibrate the cameras of a cell, and study what limits the accuracy of a pose.")
 
 cameras_app.command("budget")(budget_command)
+cameras_app.command("body")(body_command)
 
 CellOption = Annotated[
     str, typer.Option("--cell", metavar="NAME|FILE", help="A shipped measuring cell or a YAML file.")
