@@ -6,7 +6,7 @@ import numpy as np
 import plotly.graph_objects as go
 from plotly.subplots import make_subplots
 
-from experiments.plan.study import LegResult, Plan, plan_json
+from experiments.plan.study import STILL, LegResult, Plan, plan_json
 from experiments.report.plot_page import Section, html_table, write_plot_page
 from robots.planning.limit_use import BINDING, Use
 
@@ -45,13 +45,15 @@ def verdict(plan: Plan, results: list[LegResult]) -> str:
     usual = "the sin² law" if all(each.leg.is_straight for each in results) else "the usual timing"
     kept = "all limits are kept" if numbers["limits_kept"] else "not all limits are kept"
     binding = ", ".join(numbers["binding"]) or "none"
+    rings, usually = numbers["criterion"], max(numbers["baseline_criterion"], STILL)
+    more = f" It rings more than the usual timing: C {rings:.3f} m/s, usually {usually:.3f} m/s."
     return (
         f"{numbers['time_s']:.3f} s and {numbers['energy_j']:.0f} J, with {usual} in the same limits "
         f"{numbers['baseline_s']:.3f} s and {numbers['baseline_energy_j']:.0f} J: "
         f"time {_change(numbers['time_s'], numbers['baseline_s'])}, "
         f"energy {_change(numbers['energy_j'], numbers['baseline_energy_j'])}. In the plant {kept}; "
         f"what binds: {binding}. Planning a leg took {numbers['seconds']:.1f} s and at most "
-        f"{numbers['iterations']} iterations."
+        f"{numbers['iterations']} iterations.{more if rings > usually else ''}"
     )
 
 

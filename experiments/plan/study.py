@@ -27,7 +27,7 @@ OBJECTIVES = ("time", "energy", "front")
 COEFFICIENTS = 36  # of the spline: about one for each tick of some 12 ms of a quick motion
 STILL = 2e-3  # m/s, C that is none: 2 mm/s^2 in the mean
 _CALMER = (0.12, 0.3, 0.55, 0.8)  # of the time that is gained, which is given away for calm
-_CALMER_ENERGY = (10.0, 100.0, 300.0)  # weights of calm
+_CALMER_ENERGY = (10.0, 40.0, 100.0, 150.0, 220.0)  # weights of calm
 _SMOOTHER = 10.0  # motions where the optimiser has not converged
 _FRONT = (1.0, 1.05, 1.1, 1.2, 1.35, 1.5)  # of the shortest duration
 
@@ -176,6 +176,9 @@ def calm_enough(
         run = ready.driver.run(calm.motion)
         if not calm.is_solved or largest_share(run, plan.limits) > 1.0 + ROUNDING:
             continue
+        work, usual = (each.energy(plan.recuperation) for each in (run, ready.usual.run))
+        if plan.objective == "energy" and work > usual:
+            break  # what is calmer takes still more
         if run.criterion < best.run.criterion:
             best, optimum_of_best = Kept(calm.motion, run, True, kept.margins), calm
         if run.criterion <= allowed:
