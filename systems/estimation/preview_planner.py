@@ -9,6 +9,7 @@ from robots.pose import pose_error
 from systems.estimation import kernels
 from systems.estimation.arm_geometry import Arm, Constants
 from systems.estimation.arm_loads import NUM_SETS
+from systems.estimation.gear_errors import NUM_STATES
 from systems.estimation.kernels.arrays import FollowerState, PathInstant
 from systems.estimation.memory import Layout
 from systems.estimation.tip_model import TipModel
@@ -36,7 +37,7 @@ class MotorPlan(NamedTuple):
     motion: np.ndarray  # (12,), velocity and acceleration of the links
     twist: np.ndarray  # (6,), of the tip
     columns: np.ndarray  # (6, 18 + g), as `ArmGeometry.arm` gives them
-    states: np.ndarray  # (12,), of the gears' hysteresis
+    states: np.ndarray  # (18,), of the gears, see `GearErrors`
 
 
 class PreviewPlanner:
@@ -62,7 +63,7 @@ class PreviewPlanner:
             yields=(4, 6),  # newest first
             start_error=(6,),
             start_yield=(6,),
-            hysteresis=model.gear_errors.layout,
+            gears=model.gear_errors.layout,
         )
         self._constants: Constants | None = None
 
@@ -101,22 +102,29 @@ class PreviewPlanner:
     def _yields(
         self, memory: SimpleNamespace, arm: Arm, x: np.ndarray, q: np.ndarray, loads: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray]:
-        """By how much motors have to be ahead of links at q, rad, (6,); and the gears' hysteresis, (12,)."""
+        """By how much motors have to be ahead of links at q, rad, (6,); and the gears' states, (18,)."""
         columns = arm.columns[0]
         deflection = self._model.deflections(x, loads)[0]
         tilt = columns[:, 6:18] @ deflection[6:]
         yields = -np.linalg.solve(columns[:, :6], tilt) - deflection[:6]
-        return self._with_gear_errors(memory, x, q, yields, loads[0])
+        return self._with_gear_errors(memory, x, (q, yields, 0.0), loads[0])
 
     def _with_gear_errors(
-        self, memory: SimpleNamespace, x: np.ndarray, q: np.ndarray, yields: np.ndarray, loads: np.ndarray
+        self,
+        memory: SimpleNamespace,
+        x: np.ndarray,
+        now: tuple[np.ndarray, np.ndarray, float],
+        loads: np.ndarray,
     ) -> tuple[np.ndarray, np.ndarray]:
-        """By how much motors have to be ahead, and hysteresis, from what springs make of it."""
-        model = self._model
+        """By how much motors have to be ahead, and the states of gears, from what springs make of it.
+
+        ``now`` is q, the yields of springs, and s since the last time.
+        """
+        model, (q, yields, duration) = self._model, now
         if not model.has_gear_errors:
-            return yields, np.zeros(12)
-        states = model.gear_errors.step(memory.hysteresis, model.total_load(x, loads)[:6])
-        shapes = model.gear_shapes(x, q + yields, loads, states)
+            return yields, np.zeros(NUM_STATES)
+        states = model.gear_errors.step(memory.gears, model.total_load(x, loads)[:6], duration)
+        shapes = model.gear_shapes(q + yields, states)
         return yields - model.gear_error(x, shapes), states
 
     def step(
@@ -154,7 +162,7 @@ class PreviewPlanner:
         arm, moving = (constants, model.loads.masses, model.unknowns(x)), np.empty((3, 6))
         state = FollowerState(memory.q, memory.rates, memory.wander)
         kernels.plan.follow(*arm, instant, state, moving, columns, loads, yields)
-        yields, states = self._with_gear_errors(memory, x, moving[0], yields, loads)
+        yields, states = self._with_gear_errors(memory, x, (moving[0], yields, step), loads)
         yields += left * memory.start_yield
         motion, history = np.empty((4, 6)), memory.yields
         kernels.plan.motors(moving, memory.wander, yields, history, step, self._gear_lag, columns, motion)

@@ -18,7 +18,7 @@ from systems.estimation.events import (
     Event,
     Innovations,
 )
-from systems.estimation.gear_errors import NUM_SHAPES
+from systems.estimation.gear_errors import NUM_SHAPES, NUM_STATES
 from systems.estimation.keyframes import Keyframes, keyframe_row
 from systems.estimation.memory import Layout
 from systems.estimation.tip_model import Prediction, Spread, TipModel, moved
@@ -60,7 +60,7 @@ class Pair(NamedTuple):
     twist: np.ndarray  # (6,), of the tip
     X_WE: np.ndarray  # (4, 4), seen
     unrest: float = 0.0  # m/s^2, of the tip by parameters that are led in
-    states: np.ndarray = np.zeros(12)  # of the gears' hysteresis, in -1 to 1
+    states: np.ndarray = np.zeros(NUM_STATES)  # of the gears, see `GearErrors`
     time: float = 0.0  # s, as the camera's clock has it
 
 
@@ -157,7 +157,7 @@ class TipEstimator:
     def predict(self, memory: SimpleNamespace, pair: Pair) -> Prediction:
         """The tip of one pair at the estimate, as a camera sees it that was not moved."""
         x = self.x_robot(memory)
-        shapes = self.model.gear_shapes(x, pair.theta, pair.loads, pair.states)
+        shapes = self.model.gear_shapes(pair.theta, pair.states)
         return self.model.predict(
             self._constants_at(memory, x),
             x,
@@ -182,7 +182,7 @@ class TipEstimator:
         if memory.is_foreign[0]:
             return None
         model, x, since_first = self.model, self.x(memory), self._since_first(memory, pair.time)
-        shapes = model.gear_shapes(x, pair.theta, pair.loads, pair.states)
+        shapes = model.gear_shapes(pair.theta, pair.states)
         seen = pair.theta, pair.loads, pair.twist, pair.X_WE
         r, H, gears = model.innovation(self._constants_at(memory, x), x, seen, shapes, since_first)
         weight = 1.0 / (1.0 + (pair.unrest / config.calm) ** 2)

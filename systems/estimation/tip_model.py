@@ -165,20 +165,14 @@ class TipModel:
         """How gears and bearings yield in rad, (n, 18), to loads (n, 5, 18)."""
         return -x[self.K] * self.compliance * self.total_load(x, loads)
 
-    def gear_shapes(
-        self, x: np.ndarray, theta: np.ndarray, loads: np.ndarray, states: np.ndarray
-    ) -> np.ndarray | None:
+    def gear_shapes(self, theta: np.ndarray, states: np.ndarray) -> np.ndarray | None:
         """The shapes of gear errors at one configuration, (7, 6); None if there are none.
 
         Args:
-            x: the unknowns.
             theta: motor positions in rad, (6,).
-            loads: as `ArmLoads.at` gives them, (5, 18).
-            states: of hysteresis, (12,).
+            states: of the gears, (18,).
         """
-        if not self.has_gear_errors:
-            return None
-        return self.gear_errors.shapes(theta, self.total_load(x, loads)[:6], states)
+        return self.gear_errors.shapes(theta, states) if self.has_gear_errors else None
 
     def gear_error(self, x: np.ndarray, shapes: np.ndarray | None) -> np.ndarray | float:
         """What shapes (..., 7, 6) add to the angles of the joints in rad, (..., 6)."""

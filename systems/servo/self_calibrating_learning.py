@@ -10,6 +10,7 @@ from systems.estimation import kernels
 from systems.estimation.dead_time import CommandDelay
 from systems.estimation.drive_model import DriveModel
 from systems.estimation.events import DEAD_TIME_CHANGED, Event, EventLog
+from systems.estimation.gear_errors import NUM_STATES
 from systems.estimation.kernels.arrays import Ring
 from systems.estimation.memory import History, Layout
 from systems.estimation.tip_estimator import Pair, TipEstimator
@@ -30,7 +31,7 @@ _LOOK_EVERY = 5  # ticks, between two searches for the dead time
 _GIVE_UP = 1.6  # s after the start: what is believed of the dead time has to do
 
 # A row of the plan: motors, loads, links, tip, unrest, columns and correction of the drive model,
-# states of the gears' hysteresis.
+# states of the gears.
 PLAN = Layout(
     theta=(6,),
     velocity=(6,),
@@ -41,7 +42,7 @@ PLAN = Layout(
     unrest=(1,),
     columns=(24,),
     correction=(6,),
-    states=(12,),
+    states=(NUM_STATES,),
 )
 
 

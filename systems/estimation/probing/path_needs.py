@@ -67,10 +67,9 @@ class PathNeeds:
         twist = np.einsum("nij,nj->ni", arm.columns[:, :, :6], velocity)
         shapes = None
         if model.has_gear_errors:
-            still = np.zeros(12)
-            shapes = np.array(
-                [model.gear_shapes(model.mean, *row, still) for row in zip(q, loads, strict=True)]
-            )
+            teeth = -np.sign(loads[:, 0, :6])
+            still = np.hstack((np.zeros((len(q), 2 * NUM_JOINTS)), teeth))
+            shapes = np.array([model.gear_shapes(*row) for row in zip(q, still, strict=True)])
         return model.predict(self._constants, model.mean, q, loads, twist, shapes).H
 
     @property

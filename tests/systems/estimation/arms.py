@@ -50,10 +50,12 @@ class MovingArm:
         arm = model.forward(self._constants, x, theta[None])[1]
         loads = model.loads.at(arm.frames, theta[None], v[None], a[None])
         twist = arm.columns[:, :, :6] @ v
-        shapes = model.gear_shapes(x, theta, loads[0], np.zeros(12))
+        teeth = -np.sign(model.total_load(x, loads[0])[:6])
+        states = np.concatenate((np.zeros(12), teeth))
+        shapes = model.gear_shapes(theta, states)
         rest = (v[None], a[None]), twist, None if shapes is None else shapes[None]
         found = model.predict_anew(self._constants, x, (theta[None], still), *rest)
         for _ in range(3):  # until the loads are those of the arm that yields
             found = model.predict_anew(self._constants, x, (theta[None], found.gears), *rest)
         X_WE = moved(found.X_WE, (noise * CAMERA * self._noise.normal(size=6))[None])[0]
-        return Pair(theta, loads[0], np.concatenate((v, a)), twist[0], X_WE)
+        return Pair(theta, loads[0], np.concatenate((v, a)), twist[0], X_WE, states=states)

@@ -20,22 +20,36 @@ def hysteresis(gears: GearErrors):
 
 
 def test_waves_are_of_one_and_two_turns_of_the_motor(robot):
-    gears, torque, states = GearErrors(robot), np.zeros(6), np.zeros(12)
+    gears, states = GearErrors(robot), np.zeros(18)
     one_turn = 2.0 * np.pi / robot.gear_ratio
     theta = np.full(6, 0.3)
-    there = gears.shapes(theta, torque, states)
-    np.testing.assert_allclose(gears.shapes(theta + one_turn, torque, states), there, atol=1e-9)
-    np.testing.assert_allclose(
-        gears.shapes(theta + one_turn / 2.0, torque, states)[:2], -there[:2], atol=1e-9
-    )
-    np.testing.assert_allclose(
-        gears.shapes(theta + one_turn / 2.0, torque, states)[2:4], there[2:4], atol=1e-9
-    )
+    there = gears.shapes(theta, states)
+    np.testing.assert_allclose(gears.shapes(theta + one_turn, states), there, atol=1e-9)
+    np.testing.assert_allclose(gears.shapes(theta + one_turn / 2.0, states)[:2], -there[:2], atol=1e-9)
+    np.testing.assert_allclose(gears.shapes(theta + one_turn / 2.0, states)[2:4], there[2:4], atol=1e-9)
 
 
-def test_the_gap_is_where_the_spring_yields_to(robot):
-    shapes = GearErrors(robot).shapes(np.zeros(6), np.array([5.0, -5.0, 0.0, 5.0, 5.0, 5.0]), np.zeros(12))
-    np.testing.assert_allclose(shapes[4], [-1.0, 1.0, 0.0, -1.0, -1.0, -1.0], atol=1e-6)
+def test_teeth_lie_where_the_spring_yields_to_and_stay_there_without_a_load(robot):
+    gears, torque = GearErrors(robot), np.array([5.0, -5.0, 0.3, -0.3, 2.0, -2.0])
+    memory = hysteresis(gears)
+    teeth = [gears.shapes(np.zeros(6), gears.step(memory, each, 4e-3))[4] for each in (torque, 0.0 * torque)]
+    np.testing.assert_array_equal(teeth, [-np.sign(torque)] * 2)
+
+
+def test_teeth_cross_their_gap_against_the_grease_which_takes_an_impulse(robot):
+    gears, ramp = GearErrors(robot), 2.0  # N m/s
+    ways = []
+    for period in (4e-3, 1e-3):
+        memory = hysteresis(gears)
+        times = np.arange(-0.1, 0.1, period)
+        states = [gears.step(memory, np.full(6, ramp * t), period) for t in times]
+        way = np.array([gears.shapes(np.zeros(6), state)[4, 0] for state in states])
+        assert (way[times < 0.0] == 1.0).all()
+        ways.append(times[np.argmax(way < 0.0)])
+        assert way[-1] == -1.0
+    # The middle of the gap: the impulse is half the ramp times the square of the time since zero.
+    assert 0.5 * ramp * ways[1] ** 2 == pytest.approx(2e-3, rel=0.1)
+    assert ways[0] == pytest.approx(ways[1], abs=4e-3)
 
 
 def test_hysteresis_tells_from_which_side_a_load_was_reached(robot):
@@ -44,7 +58,7 @@ def test_hysteresis_tells_from_which_side_a_load_was_reached(robot):
 
     def after(torques):
         memory = hysteresis(gears)
-        return [gears.step(memory, torque) for torque in torques][-1]
+        return [gears.step(memory, torque, 4e-3)[:12] for torque in torques][-1]
 
     loaded = after([np.zeros(6), -large])
     np.testing.assert_allclose(loaded, 1.0, atol=3e-3)  # it follows the deflection

@@ -47,7 +47,7 @@ def test_the_tip_of_the_known_robot_is_on_the_path(model):
     while session.time < 3.5:
         plan, X_WE = session.step()
     lag = model.lag[:6] * plan.velocity  # what the damping of the gears holds back when they yield
-    shapes = model.gear_shapes(x, plan.theta, plan.loads, plan.states)
+    shapes = model.gear_shapes(plan.theta, plan.states)
     rows = plan.theta[None], plan.loads[None], np.zeros((1, 6)), shapes[None]
     error = pose_error(X_WE, model.predict(model.constants(x), x, *rows).X_WE[0])
     assert np.abs(lag).max() > 1e-4  # it moves
