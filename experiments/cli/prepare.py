@@ -4,6 +4,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
+from rich.console import Console
+
 from diagrams.runs.simulation import Experiment, nominal_robot
 from diagrams.scenario.carried import HOME, PATH, carried_over
 from diagrams.scenario.scenario import Scenario, ScenarioError, load_scenario, scenario_text
@@ -14,6 +16,7 @@ from robots.kinematics.error_kinematics import ErrorKinematics
 
 QUICK_SPEEDUP = 4.0  # of the acceleration along the path
 QUICK_SETTLE = 2.0  # s
+_PREPARING = "Preparing the laws (the first time they are compiled, for up to a minute)"
 
 
 @dataclass(frozen=True)
@@ -147,14 +150,17 @@ def quick(scenario: Scenario, settings: Sequence[str] = ()) -> tuple[Scenario, s
 def check(prepared: Prepared, laws: Sequence[str]) -> None:
     """Builds the diagram of every law once, so that what cannot run is refused before anything does.
 
+    What laws work out in every tick is compiled then, if it has not been, and not in every process anew.
+
     Raises:
         ValueError: if the path is out of reach or a part refuses its configuration.
     """
-    for law in laws:
-        try:
-            Experiment(prepared.scenario, law, prepared.robot)
-        except RuntimeError as error:  # what Drake does not like, such as an unknown integration scheme
-            raise ScenarioError(f"scenario {prepared.title}: {' '.join(str(error).split())}") from error
+    with Console(stderr=True).status(_PREPARING):
+        for law in laws:
+            try:
+                Experiment(prepared.scenario, law, prepared.robot)
+            except RuntimeError as error:  # what Drake does not like, such as an unknown integration scheme
+                raise ScenarioError(f"scenario {prepared.title}: {' '.join(str(error).split())}") from error
 
 
 def option_settings(
