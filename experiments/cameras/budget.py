@@ -58,7 +58,7 @@ class Budget:
         return float(np.abs(self.simulated / self.position[self.checked] - 1.0).max())
 
     def as_dict(self) -> dict[str, Any]:
-        """For JSON; None where a pose is not seen."""
+        """For JSON; shares are means over the poses that are seen."""
         seen = np.isfinite(self.position)
         shares = {name: float(np.mean(share[seen])) for name, share in self.shares().items()}
         return {

@@ -132,7 +132,9 @@ def test_messages_that_are_lost_for_a_while_cost_time_and_no_jump(lost: float, o
 
 def halted(law: str, seconds: float, catches_up: bool, resume: bool) -> tuple[RealTimeRecord, Lockstep]:
     """On a circle that the robot can just run; its joints turn with half their speed when the cell stops."""
-    scenario = faulty("reference.acceleration=30", f"servo.guard.resume={str(resume).lower()}")
+    # At its end the robot waits until the clocks are known again, and is led on then.
+    settings = ["reference.acceleration=30", "reference.dwell=2", f"servo.guard.resume={str(resume).lower()}"]
+    scenario = faulty(*settings)
     wire = Lockstep(scenario)
     wire.halts = [(1.6, seconds, catches_up)]
     record = RealTimeRun(scenario, law).run(wire.link, wire.camera(), now=wire.now)

@@ -21,7 +21,8 @@ def test_the_shares_are_a_whole_and_late_stamps_take_over(tmp_path: Path):
     found = budget(tmp_path, "--time-ms", "1")
     assert sum(found["shares"].values()) == pytest.approx(1.0)
     assert found["simulated_deviation"] < 0.15
-    assert found["shares"]["time stamps"] > 0.9
+    # In the mean over the path, on which the tool is at rest at every corner.
+    assert found["shares"]["time stamps"] == max(found["shares"].values()) > 0.4
     assert found["position_um"]["largest"] > 400.0  # 0.5 mm for a millisecond at half a metre per second
     assert "Along the path" in (tmp_path / "b.html").read_text()
 
