@@ -123,7 +123,7 @@ REFUSED = {
     "calibrate --noise loud": "--noise must be estimate, source or the path of a YAML file, got 'loud'",
     "calibrate --noise nofile.yaml": "--noise must be estimate, source or the path of a YAML file, got",
     "calibrate --noise text.yaml": "--noise text.yaml: must have exactly joint_deg, position_mm,",
-    "calibrate --joint-errors scael": "joint errors are scale, eccentricity, motor, strain_wave, coupling, got 'scael'",
+    "calibrate --joint-errors scael": "motor, strain_wave, coupling, got 'scael'",
     "calibrate --fixed nothing --measurements few.csv": "identification: no parameter is called nothing",
     "calibrate --write robot.txt --measurements few.csv": "cannot write the file robot.txt: its name must",
     "calibrate --urdf robot.txt --measurements few.csv": "cannot write the file robot.txt: its name must",
