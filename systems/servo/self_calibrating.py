@@ -57,7 +57,7 @@ class SelfCalibrating(LeafSystem):
     discrete state: between ports of their own each would see the others a tick late.
     """
 
-    title = "self-calibrating"
+    title = "Self-calibrating"
     colour = "#0f766e"
     uses_camera = False  # what it knows stays true when the camera sees nothing
     learns_from_camera = True

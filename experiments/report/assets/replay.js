@@ -127,16 +127,16 @@ holder.addEventListener("wheel", event => {
 const canvas = element("course"), pen = canvas.getContext("2d"), cursor = element("cursor");
 let courseKey = "";
 function drawCourse() {
-  const width = canvas.clientWidth, height = 54, key = [width, isDark.matches, ...laws.map(law => law.isOn)].join();
+  const width = canvas.clientWidth, height = 68, caption = 14, key = [width, isDark.matches, ...laws.map(law => law.isOn)].join();
   const x = i => 8 + (width - 16) * i / Math.max(count - 1, 1);
   if (key !== courseKey) {
     canvas.width = width;
     canvas.height = height;
     const all = laws.flatMap(law => law.mm), top = Math.log10(Math.max(...all)), floor = Math.max(Math.log10(Math.min(...all)), top - 5);
-    const y = mm => 4 + (height - 8) * (top - Math.max(Math.log10(mm), floor)) / Math.max(top - floor, 0.1);
+    const y = mm => 4 + (height - caption - 8) * (top - Math.max(Math.log10(mm), floor)) / Math.max(top - floor, 0.1);
     pen.fillStyle = "rgba(128,140,156,.14)";
     const rest = times.findIndex(t => t >= data.marks.dwell_start);
-    if (rest > 0) pen.fillRect(x(rest), 0, width - x(rest), height);
+    if (rest > 0) pen.fillRect(x(rest), 0, width - x(rest), height - caption);
     for (const law of laws.filter(law => law.isOn)) {
       pen.strokeStyle = law.color;
       pen.lineWidth = 1.3;
@@ -147,7 +147,7 @@ function drawCourse() {
     pen.fillStyle = getComputedStyle(document.documentElement).getPropertyValue("--soft");
     pen.font = "11px system-ui, sans-serif";
     pen.textBaseline = "bottom";
-    pen.fillText(`distance from the wanted point, ${(10 ** top).toPrecision(2)} mm at the top, ${(10 ** floor).toPrecision(1)} mm at the bottom`, 12, height - 2);
+    pen.fillText(`distance from the wanted point, ${(10 ** top).toPrecision(2)} mm at the top, ${(10 ** floor).toPrecision(1)} mm at the bottom`, 8, height);
     courseKey = key;
   }
   cursor.style.transform = `translateX(${x(state.frame)}px)`;
