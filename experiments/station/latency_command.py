@@ -169,7 +169,7 @@ def write_latency_page(path: Path, found: Latency, record: LatencyRecord) -> Non
     spread = go.Figure(go.Histogram(x=1e3 * record.turn_around, nbinsx=100))
     spread.update_layout(xaxis_title="turn-around in ms", yaxis_title="replies")
     verdict = (
-        f"A command takes {1e3 * found.loop:.1f} ms to the joint, {1e3 * found.dead_time:.1f} ms more than "
+        f"A command takes {1e3 * found.loop:.1f} ms to the joint, {1e3 * found.dead_time:z.1f} ms more than "
         "the cycle in which it is heard."
     )
     if found.camera is not None:
