@@ -149,7 +149,7 @@ def _write_page(page: Path, found: InstrumentCalibration) -> None:
     rows = []
     for k, line in enumerate(seen.lines.tolist()):
         before, after = (1e3 * float(np.sqrt(np.nansum(e[k] ** 2))) for e in (found.before, found.residuals))
-        axes = ["" if np.isnan(value) else f"{1e3 * value:.4f}" for value in found.residuals[k]]
+        axes = ["" if np.isnan(value) else f"{1e3 * value:z.4f}" for value in found.residuals[k]]
         names = [seen.targets[seen.target[k]], seen.instruments[seen.instrument[k]]]
         used = "" if found.used[k] else "left out"
         rows.append([str(line), *names, f"{before:.3f}", f"{after:.4f}", *axes, used])

@@ -100,7 +100,7 @@ def _pose_table(study: CalibrationStudy, before: np.ndarray) -> tuple[list[str],
     for k, (number, payload) in enumerate(zip(table.rows, table.payload, strict=True)):
         old, new = before[k], found.residuals[k]
         cells = [f"{1e3 * np.linalg.norm(old[-3:]):.3f}", f"{1e3 * np.linalg.norm(new[-3:]):.4f}"]
-        cells += [f"{1e3 * value:.4f}" for value in new[-3:]]
+        cells += [f"{1e3 * value:z.4f}" for value in new[-3:]]
         if has_rotation:
             cells += [f"{np.rad2deg(np.linalg.norm(each[:3])):.4f}" for each in (old, new)]
         used = "" if found.kept[k] else "left out"
