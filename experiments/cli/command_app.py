@@ -57,7 +57,7 @@ def command_app(
         def __init__(self, **given: Any) -> None:
             super().__init__(**given)
             if table is not None:
-                self.commands = CommandTable(table)
+                self.commands: Any = CommandTable(table)
 
     return typer.Typer(
         cls=Commands,

@@ -1,6 +1,7 @@
 """Commands that are imported when they are asked for: half of them would cost each of them a second."""
 
-from collections.abc import Iterator, Mapping, MutableMapping
+from collections.abc import Iterator, Mapping
+from functools import cache
 from importlib import import_module
 from typing import Any
 
@@ -9,7 +10,7 @@ from typer.main import get_command_from_info, get_group
 from typer.models import CommandInfo
 
 
-class CommandTable(MutableMapping[str, Any]):
+class CommandTable(Mapping[str, Any]):
     """Commands by name, in the order of the help.
 
     Args:
@@ -17,25 +18,13 @@ class CommandTable(MutableMapping[str, Any]):
     """
 
     def __init__(self, places: Mapping[str, str]) -> None:
-        self._places = dict(places)
-        self._made: dict[str, Any] = {}
+        self._places = places
 
     def __getitem__(self, name: str) -> Any:
-        if name not in self._made:
-            module, member = self._places[name].split(":")
-            self._made[name] = _command(name, getattr(import_module(module), member))
-        return self._made[name]
-
-    def __setitem__(self, name: str, command: Any) -> None:
-        self._places.setdefault(name, "")
-        self._made[name] = command
-
-    def __delitem__(self, name: str) -> None:
-        del self._places[name]
-        self._made.pop(name, None)
+        return _command(name, self._places[name])
 
     def __contains__(self, name: object) -> bool:
-        return name in self._places
+        return name in self._places  # without importing it
 
     def __iter__(self) -> Iterator[str]:
         return iter(self._places)
@@ -44,7 +33,10 @@ class CommandTable(MutableMapping[str, Any]):
         return len(self._places)
 
 
-def _command(name: str, made_of: Any) -> Any:
+@cache
+def _command(name: str, place: str) -> Any:
+    module, member = place.split(":")
+    made_of = getattr(import_module(module), member)
     if isinstance(made_of, typer.Typer):
         command: Any = get_group(made_of)
         command.name = name
