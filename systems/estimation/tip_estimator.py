@@ -62,6 +62,7 @@ class Pair(NamedTuple):
     unrest: float = 0.0  # m/s^2, of the tip by parameters that are led in
     states: np.ndarray = np.zeros(NUM_STATES)  # of the gears, see `GearErrors`
     time: float = 0.0  # s, as the camera's clock has it
+    rounding: np.ndarray = np.zeros(NUM_JOINTS)  # rad, standard deviation of theta by steps of the encoders
 
 
 class TipEstimator:
@@ -169,9 +170,19 @@ class TipEstimator:
         )
 
     def tip_covariance(self, memory: SimpleNamespace, pair: Pair) -> np.ndarray:
-        """Covariance of the predicted tip, rotation (rad^2) first, shape (6, 6)."""
+        """Covariance of the predicted tip, rotation (rad^2) first, shape (6, 6).
+
+        To what the unknowns may be wrong by, H P H^T, the steps of the encoders add J S J^T.
+        """
         H = self.predict(memory, pair).H[0]
-        return H @ self.covariance(memory) @ H.T
+        J = self._jacobian(memory, pair) * pair.rounding
+        return H @ self.covariance(memory) @ H.T + J @ J.T
+
+    def _jacobian(self, memory: SimpleNamespace, pair: Pair) -> np.ndarray:
+        """Of the tip, as the joints move, rotation first, (6, 6)."""
+        x = self.x_robot(memory)
+        arm = self.model.forward(self._constants_at(memory, x), x, pair.theta[None])[1]
+        return arm.columns[0, :, :NUM_JOINTS]
 
     def add(self, memory: SimpleNamespace, pair: Pair) -> Event | None:
         """Learns from one pair; says if something happened to the robot."""

@@ -9,7 +9,7 @@ from pydrake.systems.framework import Context, DiscreteValues, LeafSystem
 
 from robots.description.model import NUM_JOINTS, RobotModel
 from systems.controller_model import ControllerModel
-from systems.estimation.drive_model import DEAD_TIME
+from systems.estimation.drives.drive_model import DEAD_TIME
 from systems.estimation.events import PATH_UNSEEN, Event
 from systems.estimation.findings import calibrated_robot, findings, path_knowledge
 from systems.estimation.memory import Layout, Views

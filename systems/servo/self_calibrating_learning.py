@@ -7,8 +7,9 @@ import numpy as np
 from robots.description.model import NUM_JOINTS
 from systems.controller_model import ControllerModel
 from systems.estimation import kernels
-from systems.estimation.dead_time import CommandDelay
-from systems.estimation.drive_model import DriveModel
+from systems.estimation.drives.dead_time import CommandDelay
+from systems.estimation.drives.drive_model import DriveModel
+from systems.estimation.drives.encoder_steps import EncoderSteps
 from systems.estimation.events import DEAD_TIME_CHANGED, Event, EventLog
 from systems.estimation.gear_errors import NUM_STATES
 from systems.estimation.kernels.arrays import Ring
@@ -60,7 +61,7 @@ class Learning:
         self.estimator = TipEstimator(self.tip_model, config.estimator)
         self.drives = DriveModel(model, config.drives)
         self.delay = CommandDelay(model.period, config.dead_time)
-        self.events = EventLog()
+        self.events, self.steps = EventLog(), EncoderSteps()
         reach = _REACH + max(model.command_delay, config.dead_time.longest) + model.camera_delay
         length = int(np.ceil(reach / model.period))
         self.plan, self.encoders = History(PLAN.size, length), History(2 * NUM_JOINTS, length)
@@ -71,6 +72,7 @@ class Learning:
             "drives": self.drives.layout,
             "plan": self.plan.layout,
             "encoders": self.encoders.layout,
+            "steps": self.steps.layout,  # of the encoders
             "delay": self.delay.layout,
             "events": self.events.layout,
             "heard": Layout(  # at the last tick
@@ -94,6 +96,7 @@ class Learning:
         """Writes what is known before the first sample."""
         self.estimator.start(memory.estimator)
         self.drives.start(memory.drives)
+        self.steps.start(memory.steps)
         memory.upset_at[0] = memory.paused_until[0] = -np.inf
         memory.heard.newest[0] = memory.heard.accepted[0] = -np.inf
         self.delay.start(memory.delay, self._model.command_delay)
@@ -116,6 +119,7 @@ class Learning:
         joints, sample = samples
         row = np.concatenate((joints.position, joints.velocity))
         self.encoders.append(memory.encoders, joints.time, row)
+        self.steps.hear(memory.steps, joints.position)
         self.delay.search.measure(memory.delay.search, joints.time, joints.position)
         heard = memory.heard
         heard.time[0], heard.is_new[0], heard.path_start[0] = time, 1.0, path_start
@@ -168,7 +172,10 @@ class Learning:
         kernels.poses.move(at.X_WE, (exposure - stamp) * now.twist)
         is_settling = exposure < memory.delay.settled[0] + _SETTLING
         unrest = UNREST if is_settling else float(now.unrest[0])
-        return Pair(at.theta, then.loads, then.motion, now.twist, at.X_WE, unrest, then.states, stamp)
+        rounding = self.steps.sigma(memory.steps)
+        return Pair(
+            at.theta, then.loads, then.motion, now.twist, at.X_WE, unrest, then.states, stamp, rounding
+        )
 
     def encoders_at(self, memory: SimpleNamespace, time: float) -> np.ndarray | None:
         """Positions between two samples, a cubic through positions and velocities, rad, (6,)."""

@@ -1,4 +1,4 @@
-"""Rows of numbers found by time in a ring."""
+"""Rows of numbers found by time in a ring; the steps between readings."""
 
 from systems.estimation.kernels.poses import compiled, inner
 
@@ -55,3 +55,13 @@ def cubic_at(count, times, rows, time, out):
                 + s * s * (3.0 - 2.0 * s) * rows[behind, k]
                 - s * s * r * h * rows[behind, number + k]
             )
+
+
+@compiled
+def least_change(row, last, least):
+    """Keeps the smallest change from one row to the next, entry by entry, and the row as the last one."""
+    for k in range(len(row)):
+        change = abs(row[k] - last[k])
+        if 0.0 < change < least[k]:  # never of the first row: nothing is less than not a number
+            least[k] = change
+        last[k] = row[k]

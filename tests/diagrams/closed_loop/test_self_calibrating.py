@@ -93,6 +93,17 @@ def test_a_lap_from_a_nominal_robot(name, settings, moving):
 
 
 @pytest.mark.slow
+@pytest.mark.parametrize(("seed", "bits"), [(2001, 19), (2002, 17)])
+def test_the_tip_is_where_the_law_says_with_encoders_of_any_steps(seed, bits):
+    names = ("seed", "station.errors.random.seed", "station.variation.seed")
+    drawn = [f"{name}={seed}" for name in names]
+    settings = ["reference.path=circle", f"station.encoder.bits={bits}", *drawn]
+    log = run(load_scenario("everything", settings), "self_calibrating")
+    assert log.learnt is not None
+    assert log.learnt["coverage"]["share"] >= 0.88  # 0.95 of forty samples, which are alike in turns
+
+
+@pytest.mark.slow
 def test_a_dead_time_that_changes_on_the_path_is_learnt_while_the_tip_stays_on_its_track():
     settings = ["station.events=[!DeadTimeChange {at: 6, dead_time: 0.033}]", "seed=1001"]
     experiment = Experiment(load_scenario("everything", settings), "self_calibrating")

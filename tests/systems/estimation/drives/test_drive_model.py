@@ -6,7 +6,7 @@ from scipy.integrate import solve_ivp
 
 from robots.description.model import load_robot
 from systems.controller_model import ControllerModel
-from systems.estimation.drive_model import DEAD_TIME, MASS, SIZE, DriveModel, DriveModelConfig
+from systems.estimation.drives.drive_model import DEAD_TIME, MASS, SIZE, DriveModel, DriveModelConfig
 
 PERIOD = 4e-3
 LOADS = np.zeros((5, 18))

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from systems.estimation.dead_time import CommandDelay, DeadTime, DeadTimeConfig
+from systems.estimation.drives.dead_time import CommandDelay, DeadTime, DeadTimeConfig
 
 PERIOD = 4e-3
 
