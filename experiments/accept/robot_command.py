@@ -17,7 +17,9 @@ from experiments.accept.robot_cycle import (
     path_scenario,
     pose_results,
     pose_scenario,
+    visits,
 )
+from experiments.accept.robot_page import Row, table_rows, verdict, write_acceptance_page
 from experiments.cli.console import print_files, progress_bar, refusing
 from experiments.cli.json_output import human_console, json_output
 from experiments.cli.option_limits import at_least, positive
@@ -25,31 +27,7 @@ from experiments.cli.options import JsonOption, OnlyPictureOption, RobotOption, 
 from experiments.cli.prepare import Prepared, prepare, simulated_only
 from experiments.cli.staging import PAGE, staged_file
 from experiments.comparison.compare import RunJob, run_job
-from experiments.report.plot_page import Section, html_table, write_plot_page
-
-TITLES = {
-    "AP_mm": "pose accuracy AP in mm",
-    "RP_mm": "pose repeatability RP in mm",
-    "AP_deg": "pose accuracy, orientation, in degrees",
-    "vAP_mm": "multi-directional pose accuracy variation vAP in mm",
-    "AD_mm": "distance accuracy AD, P2 to P4, in mm",
-    "RD_mm": "distance repeatability RD in mm",
-    "dAP_mm": "drift of pose accuracy dAP over the cycles in mm",
-    "stabilisation_s": "pose stabilisation time in s",
-    "overshoot_mm": "pose overshoot in mm",
-    "AT_mm": "path accuracy AT in mm",
-    "RT_mm": "path repeatability RT in mm",
-    "AT_deg": "path accuracy, orientation, in degrees",
-    "CR_mm": "corner rounding CR in mm",
-    "CO_mm": "corner overshoot CO in mm",
-    "AV_percent": "path velocity accuracy AV in percent",
-    "RV_percent": "path velocity repeatability RV in percent",
-}
-_NOTE = (
-    "The largest over the poses or along the square P2, P3, P4, P5. The speed of a path rises and falls "
-    "between corners; velocity is compared at its peak. Drift is between the first and the last quarter of "
-    "the cycles, not over the eight hours of the standard."
-)
+from experiments.report.style import law_title
 
 
 def accept_robot_command(
@@ -88,7 +66,8 @@ def accept_robot_command(
         cycle = Cycle(cube_poses(prepared.scenario, 1e-3 * cube), dwell, 1e-3 * band)
         page = stack.enter_context(staged_file(out, *PAGE))
         stack.enter_context(output.staged())
-        rows, work = [], 2.0 * len(masses) * len(shares)
+        rows: list[Row] = []
+        work = 2.0 * len(masses) * len(shares)
         with progress_bar(f"{cycles} cycles of poses and of the square") as progress:
             for mass in masses:
                 for share in shares:
@@ -97,34 +76,32 @@ def accept_robot_command(
                         _row(prepared, chosen, cycle, cycles, mass, 0.01 * share,
                              lambda x, done=done: progress((done + x) / work))
                     )  # fmt: skip
-        table = _table_rows(rows)
-        head = ("criterion", *(f"{row['load_kg']:g} kg, {row['speed_percent']:g} %" for row in rows))
-        title = f"ISO 9283, {prepared.robot.name}, {chosen}, {cycles} cycles, cube of {cube:g} mm"
-        write_plot_page(page, title, _NOTE, [Section("Results", prepared.title, html_table(head, table))])
-        output.write({"law": chosen, "cycles": cycles, "cube_mm": cube, "rows": rows})
+        title = f"ISO 9283, {prepared.robot.name}, {law_title(chosen)}"
+        told = verdict(rows, law_title(chosen), cycles, cube)
+        write_acceptance_page(page, title, told, prepared.title, rows)
+        output.write(
+            {"law": chosen, "cycles": cycles, "cube_mm": cube, "rows": [row.results for row in rows]}
+        )
     shown = Table(title=escape(title), box=box.SIMPLE)
-    for number, name in enumerate(head):
+    for number, name in enumerate(("criterion", *(row.name for row in rows))):
         shown.add_column(name, justify="left" if number == 0 else "right")
-    for row in table:
-        shown.add_row(*row)
+    for line in table_rows(rows):
+        shown.add_row(*line)
     human.print(shown)
+    human.print(escape(told))
     print_files(human, out)
 
 
 def _row(
     prepared: Prepared, law: str, cycle: Cycle, cycles: int, mass: float, speed: float, progress: Any
-) -> dict[str, Any]:
+) -> Row:
     scenario = prepared.scenario
     scenario = replace(scenario, station=replace(scenario.station, payload=mass))
     poses, square = (make(scenario, cycle, cycles, speed) for make in (pose_scenario, path_scenario))
     visited = run_job(RunJob(poses, prepared.robot, law, scenario.seed), progress)
     run = run_job(RunJob(square, prepared.robot, law, scenario.seed), lambda x: progress(1.0 + x))
-    return {
-        "load_kg": mass,
-        "speed_percent": 100.0 * speed,
-        **pose_results(visited, poses, cycle, cycles),
-        **path_results(run, square, cycle),
-    }
+    found, along = visits(visited, poses, cycle, cycles), path_results(run, square, cycle)
+    return Row(mass, 100.0 * speed, pose_results(found, cycle) | along.results, found, along)
 
 
 def _numbers(option: str, text: str | None, low: float, high: float) -> list[float]:
@@ -141,10 +118,3 @@ def _numbers(option: str, text: str | None, low: float, high: float) -> list[flo
     if text is not None and not found:
         raise ValueError(f"{option} must be numbers such as 0,7, got '{text}'")
     return found
-
-
-def _table_rows(rows: list[dict[str, Any]]) -> list[list[str]]:
-    return [
-        [title, *("-" if row[name] is None else f"{row[name]:.3f}" for row in rows)]
-        for name, title in TITLES.items()
-    ]

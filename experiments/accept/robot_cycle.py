@@ -68,11 +68,27 @@ def _waypoint(X: np.ndarray) -> Waypoint:
     return Waypoint(1e3 * X[:3, 3], np.rad2deg(zyx_from_rotation(X[:3, :3])))
 
 
-def pose_results(log: RunLog, scenario: Scenario, cycle: Cycle, cycles: int) -> dict[str, float | None]:
-    """AP, RP, vAP, distances, drift, stabilisation and overshoot, in mm, degrees and s.
+@dataclass(frozen=True)
+class Visits:
+    """What was attained at each visit to a pose, n of them."""
+
+    pose: np.ndarray  # (n,), 0 for P1
+    before: np.ndarray  # (n,), the pose that it came from
+    position: np.ndarray  # (n, 3), of the tip in the world, m
+    error: np.ndarray  # (n, 6), wanted less attained: rotation vector in rad, then position in m
+    stable: np.ndarray  # (n,), s from the end of the command until the tip stays within the band
+    overshoot: np.ndarray  # (n,), m beyond the attained position after it came into the band
+
+    def of_pair(self, pose: int, before: int) -> np.ndarray:
+        """Attained positions of those visits to a pose that began at another, (k, 3)."""
+        return self.position[(self.pose == pose) & (self.before == before)]
+
+
+def visits(log: RunLog, scenario: Scenario, cycle: Cycle, cycles: int) -> Visits:
+    """What a run of `pose_scenario` attained.
 
     Args:
-        log: of a run of `pose_scenario`.
+        log: of the run.
         scenario: of that run.
         cycle: its poses.
         cycles: how often they were visited, at least 2.
@@ -83,8 +99,8 @@ def pose_results(log: RunLog, scenario: Scenario, cycle: Cycle, cycles: int) -> 
     reached = [
         (ORDER[k % moves + 1], ORDER[k % moves], settle + (k + 1) * span) for k in range(moves * cycles)
     ]
-    attained, error, came_from, stable, overshoot = [], [], [], [], []
-    for pose, before, arrival in reached:
+    attained, error, stable, overshoot = [], [], [], []
+    for pose, _, arrival in reached:
         rest = (log.time >= arrival - 1e-9) & (log.time < arrival + cycle.dwell - 1e-9)
         end = rest & (log.time >= arrival + cycle.dwell - _ATTAINED)
         e = pose_error(np.broadcast_to(cycle.poses[pose], (int(end.sum()), 4, 4)), log.X_WE_true[end])
@@ -93,38 +109,53 @@ def pose_results(log: RunLog, scenario: Scenario, cycle: Cycle, cycles: int) -> 
         seconds, beyond = _settled(away, log.time[rest] - arrival, cycle.band)
         attained.append(mean)
         error.append(e.mean(axis=0))
-        came_from.append((pose, before))
         stable.append(seconds)
         overshoot.append(beyond)
-    p, e, to = np.array(attained), np.array(error), np.array([pose for pose, _ in came_from])
-    visits = {pose: p[to == pose] for pose in range(5)}
-    accuracy = {k: float(np.linalg.norm(e[to == k, 3:].mean(axis=0))) for k in range(5)}
-    middles = [
-        p[[j for j, pair in enumerate(came_from) if pair == (0, before)]].mean(axis=0) for before in (4, 1, 3)
-    ]
+    pose, before, _ = zip(*reached, strict=True)
+    arrays = (np.array(each) for each in (pose, before, attained, error, stable, overshoot))
+    return Visits(*arrays)
+
+
+def pose_results(found: Visits, cycle: Cycle) -> dict[str, float | None]:
+    """AP, RP, vAP, distances, drift, stabilisation and overshoot, in mm, degrees and s."""
+    e = found.error
+    at = [found.pose == k for k in range(5)]
+    accuracy = [float(np.linalg.norm(e[here, 3:].mean(axis=0))) for here in at]
+    attained = [found.position[here] for here in at]
+    middles = [found.of_pair(0, before).mean(axis=0) for before in (4, 1, 3)]
     apart = [float(np.linalg.norm(a - b)) for a in middles for b in middles]
     # P2 to P4, each measured once a cycle by the visit of the first half.
-    first, second = (_of_pair(p, came_from, pair) for pair in ((1, 0), (3, 2)))
+    first, second = found.of_pair(1, 0), found.of_pair(3, 2)
     count = min(len(first), len(second))
     lengths = np.linalg.norm(first[:count] - second[:count], axis=1)
     wanted = float(np.linalg.norm(cycle.poses[1, :3, 3] - cycle.poses[3, :3, 3]))
-    quarter = max(1, len(visits[0]) // 4)
-    drift = visits[0][-quarter:].mean(axis=0) - visits[0][:quarter].mean(axis=0)
+    quarter = max(1, len(attained[0]) // 4)
+    drift = attained[0][-quarter:].mean(axis=0) - attained[0][:quarter].mean(axis=0)
     return {
-        "AP_mm": 1e3 * max(accuracy.values()),
-        "RP_mm": 1e3 * max(float(repeatability(x)) for x in visits.values() if len(x) > 1),
-        "AP_deg": float(np.rad2deg(max(np.linalg.norm(e[to == k, :3].mean(axis=0)) for k in range(5)))),
+        "AP_mm": 1e3 * max(accuracy),
+        "RP_mm": 1e3 * max(float(repeatability(x)) for x in attained if len(x) > 1),
+        "AP_deg": float(np.rad2deg(max(np.linalg.norm(e[here, :3].mean(axis=0)) for here in at))),
         "vAP_mm": 1e3 * max(apart),
         "AD_mm": 1e3 * float(lengths.mean() - wanted),
         "RD_mm": 1e3 * 3.0 * float(lengths.std(ddof=1)) if count > 1 else None,
         "dAP_mm": 1e3 * float(np.linalg.norm(drift)),
-        "stabilisation_s": max(stable),
-        "overshoot_mm": 1e3 * max(overshoot),
+        "stabilisation_s": float(found.stable.max()),
+        "overshoot_mm": 1e3 * float(found.overshoot.max()),
     }
 
 
-def path_results(log: RunLog, scenario: Scenario, cycle: Cycle) -> dict[str, float]:
-    """AT and RT with orientation, corner deviation and velocity, in mm, degrees and percent."""
+@dataclass(frozen=True)
+class Square:
+    """How the square was run: its results, and the distances that the largest are of."""
+
+    results: dict[str, float]  # AT, RT, CR, CO in mm, AT in degrees, AV and RV in percent
+    edge: np.ndarray  # (n,), 0 at P2, 1 at P3 and so on up to 4, by the time of the path
+    off: np.ndarray  # (n,), m, of the mean of the cycles from the path
+    scatter: np.ndarray  # (n,), m, repeatability there
+
+
+def path_results(log: RunLog, scenario: Scenario, cycle: Cycle) -> Square:
+    """AT and RT with orientation, corner deviation and velocity of a run of `path_scenario`."""
     path = make_path(scenario.reference)
     lap = float(path.lap_starts[1] - path.lap_starts[0])
     since = np.arange(0.0, lap, scenario.station.period)
@@ -145,15 +176,17 @@ def path_results(log: RunLog, scenario: Scenario, cycle: Cycle) -> dict[str, flo
     middle = quick > 0.99 * quick.max()
     ratio = speed[:, middle].max(axis=1) / quick.max() - 1.0
     rounding, over = _corners(mean, since, cycle, lap)
-    return {
+    scatter = repeatability(p)
+    results = {
         "AT_mm": 1e3 * float(distances.max()),
-        "RT_mm": 1e3 * float(repeatability(p).max()),
+        "RT_mm": 1e3 * float(scatter.max()),
         "AT_deg": float(np.rad2deg(np.linalg.norm(angles, axis=1).max())),
         "CR_mm": 1e3 * rounding,
         "CO_mm": 1e3 * over,
         "AV_percent": 100.0 * float(ratio.mean()),
         "RV_percent": 300.0 * float(ratio.std(ddof=1)),
     }
+    return Square(results, 4.0 * since / lap, distances, scatter)
 
 
 def _settled(away: np.ndarray, since: np.ndarray, band: float) -> tuple[float, float]:
@@ -162,11 +195,6 @@ def _settled(away: np.ndarray, since: np.ndarray, band: float) -> tuple[float, f
     seconds = float(since[min(outside[-1] + 1, len(since) - 1)]) if len(outside) else 0.0
     inside = np.flatnonzero(away <= band)
     return seconds, float(away[inside[0] :].max()) if len(inside) else float(away.max())
-
-
-def _of_pair(p: np.ndarray, came_from: list[tuple[int, int]], pair: tuple[int, int]) -> np.ndarray:
-    """Attained positions of those visits to a pose that began at another."""
-    return p[[k for k, each in enumerate(came_from) if each == pair]]
 
 
 def _at(time: np.ndarray, p: np.ndarray, when: np.ndarray) -> np.ndarray:

@@ -73,8 +73,8 @@ def body_command(
         output.write(numbers)
     path, workspace = numbers["path_um"], numbers["workspace_um"]
     human.print(
-        f"Standard deviation of the tool's position: {path[0]:.1f} to {path[1]:.1f} um in the mean along the "
-        f"path, {workspace[0]:.1f} to {workspace[1]:.1f} um in the median over the workspace"
+        f"Standard deviation of the tool's position: {path[0]:.1f} to {path[1]:.1f} µm in the mean along the "
+        f"path, {workspace[0]:.1f} to {workspace[1]:.1f} µm in the median over the workspace"
     )
     print_files(human, write)
 

@@ -89,8 +89,8 @@ def budget_verdict(found: Budget) -> str:
     position = numbers["position_um"]
     hidden = numbers["poses"] - numbers["seen"]
     return (
-        f"Standard uncertainty of a measured position: {position['median']:.0f} um in the median, "
-        f"{position['largest']:.0f} um at most ({_COVERAGE * position['largest']:.0f} um expanded, k = 2). "
+        f"Standard uncertainty of a measured position: {position['median']:.0f} µm in the median, "
+        f"{position['largest']:.0f} µm at most ({_COVERAGE * position['largest']:.0f} µm expanded, k = 2). "
         f"Shares of its variance: {named}. The Monte Carlo is within "
         f"{100.0 * numbers['simulated_deviation']:.0f} % of it."
         + (f" {hidden} of {numbers['poses']} poses are not seen." if hidden else "")
@@ -132,7 +132,8 @@ def _stacked(found: Budget) -> go.Figure:
         x=found.time[found.checked], y=1e6 * found.simulated, name="Monte Carlo", mode="markers",
         marker={"symbol": "x", "size": 9, "color": "#5b6675"},
     )  # fmt: skip
-    figure.update_layout(xaxis_title="time in s", yaxis_title="position, standard uncertainty in um")
+    figure.update_layout(xaxis_title="time in s", yaxis_title="standard uncertainty in µm")
+    figure.update_xaxes(range=[found.time[0], found.time[-1]])
     return figure
 
 

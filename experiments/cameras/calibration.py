@@ -105,9 +105,8 @@ def verdict(found: CamerasFound) -> str:
     """What was reached, in words."""
     calibration = found.calibration
     text = (
-        f"Standard deviation of the wand's length {1e3 * calibration.wand_deviation:.4f} mm over "
-        f"{len(calibration.wand_lengths)} places; pixels scatter by {calibration.sigma:.3f} px; "
-        f"found in {found.seconds:.1f} s."
+        f"Measured at {len(calibration.wand_lengths)} places, the wand's length has a standard deviation of "
+        f"{1e3 * calibration.wand_deviation:.4f} mm; pixels scatter by {calibration.sigma:.3f} px."
     )
     if found.ratios is not None:
         largest = np.abs(found.ratios).max()
@@ -130,7 +129,7 @@ def write_calibration_page(path: Path, title: str, found: CamerasFound) -> None:
     )
     note_lenses = (
         "Focal lengths f and principal points c in px, radial distortion k and tangential p as in OpenCV, "
-        "with their standard deviations; p and its deviations in thousandths."
+        "with their standard deviations."
     )
     sections = [
         Section("Cameras", note, html_table(HEAD, _rows(found))),
@@ -168,7 +167,7 @@ def _lens_table(found: CamerasFound) -> tuple[list[str], list[list[str]]]:
     rows = []
     for name, value, sigma in zip(found.names, values, sigmas, strict=True):
         rows.append([name, *(_rounded(v, s) for v, s in zip(value, sigma, strict=True))])
-    return ["camera", *LENS_NAMES], rows
+    return ["camera", *(f"1000 {name}" if name.startswith("p") else name for name in LENS_NAMES)], rows
 
 
 def _rounded(value: float, sigma: float) -> str:

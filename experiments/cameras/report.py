@@ -90,7 +90,7 @@ def _point_table(axis: str, points: Sequence[SweepPoint]) -> str:
         what = [" ".join(point.cameras)] if named else _pictured(point)
         numbers = ["-" if number is None else f"{number:.1f}" for number in _numbers(point)]
         rows.append([f"{point.value:g}", *what, *numbers])
-    return html_table([*head, "path µm", "workspace µm", "path m°"], rows)
+    return html_table([*head, "path µm", "workspace µm", "path 0.001°"], rows)
 
 
 def _pictured(point: SweepPoint) -> list[str]:

@@ -145,7 +145,7 @@ def _shift_figure(study: CompensationStudy) -> go.Figure:
         ]
     )  # fmt: skip
     axes = {name: {"title": f"{name[0]} in m"} for name in ("xaxis", "yaxis", "zaxis")}
-    figure.update_layout(scene={**axes, "aspectmode": "data"}, legend={"orientation": "h"})
+    figure.update_layout(scene={**axes, "aspectmode": "data"})
     return figure
 
 
@@ -162,10 +162,13 @@ def _error_figure(study: CompensationStudy) -> go.Figure:
     ):
         distance = 1e3 * np.linalg.norm(errors[:, 3:], axis=1)
         trace = go.Scatter(
-            x=order, y=distance, mode="markers", name=name, marker={"color": colour, "size": 5}
-        )
+            x=order, y=distance, mode="markers", name=name, marker={"color": colour, "size": 6},
+            text=[each.target.name for each in study.results], hovertemplate="%{text}: %{y:.3g} mm",
+        )  # fmt: skip
         figure.add_trace(trace)
-    figure.update_layout(xaxis={"title": "target"}, yaxis={"title": "mm", "type": "log", "tickformat": ".0e"})
+    figure.update_layout(
+        xaxis={"title": "target, in the order of the program"}, yaxis={"title": "error in mm", "type": "log"}
+    )
     return figure
 
 

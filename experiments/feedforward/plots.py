@@ -13,8 +13,9 @@ from experiments.report.plot_page import Section, html_table, write_plot_page
 from systems.feedforward import FEEDFORWARDS
 
 COLORS = {kind: FEEDFORWARDS[kind].colour for kind in KINDS}
+_LIGHT = [[0.0, "#8fbbe8"], [0.5, "#f4f1e8"], [1.0, "#f0b27a"]]  # on which the numbers can be read
 LABELS = {kind: FEEDFORWARDS[kind].title for kind in KINDS}
-TABLE_HEAD = ("feedforward", "integral", "max", "max mm", "sag mm", "dynamic mm", "us a tick")
+TABLE_HEAD = ("feedforward", "mean ratio", "max ratio", "max mm", "sag mm", "dynamic mm", "µs")
 
 
 def criterion_figure(study: FeedforwardStudy, angle_deg: int) -> go.Figure:
@@ -26,7 +27,10 @@ def criterion_figure(study: FeedforwardStudy, angle_deg: int) -> go.Figure:
         figure.add_trace(contour, 1, column)
     figure.update_xaxes(title="axis 2 in degrees")
     figure.update_yaxes(title="axis 3 in degrees", col=1)
-    return figure.update_layout(coloraxis={"colorscale": "Viridis", "colorbar": {"title": "log10 C in m/s"}})
+    decades = np.log10([study.criterion[angle_deg][kind] for kind in KINDS])
+    marks = np.linspace(decades.min(), decades.max(), 6)
+    bar = {"title": "C in m/s", "tickvals": marks, "ticktext": [f"{10**mark:.2g}" for mark in marks]}
+    return figure.update_layout(coloraxis={"colorscale": "Viridis", "colorbar": bar})
 
 
 def surface_figure(study: FeedforwardStudy, angle_deg: int) -> go.Figure:
@@ -40,8 +44,8 @@ def surface_figure(study: FeedforwardStudy, angle_deg: int) -> go.Figure:
 
 def ratio_figure(study: FeedforwardStudy, angle_deg: int) -> go.Figure:
     """Contours of C with the elastic structure in the model over C with elastic joints alone."""
-    style = {"showlabels": True, "labelfont": {"color": "white"}}
-    figure = go.Figure(_contour(study, study.ratio(angle_deg), contours=style, colorscale="Viridis"))
+    style = {"showlabels": True, "labelfont": {"color": "#1c2430"}}
+    figure = go.Figure(_contour(study, study.ratio(angle_deg), contours=style, colorscale=_LIGHT))
     return figure.update_layout(xaxis={"title": "axis 2 in degrees"}, yaxis={"title": "axis 3 in degrees"})
 
 
@@ -120,7 +124,9 @@ def write_study_page(path: Path, study: FeedforwardStudy) -> None:
     sections = [
         Section(
             "Rectangle in space",
-            "How far the tip is from its path, relative to the rigid model; Reiner (2010), table 6.1.",
+            "How far the tip is from its path: mean and maximum as ratios to the rigid model, the maximum in "
+            "mm, the sag at rest before it, and how far the tip leaves that when it moves; last, the time "
+            "that a tick of the model takes. Reiner (2010), table 6.1.",
             html_table(TABLE_HEAD, table_rows(study)),
         ),
         Section(
@@ -145,10 +151,15 @@ def write_study_page(path: Path, study: FeedforwardStudy) -> None:
                 criterion_figure(study, angle),
                 420,
             ),
-            Section(f"Ringing after {angle} degrees, surfaces", "", surface_figure(study, angle), 560),
+            Section(
+                f"Ringing after {angle} degrees, surfaces",
+                "The same C above the positions: the lower the surface, the calmer the wrist.",
+                surface_figure(study, angle),
+                560,
+            ),
             Section(
                 f"Ringing after {angle} degrees, ratio as a surface",
-                "",
+                "The same ratio: below one the structure in the model helps.",
                 ratio_surface_figure(study, angle),
                 560,
             ),
@@ -157,7 +168,8 @@ def write_study_page(path: Path, study: FeedforwardStudy) -> None:
         Section(
             "Why an approximate inverse is enough",
             "The smallest arm whose structure yields, two joints of which the second one is sprung: Reiner "
-            "(2010), figure 3.10. Taken for rigid, approximately as in the model above, and exactly.",
+            "(2010), figure 3.10. Taken for rigid, approximately as in the model above, and exactly; below, "
+            "how far torques are from the exact ones.",
             two_joint_figure(),
             760,
         )
@@ -185,7 +197,7 @@ def two_joint_figure() -> go.Figure:
                 trace = go.Scatter(x=TIMES, y=curve, name=name, line=line, legendgroup=name)
                 figure.add_trace(trace.update(showlegend=row == column == 1), row, column)
     figure.update_xaxes(title="time in s", row=3)
-    for row, title in enumerate(("angle in degrees", "torque in kN m", "torque less the exact one"), 1):
+    for row, title in enumerate(("angle in degrees", "torque in kN m", "error in kN m"), 1):
         figure.update_yaxes(title=title, row=row, col=1)
     return figure
 

@@ -6,11 +6,13 @@ import numpy as np
 import plotly.graph_objects as go
 from plotly.subplots import make_subplots
 
+from experiments.cli.console import count
 from experiments.identify.study import IdentifyStudy
 from experiments.report.plot_page import Section, html_table, sortable_table, write_plot_page
 
 _MEASURED, _BEFORE, _AFTER = "#7a8696", "#e0a43a", "#2f7fd0"
-_SHOWN_CASES = 6
+_UNITS = {"gyro": "rad/s", "accelerometer": "m/s<sup>2</sup>"}
+_SHOWN_CASES = 4
 
 
 def table_head(study: IdentifyStudy) -> list[str]:
@@ -67,11 +69,20 @@ def verdict(study: IdentifyStudy) -> str:
 def signals_figure(study: IdentifyStudy, case: int) -> go.Figure:
     """Measured and modelled readings of a case, a row a sensor: its axis that moves most."""
     found = study.found
-    figure = make_subplots(len(found.sensors), 1, shared_xaxes=True, vertical_spacing=0.012)
+    axes = [
+        "xyz"[int(np.argmax(np.nanstd(found.measured[:, case, 3 * k : 3 * k + 3], axis=0)))]
+        for k in range(len(found.sensors))
+    ]
+    # Above each row: there is no room for them beside it.
+    titles = [f"{sensor.name}, {axis}" for sensor, axis in zip(found.sensors, axes, strict=True)]
+    figure = make_subplots(
+        len(found.sensors), 1, shared_xaxes=True, vertical_spacing=0.025, subplot_titles=titles
+    )
+    figure.update_annotations(font_size=12, x=0.0, xanchor="left")
     for row, sensor in enumerate(found.sensors, 1):
         channels = slice(3 * row - 3, 3 * row)
         measured = found.measured[:, case, channels]
-        axis = int(np.argmax(np.nanstd(measured, axis=0)))
+        axis = "xyz".index(axes[row - 1])
         curves = (
             ("measured", measured[:, axis], _MEASURED),
             ("before", found.before[:, case, channels][:, axis], _BEFORE),
@@ -83,7 +94,7 @@ def signals_figure(study: IdentifyStudy, case: int) -> go.Figure:
                 x=found.times[known], y=curve[known], name=name, line={"color": colour, "width": 1.4}
             )
             figure.add_trace(trace.update(legendgroup=name, showlegend=row == 1), row, 1)
-        figure.update_yaxes(title=f"{sensor.name} {'xyz'[axis]}", row=row, col=1)
+        figure.update_yaxes(title={"text": _UNITS[sensor.kind], "font": {"size": 12}}, row=row, col=1)
     return figure.update_xaxes(title="time in s", row=len(found.sensors))
 
 
@@ -134,13 +145,20 @@ def write_identify_page(path: Path, study: IdentifyStudy) -> None:
             "disagree about; known is what is sure to 3 % (springs) or 25 % (dampers).",
             html_table(table_head(study), table_rows(study)),
         ),
-        Section("Spectra", "All sensors and cases.", spectra_figure(study), 420),
+        Section(
+            "Spectra",
+            "All sensors and cases, each reading over the spread of what the model leaves of it.",
+            spectra_figure(study),
+            420,
+        ),
     ]
-    height = 110 * len(study.found.sensors)
-    shown = range(0, len(study.found.cases), max(1, len(study.found.cases) // _SHOWN_CASES))
-    for case in shown:
-        title = f"Case {study.found.cases[case].name}: measured, and modelled before and after"
-        note = f"The stamps of the sensors were ahead by {1e3 * study.found.lags[case]:.2f} ms."
+    height, cases = 120 * len(study.found.sensors), study.found.cases
+    for case in np.unique(np.linspace(0, len(cases) - 1, _SHOWN_CASES).astype(int)):
+        title = f"Case {cases[case].name}: measured, and modelled before and after"
+        note = (
+            f"{min(_SHOWN_CASES, len(cases))} of {count(len(cases), 'case')} shown, of each sensor the axis "
+            f"that moves most. The stamps of the sensors were ahead by {1e3 * study.found.lags[case]:.2f} ms."
+        )
         sections.append(Section(title, note, signals_figure(study, case), height))
     sections += [
         Section(

@@ -6,6 +6,7 @@ import numpy as np
 import plotly.graph_objects as go
 from plotly.subplots import make_subplots
 
+from experiments.cli.console import count
 from experiments.invert.study import KINDS, SETTLE, InvertStudy, ahead_of_rigid
 from experiments.report.plot_page import Section, html_table, write_plot_page
 from systems.feedforward import FEEDFORWARDS
@@ -34,14 +35,14 @@ def verdict(study: InvertStudy) -> str:
     if np.isnan(ratio).all():
         return "The stable inverse was found in none of the positions."
     missing = int(np.isnan(ratio).sum())
-    of = f"{ratio.size} motions" + (f" ({missing} without a solution)" if missing else "")
+    of = count(ratio.size, "motion") + (f" ({missing} without a solution)" if missing else "")
     robots = f", all springs of {len(ratio)} robots up to {study.spring_error:.0%} off" * bool(
         study.spring_error
     )
+    over = f" (median of {of}{robots}), at worst {np.nanmax(ratio):.2f} times" if ratio.size > 1 else ""
     return (
         f"After {study.angle_deg:g} degrees the wrist rings {np.nanmedian(ratio):.2f} times as much with the "
-        f"stable inverse as with the best causal one (median of {of}{robots}), at worst "
-        f"{np.nanmax(ratio):.2f} times. It takes {study.seconds:.1f} s to compute."
+        f"stable inverse as with the best causal one{over}. It takes {study.seconds:.1f} s to compute."
     )
 
 

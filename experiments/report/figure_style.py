@@ -17,11 +17,12 @@ _AXIS = {
     "title": {"standoff": 8},
 }
 _AXIS_3D = {
-    "gridcolor": _GRID,
+    "gridcolor": _LINE,
     "zerolinecolor": _LINE,
     "linecolor": _LINE,
     "showbackground": False,
     "showspikes": False,
+    "nticks": 6,
 }
 
 TEMPLATE = go.layout.Template(
@@ -33,9 +34,30 @@ TEMPLATE = go.layout.Template(
         "plot_bgcolor": "rgba(0,0,0,0)",
         "xaxis": _AXIS,
         "yaxis": _AXIS,
-        "scene": {f"{name}axis": _AXIS_3D for name in "xyz"},
+        "scene": {
+            **{f"{name}axis": _AXIS_3D for name in "xyz"},
+            # The default view cuts off the titles of the axes.
+            "camera": {"eye": {"x": 1.45, "y": 1.45, "z": 0.95}, "center": {"x": 0.0, "y": 0.0, "z": -0.1}},
+        },
         # Below, where it takes no width from the figure.
-        "legend": {"orientation": "h", "x": 0.0, "y": -0.2, "yanchor": "top"},
+        "legend": {"orientation": "h", "x": 0.0, "y": -0.2, "yanchor": "top", "itemsizing": "constant"},
         "margin": {"l": 60, "r": 20, "t": 28, "b": 50},
     }
 )
+_OF_SCENES = {"legend": {"y": 0.0, "yanchor": "bottom"}, "margin": {"l": 0, "r": 0, "t": 0, "b": 0}}
+
+
+def styled(figure: go.Figure, height: int) -> go.Figure:
+    """The same figure in the look of the pages, so many px high."""
+    figure.update_layout(height=height, template=TEMPLATE)
+    if any(name.startswith("scene") for name in figure.layout.to_plotly_json()):
+        figure.update_layout(_OF_SCENES)
+    # Between decades plotly writes the first digit alone, "2" for 0.2.
+    figure.for_each_xaxis(_whole_numbers)
+    figure.for_each_yaxis(_whole_numbers)
+    return figure
+
+
+def _whole_numbers(axis: go.layout.XAxis | go.layout.YAxis) -> None:
+    if axis.type == "log" and axis.tickformat is None:
+        axis.tickformat = "~g"

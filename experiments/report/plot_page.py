@@ -1,5 +1,6 @@
 """Pages with plotly figures that open offline."""
 
+import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -8,10 +9,12 @@ import plotly.graph_objects as go
 from markupsafe import Markup, escape
 
 from experiments.report.curves import thinned_figure
-from experiments.report.figure_style import TEMPLATE
-from experiments.report.packed import later
+from experiments.report.figure_style import styled
+from experiments.report.packed import later, packed
 from experiments.report.page import write_page
 
+_LONG = 60  # characters: longer cells are broken into lines
+_WORD = re.compile(r"[^\W\d_]{4}|^(?!nan$|inf$)[^\W\d_]")
 _CONFIG = {"responsive": True, "displayModeBar": False, "showSendToCloud": False, "plotlyServerURL": ""}
 
 
@@ -29,8 +32,7 @@ class Section:
         """The content as it stands in the page."""
         if not isinstance(self.content, go.Figure):
             return Markup(self.content)
-        figure = thinned_figure(self.content)
-        figure.update_layout(height=self.height, template=TEMPLATE)
+        figure = styled(thinned_figure(self.content), self.height)
         return later(figure.to_html(full_html=False, include_plotlyjs=False, config=_CONFIG))
 
 
@@ -40,7 +42,9 @@ def write_plot_page(path: str | Path, title: str, verdict: str, sections: Sequen
     Raises:
         OSError: if it cannot be written.
     """
-    write_page(path, "plot_page.html", title=title, verdict=verdict, sections=sections)
+    # Two thirds of a page are the plotting library.
+    library = None if any(isinstance(section.content, go.Figure) for section in sections) else packed("")
+    write_page(path, "plot_page.html", library, title=title, verdict=verdict, sections=sections)
 
 
 def html_table(head: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
@@ -66,7 +70,26 @@ def sortable_table(
 
 
 def _inside(head: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
-    cells = ["".join(f"<td>{escape(cell)}</td>" for cell in row) for row in rows]
-    titles = "".join(f"<th>{escape(name)}</th>" for name in head)
+    """Columns of words begin at the left, those of numbers end at the right."""
+    classes = [" class=word" * (k > 0 and _has_words([row[k] for row in rows])) for k in range(len(head))]
+    cells = [
+        "".join(
+            f"<td{_broken(cell, kind)}>{escape(cell)}</td>" for kind, cell in zip(classes, row, strict=True)
+        )
+        for row in rows
+    ]
+    titles = "".join(f"<th{kind}>{escape(name)}</th>" for kind, name in zip(classes, head, strict=True))
     lines = "".join(f"<tr>{line}</tr>" for line in cells)
     return f"<thead><tr>{titles}</tr></thead><tbody>{lines}</tbody>"
+
+
+def _has_words(cells: Sequence[str]) -> bool:
+    return any(_WORD.search(_seen(cell)) for cell in cells)
+
+
+def _broken(cell: str, kind: str) -> str:
+    return " class=text" if kind and len(_seen(cell)) > _LONG else kind
+
+
+def _seen(cell: str) -> str:
+    return cell.striptags() if isinstance(cell, Markup) else cell

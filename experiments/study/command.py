@@ -25,7 +25,13 @@ from experiments.metrics.single_figures import FIGURES
 from experiments.report.plot_page import Section, html_table, write_plot_page
 from experiments.report.style import law_title
 from experiments.study.analysis import Rows, of_law, spread, study_json, worst_row
-from experiments.study.figures import effects_figure, indices_figure, spread_figure
+from experiments.study.figures import (
+    effects_figure,
+    indices_figure,
+    metric_name,
+    metric_unit,
+    spread_figure,
+)
 from experiments.study.rows import StudyRow, first_scenario, run_row, study_rows
 from experiments.study.store import TABLE, StudyStore, columns_of
 from experiments.study.study_file import Study, load_study
@@ -133,12 +139,12 @@ def _write_page(path: Path, study: Study, rows: Rows, plan: Sequence[StudyRow]) 
     for metric in study.metrics:
         sections += [
             Section(
-                f"Spread of {metric}",
-                f"The share of runs whose {FIGURES[metric]} is at most what the axis says.",
+                f"Spread: {metric_name(metric)}",
+                f"The share of runs that are at most so far off. In the tables it is {metric}.",
                 spread_figure(study, rows, metric),
             ),
             Section(
-                f"What each factor does to {metric}",
+                f"Effect of each factor: {metric_name(metric)}",
                 "Means over all runs with that value, and their 95 % intervals.",
                 effects_figure(study, rows, metric),
                 height=380,
@@ -148,8 +154,9 @@ def _write_page(path: Path, study: Study, rows: Rows, plan: Sequence[StudyRow]) 
         if indices is not None:
             sections.append(
                 Section(
-                    f"Whose doing the variance of {metric} is",
-                    "Sobol's indices: of the factor alone, and with its interactions; 95 % intervals.",
+                    f"Which factor matters: {metric_name(metric)}",
+                    "Sobol's indices, the share of the variance that a factor causes alone, and with its "
+                    "interactions; 95 % intervals. Those beyond 0 and 1 say that samples are too few.",
                     indices,
                 )
             )
@@ -178,9 +185,9 @@ def study_verdict(study: Study, rows: Rows) -> str:
         return f"All {count(len(rows['row']), 'run')} failed."
     best = ranked[0]
     return (
-        f"Over {count(len(rows['row']), 'run')} {law_title(best)} is best in its worst run, with "
-        f"{found[best]['worst']:.3g} (median {found[best]['median']:.3g}): {FIGURES[metric]}."
-        + (f" {count(failed, 'run')} failed." if failed else "")
+        f"Over {count(len(rows['row']), 'run')} {law_title(best)} has the best worst run: "
+        f"{metric_name(metric)} {found[best]['worst']:.3g}, in the median {found[best]['median']:.3g}, "
+        f"{metric_unit(metric)}." + (f" {count(failed, 'run')} failed." if failed else "")
     )
 
 

@@ -4,10 +4,12 @@ import numpy as np
 import plotly.graph_objects as go
 from plotly.subplots import make_subplots
 
+from diagrams.scenario.scenario import load_scenario
 from experiments.metrics.single_figures import FIGURES
 from experiments.report.style import law_colors, law_title
 from experiments.study.analysis import Rows, main_effects, of_law, sobol_indices
 from experiments.study.study_file import Study
+from robots.configuration.quantity import unit_at
 
 _LARGEST_RATIO = 50.0  # of two results: above, the axis is logarithmic
 _MAX_POINTS = 2_000  # of a curve; more cannot be seen
@@ -28,13 +30,13 @@ def spread_figure(study: Study, rows: Rows, metric: str) -> go.Figure:
             name=law_title(law),
         )
     figure.update_yaxes(title="runs below, in %", range=[0.0, 102.0])
-    return figure.update_xaxes(title=FIGURES[metric], type=_axis_type(rows[metric]))
+    return figure.update_xaxes(title=f"at most, {metric_unit(metric)}", type=_axis_type(rows[metric]))
 
 
 def effects_figure(study: Study, rows: Rows, metric: str) -> go.Figure:
     """The mean over the values of each factor with its 95 % interval, side by side on one scale."""
     figure = make_subplots(1, len(study.factors), shared_yaxes=True, horizontal_spacing=0.03)
-    colors = law_colors(study.laws)
+    colors, titles = law_colors(study.laws), _factor_titles(study)
     for law in study.laws:
         for column, effect in enumerate(main_effects(study, of_law(rows, law), metric), 1):
             figure.add_scatter(
@@ -48,8 +50,8 @@ def effects_figure(study: Study, rows: Rows, metric: str) -> go.Figure:
                 row=1,
                 col=column,
             )
-            figure.update_xaxes(title=effect.factor, row=1, col=column)
-    figure.update_yaxes(title=f"mean of {FIGURES[metric]}", row=1, col=1)
+            figure.update_xaxes(title=titles[effect.factor], row=1, col=column)
+    figure.update_yaxes(title=f"mean, {metric_unit(metric)}", row=1, col=1)
     return figure.update_yaxes(type=_axis_type(rows[metric]))
 
 
@@ -60,9 +62,9 @@ def indices_figure(study: Study, rows: Rows, metric: str) -> go.Figure | None:
         found = sobol_indices(study, of_law(rows, law), metric)
         if found is None:
             continue
-        for name, share, interval, opacity in (
-            ("alone", found.first, found.first_interval, 1.0),
-            ("with others", found.total, found.total_interval, 0.45),
+        for name, share, interval, pattern in (
+            ("alone", found.first, found.first_interval, ""),
+            ("with others", found.total, found.total_interval, "/"),
         ):
             figure.add_bar(
                 x=found.factors,
@@ -73,12 +75,31 @@ def indices_figure(study: Study, rows: Rows, metric: str) -> go.Figure | None:
                     "symmetric": False,
                     "thickness": 1,
                 },
-                marker={"color": colors[law], "opacity": opacity},
+                marker={"color": colors[law], "pattern": {"shape": pattern, "fillmode": "replace"}},
                 name=f"{law_title(law)}, {name}",
             )
     if not figure.data:
         return None
-    return figure.update_layout(yaxis={"title": f"share of the variance of {metric}"}, barmode="group")
+    # Few samples give intervals far beyond what a share can be.
+    yaxis = {"title": "share of the variance", "range": [-0.25, 1.5]}
+    return figure.update_layout(yaxis=yaxis, barmode="group")
+
+
+def metric_unit(metric: str) -> str:
+    """What an axis says where the heading names the metric: ``in mm``."""
+    return "in " + FIGURES[metric].rpartition(" in ")[2] if metric != "guard_ticks" else "in ticks"
+
+
+def metric_name(metric: str) -> str:
+    """The metric in words, without its unit."""
+    return FIGURES[metric].removesuffix(f" {metric_unit(metric)}")
+
+
+def _factor_titles(study: Study) -> dict[str, str]:
+    """The factors with their units, where the scenario declares one."""
+    scenario = load_scenario(study.scenario, study.settings)
+    units = {factor: unit_at(scenario, factor) for factor in study.factors}
+    return {factor: f"{factor} in {unit}" if unit else factor for factor, unit in units.items()}
 
 
 def _known(values: np.ndarray) -> np.ndarray:

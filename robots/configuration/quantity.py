@@ -109,6 +109,18 @@ def declaration(entry: Field) -> Declaration:
     return entry.metadata.get(_KEY, Declaration())
 
 
+def unit_at(part: Any, path: str) -> str:
+    """The unit of a field of a tree of dataclasses by its place, such as ``station.payload``.
+
+    Empty where there is no such field, or no unit is declared.
+    """
+    name, _, below = path.partition(".")
+    entry = next((each for each in fields(part) if each.name == name), None) if is_dataclass(part) else None
+    if entry is None:
+        return ""
+    return unit_at(getattr(part, name), below) if below else declaration(entry).limits.unit
+
+
 def out_of_range(part: Any, keys: tuple[str | int, ...] = ()) -> tuple[tuple[str | int, ...], str] | None:
     """The first number of a tree of dataclasses that is outside the limits of its field, defaults included.
 

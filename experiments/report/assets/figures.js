@@ -24,12 +24,15 @@ function saveText(text, name) {
   link.click();
   URL.revokeObjectURL(link.href);
 }
-/* Words in the colour of the page, and three dimensions from farther away where there is less room. */
+/* Words in the colour of the page; where there is less room, small titles and three dimensions from farther away. */
 function colorFigures() {
   const ink = getComputedStyle(document.documentElement).getPropertyValue("--soft").trim();
   for (const plot of document.querySelectorAll(".js-plotly-plot")) {
     const change = {"font.color": ink};
-    if (window.innerWidth < 520 && plot._fullLayout.scene) change["scene.camera.eye"] = {x: 1.9, y: 1.9, z: 1.5};
+    if (window.innerWidth < 520) {
+      if (plot._fullLayout.scene) change["scene.camera.eye"] = {x: 1.9, y: 1.9, z: 1.5};
+      (plot.layout.annotations || []).forEach((_, i) => { change[`annotations[${i}].font.size`] = 11; });
+    }
     Plotly.relayout(plot, change);
   }
 }

@@ -12,7 +12,9 @@ from experiments.accept.robot_cycle import (
     path_scenario,
     pose_results,
     pose_scenario,
+    visits,
 )
+from experiments.accept.robot_page import Row, verdict, write_acceptance_page
 from systems.reference.paths import make_path
 
 BASE = load_scenario("nominal", ["reference.settle=0.5", "reference.acceleration=4"])
@@ -34,6 +36,10 @@ def log_of(scenario: Scenario, error) -> RunLog:
     )  # fmt: skip
 
 
+def poses_of(scenario: Scenario, error) -> dict[str, float | None]:
+    return pose_results(visits(log_of(scenario, error), scenario, CYCLE, CYCLES), CYCLE)
+
+
 def test_the_five_poses_are_a_tenth_of_the_diagonal_within_the_corners_of_an_inclined_plane():
     p = CYCLE.poses[:, :3, 3]
     np.testing.assert_allclose(np.linalg.norm(p[1:] - p[0], axis=1), 0.4 * np.sqrt(3.0) * 0.25, rtol=1e-9)
@@ -45,7 +51,7 @@ def test_the_five_poses_are_a_tenth_of_the_diagonal_within_the_corners_of_an_inc
 def test_a_constant_offset_is_accuracy_and_neither_scatter_nor_drift():
     scenario = pose_scenario(BASE, CYCLE, CYCLES, 1.0)
     offset = np.array([3e-4, 0.0, 4e-4])
-    found = pose_results(log_of(scenario, lambda t: np.tile(offset, (len(t), 1))), scenario, CYCLE, CYCLES)
+    found = poses_of(scenario, lambda t: np.tile(offset, (len(t), 1)))
     assert found["AP_mm"] == pytest.approx(0.5, rel=1e-9)
     for name in ("RP_mm", "vAP_mm", "AD_mm", "RD_mm", "dAP_mm", "AP_deg", "stabilisation_s", "overshoot_mm"):
         assert found[name] == pytest.approx(0.0, abs=1e-6), name
@@ -58,7 +64,7 @@ def test_a_tip_that_drifts_steadily_has_moved_by_three_quarters_of_its_way():
     def drifting(t: np.ndarray) -> np.ndarray:
         return np.outer(t / end, [1e-3, 0.0, 0.0])
 
-    found = pose_results(log_of(scenario, drifting), scenario, CYCLE, CYCLES)
+    found = poses_of(scenario, drifting)
     assert found["dAP_mm"] == pytest.approx(0.75, abs=0.03)
 
 
@@ -71,7 +77,7 @@ def test_a_tip_that_rings_out_needs_the_time_until_its_amplitude_is_that_of_the_
         since = np.mod(t - 0.5, span)  # of the last arrival
         return np.outer(1e-3 * np.exp(-since / 0.05) * np.cos(2 * np.pi * 20.0 * since), [0.0, 0.0, 1.0])
 
-    found = pose_results(log_of(scenario, ringing), scenario, CYCLE, CYCLES)
+    found = poses_of(scenario, ringing)
     stabilised, overshoot = found["stabilisation_s"], found["overshoot_mm"]
     assert stabilised is not None
     assert overshoot is not None
@@ -86,13 +92,13 @@ def test_a_tip_that_is_late_is_on_the_path_and_one_beside_it_is_not():
     def late(t: np.ndarray) -> np.ndarray:
         return path.sample(t - 0.02)[0][:, :3, 3] - path.sample(t)[0][:, :3, 3]
 
-    found = path_results(log_of(scenario, late), scenario, CYCLE)
+    found = path_results(log_of(scenario, late), scenario, CYCLE).results
     assert found["AT_mm"] < 0.01
     assert found["CR_mm"] < 0.01  # every corner is reached, for the path rests in it
     assert abs(found["AV_percent"]) < 0.5
     normal = np.cross(*(CYCLE.poses[[1, 2], :3, 3] - CYCLE.poses[0, :3, 3]))
     beside = 2e-4 * normal / np.linalg.norm(normal)
-    found = path_results(log_of(scenario, lambda t: np.tile(beside, (len(t), 1))), scenario, CYCLE)
+    found = path_results(log_of(scenario, lambda t: np.tile(beside, (len(t), 1))), scenario, CYCLE).results
     assert found["AT_mm"] == pytest.approx(0.2, rel=1e-3)
     assert found["RT_mm"] == pytest.approx(0.0, abs=1e-6)
 
@@ -101,3 +107,23 @@ def test_half_the_speed_takes_twice_the_time():
     fast, slow = (make_path(pose_scenario(BASE, CYCLE, 2, speed).reference) for speed in (1.0, 0.5))
     rests = 18 * CYCLE.dwell
     assert slow.dwell_start - 0.5 - rests == pytest.approx(2.0 * (fast.dwell_start - 0.5 - rests))
+
+
+def test_the_page_says_the_worst_of_all_loads_and_draws_what_it_is_the_largest_of(tmp_path):
+    poses, square = (make(BASE, CYCLE, CYCLES, 1.0) for make in (pose_scenario, path_scenario))
+    rows = []
+    for load, off in ((0.0, 1e-4), (7.0, 3e-4)):
+
+        def above(t: np.ndarray, off: float = off) -> np.ndarray:
+            return np.tile([0.0, 0.0, off], (len(t), 1))
+
+        found = visits(log_of(poses, above), poses, CYCLE, CYCLES)
+        along = path_results(log_of(square, above), square, CYCLE)
+        assert 1e3 * along.off.max() == pytest.approx(along.results["AT_mm"])
+        assert 1e3 * along.scatter.max() == pytest.approx(along.results["RT_mm"])
+        np.testing.assert_allclose(found.error[:, 5], -off, atol=1e-12)
+        rows.append(Row(load, 100.0, pose_results(found, CYCLE) | along.results, found, along))
+    told = verdict(rows, "PBVS", CYCLES, 250.0)
+    assert "AP of 0.300 mm" in told
+    write_acceptance_page(tmp_path / "page.html", "ISO 9283", told, "nominal", rows)
+    assert told in (tmp_path / "page.html").read_text()

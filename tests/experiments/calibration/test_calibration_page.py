@@ -51,7 +51,7 @@ def test_the_page_names_parameters_and_shows_them_rounded(folder: Path):
     for name, value, sigma in zip(found["names"], found["values"], found["sigmas"], strict=True):
         factor = 1e3 if name.endswith(("_x", "_y", "_z")) else np.rad2deg(1.0)
         shown, _ = rounded(factor * value, 1.96 * factor * sigma)
-        assert f"<td>{in_words(name)}</td><td>{name}</td>" in page
+        assert f"{in_words(name)}</td><td class=word>{name}</td>" in page
         assert f"<td>{shown}</td>" in page
 
 

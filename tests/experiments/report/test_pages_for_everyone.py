@@ -27,6 +27,15 @@ UNTITLED = """[...document.querySelectorAll(".js-plotly-plot")].flatMap(plot =>
   Object.entries(plot._fullLayout).filter(([name, axis]) => /^[xy]axis/.test(name) && axis.visible
     && axis.type !== "category" && axis.showticklabels !== false && !axis.matches && !axis.title.text)
   .map(([name]) => plot.id + " " + name))"""
+# Words that do not lie within their figure: nobody can read them.
+CUT = """[...document.querySelectorAll(".js-plotly-plot")].flatMap(plot => {
+  const all = plot.getBoundingClientRect();
+  return [...plot.querySelectorAll(".main-svg text")].filter(text => text.textContent.trim()).filter(text => {
+    const box = text.getBoundingClientRect();
+    return box.width && (box.left < all.left - 2 || box.right > all.right + 2 || box.top < all.top - 2
+      || box.bottom > all.bottom + 2);
+  }).map(text => text.textContent);
+})"""
 WIDE_ROW = ["a long cell of many words, " * 4] * 6
 
 
@@ -74,5 +83,6 @@ def test_a_page_can_be_read_by_everyone_on_every_screen(tab, pages: Path, page: 
     )
     assert found == []
     assert tab.run(UNTITLED) == []
+    assert tab.run(CUT) == []
     assert tab.complaints == []
     assert all(address.startswith(("file:", "data:", "blob:")) for address in tab.requests)
