@@ -39,7 +39,6 @@ _NO_NOISE = 0.01  # share of the assumed sigma below which residuals are no nois
 _PRIOR_FADES = 0.01  # of the rms: then the prior weighs nothing
 _ROUNDS = 30
 _SETTLED = 0.02  # of its own standard deviation: change of a variance that ends the search
-_DAMPED_FROM = 6  # rounds after which scoring is damped, because it may go in circles
 _ROBUST_ROUNDS = 4
 _PLAUSIBLE = 0.03  # m: with half the rows farther off the table belongs to something else
 _RISK = 1e-4  # that a clean table of known noise is searched for gross errors
@@ -243,10 +242,9 @@ class _Search:
                 break
             kept = clean
             u = self._minimise(u, noise, kept).u
-            for _ in range(0 if self._is_known else 3):
+            if not self._is_known:
                 at = _selected(problem.linearise(u), kept)
-                theta = variance_components(at, noise.select(kept), self._estimated(kept)).theta
-                noise = NoiseModel(theta, self._shape)
+                theta = variance_components(at, u, noise.select(kept), self._estimated(kept)).theta
         usable = lacks_something(problem, NoiseModel(self._theta, self._shape), least, u, kept)
         if usable is None:
             return kept, u, theta
@@ -296,7 +294,7 @@ class _Search:
         if self._is_known:
             return fit, noise, None
         estimated, before = self._estimated(kept), np.inf
-        for turn in range(_ROUNDS):
+        for _ in range(_ROUNDS):
             theta = noise.theta.copy()
             if theta[POSITION] * self._shape[:, POSITION].max() <= 1.01 * FLOOR**2:
                 break  # down to rounding
@@ -311,11 +309,10 @@ class _Search:
                 if theta[JOINT] == 0.0 and JOINT in estimated:
                     theta[JOINT] = 0.01 * theta[POSITION]
                 at = _selected(fit.at, kept)
-                found = variance_components(at, NoiseModel(theta, self._shape[kept]), estimated)
+                found = variance_components(at, fit.u, NoiseModel(theta, self._shape[kept]), estimated)
                 change = np.abs(found.theta - theta)[estimated]
                 is_settled = bool(np.all(change < _SETTLED * np.sqrt(np.diag(found.covariance))))
-                is_damped = turn >= _DAMPED_FROM and not is_settled
-                theta = np.sqrt(found.theta * theta) if is_damped else found.theta
+                theta = found.theta
             noise = noise.with_variances(theta)
             fit = self._minimise(fit.u, noise, kept, is_rough=not is_settled)
             if is_settled:

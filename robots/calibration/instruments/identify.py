@@ -270,7 +270,7 @@ class _Adjustment:
             else:
                 if JOINT in self._estimated and theta[JOINT] == 0.0:
                     theta[JOINT] = 0.01 * theta[1:].max()
-                found = variance_components(fit.at, noise.with_variances(theta), self._estimated)
+                found = variance_components(fit.at, fit.u, noise.with_variances(theta), self._estimated)
                 change = np.abs(found.theta - theta)[self._estimated]
                 is_settled = bool(np.all(change < _SETTLED * np.sqrt(np.diag(found.covariance))))
                 theta = found.theta

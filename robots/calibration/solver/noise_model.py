@@ -6,7 +6,7 @@ table says of each row; the theta are variances, known or to be found.
 """
 
 from dataclasses import dataclass, replace
-from typing import Protocol
+from typing import Protocol, Self
 
 import numpy as np
 
@@ -30,6 +30,10 @@ class Noise(Protocol):
         """What they are multiplied by, number for number or row for row."""
         ...
 
+    def with_variances(self, theta: np.ndarray) -> Self:
+        """See `NoiseModel.with_variances`."""
+        ...
+
     def whitening(self, J: np.ndarray) -> np.ndarray:
         """See `NoiseModel.whitening`."""
         ...
@@ -50,7 +54,7 @@ class NoiseModel:
     theta: np.ndarray  # (3,) variances of joint, position and rotation: rad^2, m^2, rad^2
     shape: np.ndarray  # (n, 3) what they are multiplied by, row for row
 
-    def with_variances(self, theta: np.ndarray) -> "NoiseModel":
+    def with_variances(self, theta: np.ndarray) -> Self:
         """The same rows with other variances."""
         return replace(self, theta=theta)
 

@@ -3,17 +3,24 @@
 The parameters are random effects of unit size (they are scaled by their prior). With whitened rows A and
 H = A^T V^-1 A + I, P = V^-1 - V^-1 A H^-1 A^T V^-1, g_i = e^T V^-1 Q_i V^-1 e, t_i = tr(P Q_i) and
 F_ij = tr(P Q_i P Q_j), a step of Fisher's scoring is theta += F^-1 (g - t), Patterson and Thompson (1971).
+Steps are damped until log det V + log det H + e^T V^-1 e + |u|^2, minus twice the logarithm of the restricted
+likelihood, falls: where one kind of noise hides another, bare scoring goes in circles.
 """
 
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.linalg import solve_triangular
 
 from robots.calibration.solver.noise_model import JOINT, POSITION, ROTATION, Noise
 from robots.calibration.solver.problem import Linearised
 
-_SEEN = 0.1  # singular values below it, in units of the prior, take nothing from the degrees of freedom
+_SEEN = 0.1  # singular values below it, in units of the prior, widen no covariance
 _LEAST = 0.02  # of its former value: a component falls no faster
+_STEPS = 40
+_SETTLED = 0.005  # of its own standard deviation: a last step
+_DAMPING_FROM, _LARGEST_DAMPING = 0.1, 1e6  # of the information
+_ROUNDING = 1e-9  # by which the likelihood may be wrong
 
 
 @dataclass(frozen=True)
@@ -25,68 +32,77 @@ class VarianceComponents:
 
 
 @dataclass(frozen=True)
-class _Whitened:
-    """What the traces are made of, for the components that are estimated."""
+class _Likelihood:
+    """Minus twice the logarithm of the restricted likelihood at some variances, and how it falls."""
 
-    square: list[np.ndarray]  # W Q_i W^T, (n, k, k)
-    HB: list[np.ndarray]  # W Q_i W^T B, (n k, r)
-    M: list[np.ndarray]  # B^T W Q_i W^T B, (r, r)
-    score: np.ndarray  # g_i - t_i
+    value: float
+    score: np.ndarray  # (c,) g_i - t_i of the estimated components
+    information: np.ndarray  # (c, c) F
 
 
-def variance_components(at: Linearised, noise: Noise, estimated: list[int]) -> VarianceComponents:
-    """One step of scoring.
+def variance_components(
+    at: Linearised, u: np.ndarray, noise: Noise, estimated: list[int]
+) -> VarianceComponents:
+    """The most likely variances where residuals change linearly with the parameters.
 
     Args:
-        at: the rows that are kept, linearised at the estimate.
+        at: the rows that are kept, linearised.
+        u: the parameters where they are, in units of the prior, (m,).
         noise: variances to start from.
         estimated: which components are not known.
     """
+    y = at.residuals + at.A @ u  # what the parameters and the noise have to explain
+    least = noise.floors(at.residuals)[estimated]
     theta = noise.theta.copy()
-    parts = _whitened(at, noise, estimated)
-    count = len(estimated)
-    F = np.empty((count, count))
-    for i in range(count):
-        for j in range(count):
-            F[i, j] = (
-                np.sum(parts.square[i] * parts.square[j])
-                - 2.0 * np.sum(parts.HB[i] * parts.HB[j])
-                + np.sum(parts.M[i] * parts.M[j].T)
-            )
-    # A component that would turn negative falls to its floor, and the others are solved again.
-    free, new = list(range(count)), theta[estimated]
-    while free:
-        new = theta[estimated]
-        new[free] += np.linalg.solve(F[np.ix_(free, free)], parts.score[free])
-        falling = [i for i in free if new[i] < _LEAST * theta[estimated[i]]]
-        if not falling:
+    theta[estimated] = np.maximum(theta[estimated], least)
+    now, damping = _likelihood(at, y, noise.with_variances(theta), estimated), 0.0
+    for _ in range(_STEPS):
+        before = theta[estimated]
+        free = np.flatnonzero((before > least) | (now.score > 0.0))
+        if not len(free):
             break
-        for i in falling:
-            theta[estimated[i]] *= _LEAST
-        free = [i for i in free if i not in falling]
-    theta[estimated] = new if free else theta[estimated]
-    theta[estimated] = np.maximum(theta, noise.floors(at.residuals))[estimated]
-    return VarianceComponents(theta, 2.0 * np.linalg.inv(F))
+        F = now.information[np.ix_(free, free)]
+        step = np.zeros(len(estimated))
+        step[free] = np.linalg.solve(F + damping * np.diag(np.diagonal(F)), now.score[free])
+        tried = theta.copy()
+        tried[estimated] = np.maximum(before + step, np.maximum(_LEAST * before, least))
+        there = _likelihood(at, y, noise.with_variances(tried), estimated)
+        change = np.abs(tried[estimated] - before)[free]
+        is_last = bool(np.all(change < _SETTLED * np.sqrt(2.0 * np.diagonal(np.linalg.inv(F)))))
+        if there.value <= now.value + _ROUNDING * abs(now.value):
+            theta, now, damping = tried, there, damping / 10.0 if damping > _DAMPING_FROM else 0.0
+        else:
+            damping = max(10.0 * damping, _DAMPING_FROM)
+        if is_last or damping > _LARGEST_DAMPING:
+            break
+    return VarianceComponents(theta, 2.0 * np.linalg.inv(now.information))
 
 
-def _whitened(at: Linearised, noise: Noise, estimated: list[int]) -> _Whitened:
+def _likelihood(at: Linearised, y: np.ndarray, noise: Noise, estimated: list[int]) -> _Likelihood:
     n, k, m = at.A.shape
     W = noise.whitening(at.J)
-    A, e = (W @ at.A).reshape(-1, m), np.einsum("nij,nj->ni", W, at.residuals)
-    _, s, Vt = np.linalg.svd(np.linalg.qr(A, mode="r"), full_matrices=False)
-    seen = s > _SEEN
-    flat = (A @ Vt[seen].T) / np.sqrt(s[seen] ** 2 + 1.0)
-    B = flat.reshape(n, k, -1)
+    A, y = (W @ at.A).reshape(-1, m), np.einsum("nij,nj->ni", W, y).ravel()
+    R = np.asarray(np.linalg.qr(np.vstack([A, np.eye(m)]), mode="r"))  # R^T R = H
+    B = solve_triangular(R, A.T, trans=1, check_finite=False).T  # B B^T = A H^-1 A^T
+    e = y - B @ (B.T @ y)
+    value = float(y @ e)  # e^T e + u^T u
+    value += 2.0 * float(np.sum(np.log(np.abs(np.diagonal(R)))))
+    value -= 2.0 * float(np.sum(np.log(np.diagonal(W, axis1=1, axis2=2))))
     halves = noise.halves(W, at.J)
+    cube, rest = B.reshape(n, k, m), e.reshape(n, k, 1)
     square, HB, M, score = [], [], [], []
     for i in estimated:
         H, Ht = halves[i], np.swapaxes(halves[i], 1, 2)
         square.append(H @ Ht)
-        HB.append((H @ (Ht @ B)).reshape(-1, B.shape[2]))
-        M.append(flat.T @ HB[-1])
-        g = np.sum((Ht @ e[..., None]) ** 2)
-        score.append(g - np.sum(H**2) + np.trace(M[-1]))
-    return _Whitened(square, HB, M, np.array(score))
+        HB.append((H @ (Ht @ cube)).reshape(-1, m))
+        M.append(B.T @ HB[-1])
+        score.append(np.sum((Ht @ rest) ** 2) - np.sum(H**2) + np.trace(M[-1]))
+    F = np.empty((len(estimated), len(estimated)))
+    for i in range(len(estimated)):
+        for j in range(i + 1):
+            F[i, j] = np.sum(square[i] * square[j]) - 2.0 * np.sum(HB[i] * HB[j]) + np.sum(M[i] * M[j].T)
+            F[j, i] = F[i, j]
+    return _Likelihood(value, np.array(score), F)
 
 
 def parameter_factor(
