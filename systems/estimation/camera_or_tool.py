@@ -27,6 +27,7 @@ class CameraOrTool:
         self._weights = 1.0 / variances
         self.layout = Layout(
             samples=(1,),  # still to be looked at; zero when nothing is open
+            is_open=(1,),  # whether it may be either, also after nobody looks any more
             A_calm=(2, size, size),  # what was known while samples agreed, the newer first
             xi_calm=(2, size),
             kept=(1,),  # how many of them there are
@@ -43,16 +44,21 @@ class CameraOrTool:
         memory.A_calm[0], memory.xi_calm[0] = A, xi
         memory.kept[0] += 1.0
 
-    def begin(self, memory: SimpleNamespace) -> None:
+    def begin(self, memory: SimpleNamespace, may_be_camera: bool = True) -> None:
         """Samples do not agree any more: what was known well before that is what they are held against.
 
         Nothing happens if nothing was kept, or another comparison is still open.
+
+        Args:
+            memory: of the layout.
+            may_be_camera: whether it looks like one of the two.
         """
         if memory.samples[0] > 0.0 or memory.kept[0] < len(memory.A_calm):
             return
         memory.samples[0], memory.kept[0] = _LONGEST, 0.0
         memory.A_before[:], memory.xi_before[:] = memory.A_calm[1], memory.xi_calm[1]
         memory.A[:], memory.b[:], memory.square[0] = 0.0, 0.0, 0.0
+        memory.is_open[0] = may_be_camera
 
     def is_camera(self, memory: SimpleNamespace, r: np.ndarray, X_WE: np.ndarray) -> bool:
         """Whether it is clear now that the camera was moved.
@@ -76,7 +82,7 @@ class CameraOrTool:
         clearer = float(left[0] - left[1]) / unit
         if abs(clearer) <= _CLEAR:
             return False
-        memory.samples[0] = 0.0
+        memory.samples[0] = memory.is_open[0] = 0.0
         # A move of the camera leaves no more than noise: what does is something else.
         return clearer > 0.0 and unit < _NOISE
 

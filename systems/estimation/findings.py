@@ -27,7 +27,7 @@ def findings(estimator: TipEstimator, memory: SimpleNamespace) -> dict[str, Any]
     """
     model = estimator.model
     x = estimator.x_robot(memory)
-    sigma = model.sigma * np.sqrt(np.diag(estimator.covariance(memory)))
+    sigma = model.sigma * np.sqrt(np.diag(estimator.covariance_of_robot(memory)))
     names = _names(estimator)
     return {
         "clock_offset_s": estimator.clock_offset(memory, float(memory.last_time[0])),
@@ -49,7 +49,7 @@ def calibrated_robot(estimator: TipEstimator, memory: SimpleNamespace, of: str) 
     """
     model, names = estimator.model, _names(estimator)
     x, count = estimator.x_robot(memory), len(names)
-    covariance = (np.outer(model.sigma, model.sigma) * estimator.covariance(memory))[:count, :count]
+    covariance = (np.outer(model.sigma, model.sigma) * estimator.covariance_of_robot(memory))[:count, :count]
     known = names, x[:count], covariance
     return learnt_robot(model.robot, model.geometric_errors(x), x[model.K], known, of)
 

@@ -10,6 +10,7 @@ import numpy as np
 from robots.description.model import NUM_JOINTS
 from systems.estimation import kernels
 from systems.estimation.arm_geometry import Constants
+from systems.estimation.camera_moves import CameraMoves
 from systems.estimation.camera_or_tool import CameraOrTool
 from systems.estimation.events import (
     CAMERA_MOVED,
@@ -27,7 +28,7 @@ _AGAIN = 500  # samples, in which a second event says that the first was explain
 _OF_THE_LOAD = 0.1  # of its spread, when a tool was displaced
 _DOUBT = 3.0  # times wider, what is known of everything, where it does not hold
 _TRUST = 0.02  # m or rad, the largest step from where the past was read
-_KEEP_EVERY = 25  # samples, between two notes of what is known
+_KEEP_EVERY = 10  # samples, between two notes of what is known
 _DRIFT_EVERY = 50  # samples, between two looks whether the clock drifts
 _LEAST_DRIFT, _DRIFT_SIGMAS = (
     1e-4,
@@ -80,6 +81,7 @@ class TipEstimator:
         self._keyframes = Keyframes(model, self.weights)
         self._innovations = Innovations(variances)
         self._camera_or_tool = CameraOrTool(variances, model.size)
+        self._camera = CameraMoves(model.world_directions())
         n = model.size
         self.layout = Layout(
             xi=(n,),
@@ -102,11 +104,7 @@ class TipEstimator:
             sum_H=(6, n),
             keyframes=self._keyframes.layout,
             innovations=self._innovations.layout,
-            camera=Layout(  # what of the unknowns is not of the robot but of a camera that was moved
-                xi=(n,),  # of all moves but the last
-                xi_before=(n,),  # the unknowns before the last move
-                gain=(6, n),  # from what they have changed by since then to the move
-            ),
+            camera=self._camera.layout,
             after_step=self._camera_or_tool.layout,
         )
         self._constants: Constants | None = None
@@ -125,10 +123,7 @@ class TipEstimator:
 
     def x_robot(self, memory: SimpleNamespace) -> np.ndarray:
         """The unknowns of the robot where it stands, (n,): without what only a moved camera sees."""
-        if not memory.camera.gain.any():
-            return self.x(memory)
-        xi = memory.xi - memory.camera.xi - self._of_the_camera(memory, memory.xi)
-        return self.model.full(xi)
+        return self.model.full(self._camera.robot(memory.camera, memory.xi))
 
     def clock_offset(self, memory: SimpleNamespace, time: float) -> float:
         """What is to be added to a stamp of the camera in s."""
@@ -144,6 +139,10 @@ class TipEstimator:
     def covariance(self, memory: SimpleNamespace) -> np.ndarray:
         """Covariance of the unknowns in units of their spreads, shape (n, n)."""
         return np.linalg.inv(memory.keyframes.A + memory.A_open)
+
+    def covariance_of_robot(self, memory: SimpleNamespace) -> np.ndarray:
+        """The same of `x_robot`."""
+        return self._camera.covariance(memory.camera, self.covariance(memory))
 
     def constants(self, memory: SimpleNamespace) -> Constants:
         """The geometry near the estimate; a function of the memory alone, kept to save time."""
@@ -172,11 +171,17 @@ class TipEstimator:
     def tip_covariance(self, memory: SimpleNamespace, pair: Pair) -> np.ndarray:
         """Covariance of the predicted tip, rotation (rad^2) first, shape (6, 6).
 
-        To what the unknowns may be wrong by, H P H^T, the steps of the encoders add J S J^T.
+        To what the unknowns may be wrong by, H P H^T, the steps of the encoders add J S J^T. As long as
+        nothing tells a displaced tool from a camera that was moved, the tip is where it is seen or, as
+        likely, where it would be without the step: with the way d from there, that adds d d^T / 2.
         """
         H = self.predict(memory, pair).H[0]
         J = self._jacobian(memory, pair) * pair.rounding
-        return H @ self.covariance(memory) @ H.T + J @ J.T
+        covariance = H @ self.covariance_of_robot(memory) @ H.T + J @ J.T
+        if memory.after_step.is_open[0]:
+            d = H @ (memory.xi - memory.after_step.xi_before)
+            covariance += 0.5 * np.outer(d, d)
+        return covariance
 
     def _jacobian(self, memory: SimpleNamespace, pair: Pair) -> np.ndarray:
         """Of the tip, as the joints move, rotation first, (6, 6)."""
@@ -211,7 +216,7 @@ class TipEstimator:
                 return None  # a few samples later it is known what they mean
             if verdict.has_jumped and weight > 0.2:
                 event = self._innovations.explain(innovations, H, self.model)
-                self._camera_or_tool.begin(memory.after_step)
+                self._camera_or_tool.begin(memory.after_step, may_be_camera=event.kind != LOAD_CHANGED)
                 self._widen(memory, event)
             elif verdict.has_drifted and weight > 0.2:
                 self._innovations.forget(innovations)
@@ -338,27 +343,15 @@ class TipEstimator:
     def _take_back(self, memory: SimpleNamespace, X_WE: np.ndarray) -> Event:
         """It was the camera: what was known before it moved holds of the robot, but not of where it is seen.
 
-        A move of the camera and one of the robot's base look the same. So the unknowns follow what is seen,
-        as after a move of the base. What of that was the camera's is E(c | x) = S B^T (P + B S B^T)^-1 (x -
-        x_before), with the covariance P from before, the columns B of a move and its spread S.
+        So the unknowns follow what is seen, as after a move of the base; see `CameraMoves`.
         """
-        before, camera, model = memory.after_step, memory.camera, self.model
-        camera.xi += self._of_the_camera(memory, before.xi_before)
-        B = model.world_directions()
-        P = np.linalg.inv(before.A_before)
-        A = np.linalg.inv(P + B @ B.T)
-        A = 0.5 * (A + A.T)
-        camera.gain[:], camera.xi_before[:] = B.T @ A, before.xi_before
+        before = memory.after_step
+        A = self._camera.begin(memory.camera, before.A_before, before.xi_before)
         self._innovations.rest(memory.innovations)
         memory.xi[:] = before.xi_before
         self._keyframes.reset(memory.keyframes, A, before.xi_before)
         self._forget_open(memory)
         return Event(CAMERA_MOVED, self._camera_or_tool.size(before, X_WE[:3, 3]), 0.0)
-
-    def _of_the_camera(self, memory: SimpleNamespace, xi: np.ndarray) -> np.ndarray:
-        """What of the change since the camera was moved last is the camera's, (n,)."""
-        camera = memory.camera
-        return self.model.world_directions() @ (camera.gain @ (xi - camera.xi_before))
 
     @staticmethod
     def _forget_open(memory: SimpleNamespace) -> None:
