@@ -26,6 +26,7 @@ from systems.reference.paths import CartesianPath, make_path
 
 _OF_WATCH = ("speed_share", "stop", "separation")
 _CHUNK = 0.2  # s of simulated time between two reports of progress
+_FRAME = 1.0 / 30.0  # s of simulated time between two pictures, where somebody looks on
 _LONGEST_HOLD = 30.0  # s, after which a run is over whose path is held
 
 
@@ -128,8 +129,19 @@ class Experiment:
         self._wall_time = 0.0
         self._predictions: list[Prediction] = []  # of the tip, one a chunk, by a law that says where it is
 
-    def advance(self, until: float | None = None, progress: Callable[[float], None] | None = None) -> None:
-        """Advances to a time in s, or to the end of the path, which is later where it is slowed."""
+    def advance(
+        self,
+        until: float | None = None,
+        progress: Callable[[float], None] | None = None,
+        show: Callable[[], None] | None = None,
+    ) -> None:
+        """Advances to a time in s, or to the end of the path, which is later where it is slowed.
+
+        Args:
+            until: in s; None for the end of the path.
+            progress: is called now and then with the share that is done, 0 to 1.
+            show: is called about 30 times a simulated second, on ticks, and at the end.
+        """
         # Chunks that end on a tick cost nothing: the integrator stops there anyway.
         ticks = max(1, round(_CHUNK / self.scenario.station.period))
         started = time.perf_counter()
@@ -138,15 +150,18 @@ class Experiment:
         gc.disable()
         try:
             if until is None:
-                self._advance_to_path_end(ticks, progress)
+                self._advance_to_path_end(ticks, progress, show)
             else:
-                self._advance(until, ticks, progress and (lambda: progress(self.context.get_time() / until)))
+                report = progress and (lambda: progress(self.context.get_time() / until))
+                self._advance(until, ticks, report, show)
         finally:
             if collecting:
                 gc.enable()
         self._wall_time += time.perf_counter() - started
 
-    def _advance_to_path_end(self, ticks: int, progress: Callable[[float], None] | None) -> None:
+    def _advance_to_path_end(
+        self, ticks: int, progress: Callable[[float], None] | None, show: Callable[[], None] | None
+    ) -> None:
         """Advances until the time on the path is over, or has not gone on for long."""
         end, moved_at = self.path.duration, 0.0
 
@@ -157,7 +172,7 @@ class Experiment:
         remaining = end - self.servo.path_time(self.context)
         while remaining > 1e-9 and self.context.get_time() < moved_at + _LONGEST_HOLD:
             wait = max(remaining, self.scenario.station.period)
-            self._advance(self.context.get_time() + wait, ticks, report)
+            self._advance(self.context.get_time() + wait, ticks, report, show)
             last, remaining = remaining, end - self.servo.path_time(self.context)
             if remaining < last:
                 moved_at = self.context.get_time()
@@ -167,11 +182,22 @@ class Experiment:
             )
             self._events.append(GuardEvent(moved_at, "path_held", why))
 
-    def _advance(self, end: float, ticks: int, report: Callable[[], None] | None) -> None:
-        done = round(self.context.get_time() / self.scenario.station.period)
+    def _advance(
+        self, end: float, ticks: int, report: Callable[[], None] | None, show: Callable[[], None] | None
+    ) -> None:
+        period = self.scenario.station.period
+        frame = max(1, round(_FRAME / period))
+        done = round(self.context.get_time() / period)
         while self.context.get_time() < end:
+            if show:
+                for tick in range((done // frame + 1) * frame, done + ticks, frame):
+                    if tick * period < end:
+                        self.integration.advance(self.simulator, tick * period)
+                        show()
             done += ticks
-            self.integration.advance(self.simulator, min(end, done * self.scenario.station.period))
+            self.integration.advance(self.simulator, min(end, done * period))
+            if show and (done % frame == 0 or self.context.get_time() >= end):
+                show()
             prediction = predicted_tip(self.servo, self.context)
             if prediction is not None:
                 self._predictions.append(prediction)

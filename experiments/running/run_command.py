@@ -47,6 +47,8 @@ from experiments.station.guided_command import (
     refuse_real_time,
 )
 
+_PATIENCE = 20.0  # s, until a browser shows what is to be watched
+
 
 def run_command(
     law: LawOption = None,
@@ -60,7 +62,12 @@ def run_command(
     with_cell: WithCellOption = False,
     yes: YesOption = False,
     out: OutOption = Path("out"),
-    meshcat: Annotated[bool, typer.Option("--meshcat", help="Show it live in a browser.")] = False,
+    live: Annotated[
+        bool,
+        typer.Option(
+            "--live", "--meshcat", help="Show it in a browser while it runs, in real time or at --pace."
+        ),
+    ] = False,
     pace: Annotated[
         float | None,
         typer.Option(metavar="RATE", help="Largest real-time factor of a simulation: 1 is real time."),
@@ -83,8 +90,10 @@ def run_command(
         print_note(console, prepared.note)
         is_guided = prepared.scenario.station.kind != "simulated"
         if is_guided:
-            if meshcat or pace is not None:
-                raise ValueError("--meshcat and --pace belong to a simulated station")
+            if live or pace is not None:
+                raise ValueError(
+                    "--live and --pace belong to a simulated station; --foxglove shows a real one"
+                )
             ask_before_moving(console, prepared, with_cell or yes)
         viewer = foxglove_server(console, prepared, foxglove)
         refuse_real_time(prepared, realtime)
@@ -98,10 +107,13 @@ def run_command(
             logs = guided.logs
         else:
             experiment = Experiment(prepared.scenario, law, prepared.robot)
-            view = LiveView(experiment, prepared.nominal_robot) if meshcat else None
+            view = LiveView(experiment, prepared.nominal_robot, speed=pace or 1.0) if live else None
             if view:
-                console.print(f"Watch it at {view.address}")
-            if pace is not None:
+                console.print(f"Watch it at {view.address}; it begins when the page is open")
+                console.print("Controls at the top right magnify, pause (space bar) and set the speed")
+                if not view.wait_for_browser(_PATIENCE):
+                    console.print(f"Nobody has opened the page in {_PATIENCE:g} s; it begins without")
+            elif pace is not None:
                 experiment.simulator.set_target_realtime_rate(pace)
                 experiment.simulator.ResetStatistics()  # the pace counts from here
             with simulating(law, prepared.scenario.seed), progress_bar(law) as progress:

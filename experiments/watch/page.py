@@ -7,6 +7,7 @@ import cv2
 import numpy as np
 import plotly.graph_objects as go
 
+from experiments.cli.console import count
 from experiments.report.plot_page import Section, html_table, write_plot_page
 from experiments.watch.run import WatchRun, parts
 from experiments.watch.study import WatchStudy
@@ -15,6 +16,8 @@ from systems.vision.people.surroundings import Surroundings
 
 AID = "An aid, not a safety function: it must not replace fences, light curtains or a rated controller."
 _SHOWN = 4  # cameras
+_STOP, _SLOW, _THINGS = "#d55e00", "#8a6d00", "#8a95a5"
+_AT_THE_ROBOT = 0.01  # m: what is nearer is not told apart
 _HULL, _BOX = (60, 60, 230), (0, 200, 255)  # blue, green, red
 
 
@@ -33,13 +36,14 @@ def write_run_page(
     sections = [
         Section(
             "Distance and speed",
-            "Distances in m, held from image to image; the speed is that of the path.",
+            "Distances are held from image to image; the speed is that of the path. The robot slows down "
+            "where the measured distance is below the protective one.",
             _timeline(run),
             520,
         ),
         Section(
             "Plan of the cell",
-            "The way of the nearest person, and the zones about the base.",
+            "The way of the nearest person, and how far about the base the robot slows down and stops.",
             _plan(run, ground),
             620,
         ),
@@ -70,20 +74,23 @@ def write_study_page(path: str | Path, title: str, study: WatchStudy) -> None:
             x=[each.place[0] for each in study.places],
             y=[each.place[1] for each in study.places],
             mode="markers",
+            showlegend=False,
             marker={
                 "color": [
                     each.measured - each.true if np.isfinite(each.measured) else 1.0 for each in study.places
                 ],
                 "colorscale": "RdBu_r",
                 "cmid": 0.0,
-                "colorbar": {"title": "m"},
+                "colorbar": {"title": "error in m"},
                 "size": 12,
             },
         )
     )
     sections = [
         Section("Error of the distance", "Above the line it would be more than 0.1 m too far.", errors),
-        Section("Places", "Coloured by the error.", plan, 620),
+        Section(
+            "Places", "Where people stood, coloured by the error; grey is what stands in the cell.", plan, 620
+        ),
     ]
     write_plot_page(path, title, f"{study_verdict(study)} {AID}", sections)
 
@@ -92,13 +99,14 @@ def run_verdict(run: WatchRun) -> str:
     """A run in a sentence or two."""
     numbers = run.as_dict()
     nearest = numbers["smallest_distance_m"]
-    seen = (
-        "nobody was seen"
-        if nearest is None
-        else f"the nearest was seen {max(nearest, 0.0):.2f} m from the robot"
-    )
+    if nearest is None:
+        seen = "nobody was seen"
+    elif nearest < _AT_THE_ROBOT:
+        seen = "somebody was seen at the robot, without any distance"
+    else:
+        seen = f"the nearest was seen {nearest:.2f} m from the robot"
     return (
-        f"In {numbers['duration_s']:.1f} s {seen}; {numbers['stops']} stops, "
+        f"In {numbers['duration_s']:.1f} s {seen}; {count(numbers['stops'], 'stop')}, "
         f"slowed for {numbers['slowed_s']:.1f} s, "
         f"stopped for {numbers['stopped_s']:.1f} s."
     )
@@ -115,7 +123,8 @@ def study_verdict(study: WatchStudy) -> str:
         )
     empty = (
         f" {numbers['empty_minutes']:g} minutes of the empty cell with the robot in motion and 5 % more and "
-        f"less light, {numbers['empty_sets']} sets: {numbers['false_stops']} stops."
+        f"less light, {count(numbers['empty_sets'], 'set')} of images: "
+        f"{count(numbers['false_stops'], 'stop')}."
         if numbers["empty_sets"]
         else ""
     )
@@ -137,11 +146,11 @@ def _timeline(run: WatchRun) -> go.Figure:
     )
     figure.add_trace(
         go.Scatter(x=line.time, y=line.stopped.astype(int), name="stop", yaxis="y2", mode="lines",
-                   fill="tozeroy", line={"width": 0}, opacity=0.3)
+                   fill="tozeroy", fillcolor="rgba(213,94,0,0.15)", line={"width": 0, "color": _STOP})
     )  # fmt: skip
     return figure.update_layout(
         xaxis={"title": "time in s"},
-        yaxis={"title": "m", "rangemode": "tozero"},
+        yaxis={"title": "distance in m", "rangemode": "tozero"},
         yaxis2={
             "title": "share of the speed",
             "overlaying": "y",
@@ -166,37 +175,36 @@ def _ground(ground: Surroundings) -> go.Figure:
                 fill="toself",
                 mode="lines",
                 name=each.name,
-                line={"width": 1},
+                line={"width": 1, "color": _THINGS},
+                showlegend=False,
             )
         )
-    figure.update_layout(
-        showlegend=False, xaxis={"title": "x in m"}, yaxis={"title": "y in m", "scaleanchor": "x"}
-    )
+    figure.update_layout(xaxis={"title": "x in m"}, yaxis={"title": "y in m", "scaleanchor": "x"})
     return figure
 
 
 def _plan(run: WatchRun, ground: Surroundings) -> go.Figure:
     figure, angle = _ground(ground), np.linspace(0.0, 2.0 * np.pi, 90)
     at_rest = run.terms["total"] - run.terms["reaction"] - run.terms["stopping"]
-    for name, radius in (("stop", at_rest), ("slow", run.terms["total"])):
+    for name, radius, colour in (("stop", at_rest, _STOP), ("slow", run.terms["total"], _SLOW)):
         figure.add_trace(
             go.Scatter(x=radius * np.cos(angle), y=radius * np.sin(angle), mode="lines", name=name,
-                       line={"dash": "dash"})
+                       line={"dash": "dash", "color": colour})
         )  # fmt: skip
     line = run.timeline
     figure.add_trace(
         go.Scatter(x=line.place[:, 0], y=line.place[:, 1], mode="markers", name="person",
                    marker={"color": line.rate, "colorscale": "RdYlGn", "cmin": 0, "cmax": 1, "size": 6,
-                           "colorbar": {"title": "speed"}})
+                           "colorbar": {"title": "share of<br>the speed"}})
     )  # fmt: skip
     return figure
 
 
 def _terms(run: WatchRun) -> str:
-    rows = [[name.replace("_", " "), f"{value:.3f}"] for name, value in run.terms.items()]
+    rows = [[name.replace("_", " "), f"{value:.3f} m"] for name, value in run.terms.items()]
     rows += [[f"reaction time: {name}", f"{value:.3f} s"] for name, value in parts(run.cell.reaction).items()]
     rows += [["note", note] for note in run.notes]
-    return html_table(("term", "m"), rows)
+    return html_table(("term", "value"), rows)
 
 
 def _pictures(run: WatchRun, cameras: Cameras) -> str:

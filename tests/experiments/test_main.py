@@ -13,7 +13,7 @@ import pytest
 from diagrams.scenario.scenario import load_scenario, shipped_scenarios
 from experiments import main
 from experiments.cli.prepare import check, prepare
-from experiments.running import compare_command
+from experiments.running import compare_command, run_command
 from robots.description.model import shipped_robots
 from tests.experiments.commands import RESULTS, SHORT, files, refusal, truetip
 
@@ -170,6 +170,16 @@ def test_the_pace_of_a_run_can_be_set(tmp_path):
     timing = json.loads((tmp_path / "out/timing.json").read_text())["runs"]["open_loop"]
     # Slower on a busy machine, but never faster than it was told.
     assert timing["real_time_factor"] < 1.5 * 1.05
+
+
+def test_a_run_can_be_watched_in_real_time(tmp_path, monkeypatch):
+    monkeypatch.setattr(run_command, "_PATIENCE", 0.0)
+    result = truetip("run", "--law=open_loop", "--live", *SHORT)
+    assert result.exit_code == 0, result.output
+    assert re.search(r"Watch it at http://localhost:\d+; it begins when the page is open", result.stdout)
+    assert "Nobody has opened the page in 0 s" in result.stdout
+    timing = json.loads((tmp_path / "out/timing.json").read_text())["runs"]["open_loop"]
+    assert timing["real_time_factor"] < 1.05
 
 
 def test_what_the_readme_shows_can_be_run(tmp_path):
