@@ -183,17 +183,18 @@ def validate(identified: Identified, calibrated: RobotModel, fresh: Measurements
         fresh = fresh.select(plausible)
     before = validated(identified.robot, fresh, position_only)
     after = validated(calibrated, fresh, position_only)
-    refuse_the_harmful(before, after)
+    if before is not None and after is not None:
+        refuse_the_harmful(before.mean_norm_mm, after.mean_norm_mm)
     return Validation(fresh, left_out, before, after)
 
 
-def refuse_the_harmful(before: ErrorStatistics | None, after: ErrorStatistics | None) -> None:
-    """Raises ValueError if fresh configurations show a calibrated robot to be worse than the nominal one."""
-    if before is None or after is None or after.mean_norm_mm <= _HARMFUL * before.mean_norm_mm:
+def refuse_the_harmful(before: float, after: float) -> None:
+    """Raises ValueError if mean errors in mm show a calibrated robot to be worse than the nominal one."""
+    if after <= _HARMFUL * before:
         return
     raise ValueError(
-        f"calibration: on fresh configurations the mean error rises from {before.mean_norm_mm:.3g} mm of the "
-        f"nominal robot to {after.mean_norm_mm:.3g} mm; the measurements do not show what is wrong with it "
+        f"calibration: on fresh configurations the mean error rises from {before:.3g} mm of the "
+        f"nominal robot to {after:.3g} mm; the measurements do not show what is wrong with it "
         "(do both tables belong to this robot, and does it yield or carry a load that is not said?)"
     )
 

@@ -23,7 +23,7 @@ from experiments.calibration.calibrate import (
     validated,
     validation_configurations,
 )
-from experiments.calibration.instruments import calibrate_with_instruments
+from experiments.calibration.instruments import InstrumentTables, ResultFiles, calibrate_with_instruments
 from experiments.calibration.noise_option import ESTIMATE, noise_option
 from experiments.calibration.page import write_calibration_page
 from experiments.calibration.recording import recorded_measurements
@@ -154,11 +154,19 @@ def calibrate_command(
             wanted = replace(wanted, compliance=prepared.scenario.station.elasticity == "structure")
         baked = urdf_sag(urdf, urdf_payload, urdf_pose, wanted.compliance)
         if measurements and names_targets(measurements):
-            wanted.check_instruments(urdf)
-            calibrated = (prepared.scenario.robot, prepared.robot)
-            tables, kinds = (measurements, cell), wanted.joint_errors
+            wanted.check_instruments()
+            adjusted = InstrumentTables(
+                measurements,
+                cell,
+                validation,
+                noise_option(noise),
+                tuple(wanted.fixed),
+                wanted.joint_errors,
+                wanted.compliance,
+            )
+            files = ResultFiles(out, write, urdf, baked)
             calibrate_with_instruments(
-                human, output, calibrated, tables, out, write, kinds, wanted.compliance
+                human, output, (prepared.scenario.robot, prepared.robot), adjusted, files
             )
             return
         if cell is not None:
@@ -180,7 +188,8 @@ def calibrate_command(
         if robot_file:
             write_text(robot_file, robot_text(study.calibrated))
         if urdf_file:
-            drawn, note = urdf_robot(study.calibrated, baked, study.sets.calibration)
+            table = study.sets.calibration
+            drawn, note = urdf_robot(study.calibrated, baked, table.q, table.payload)
             write_text(urdf_file, urdf_text(drawn, note))
     print_calibration(human, study, path, measured.problems)
     if note:
@@ -226,18 +235,10 @@ class _Wanted:
         noise_option(self.noise)
         names_of(self.joint_errors)
 
-    def check_instruments(self, urdf: str | None) -> None:
+    def check_instruments(self) -> None:
         """Raises ValueError if an option has no effect on tables of targets and instruments."""
-        given = {
-            "--validation": self.validation,
-            "--fixed": self.fixed,
-            "--position-only": self.position_only,
-            "--noise": self.noise != ESTIMATE,
-            "--urdf": urdf,
-        }
-        for option, value in given.items():
-            if value:
-                raise ValueError(f"{option} has no effect on a table of targets and instruments")
+        if self.position_only:
+            raise ValueError("--position-only has no effect on a table of targets and instruments")
 
 
 @dataclass(frozen=True)

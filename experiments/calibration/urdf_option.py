@@ -4,7 +4,6 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from robots.calibration.measurements import Measurements
 from robots.description.model import NUM_JOINTS, RobotModel
 from robots.description.urdf import not_in_urdf
 from robots.dynamics.baked_sag import with_baked_sag
@@ -43,8 +42,16 @@ def urdf_sag(file: str | None, payload: float | None, pose: str | None, complian
     return Sag(payload, q)
 
 
-def urdf_robot(robot: RobotModel, sag: Sag | None, table: Measurements) -> tuple[RobotModel, str]:
+def urdf_robot(
+    robot: RobotModel, sag: Sag | None, q: np.ndarray, payload: np.ndarray
+) -> tuple[RobotModel, str]:
     """The robot to write as URDF, and what its reader should know.
+
+    Args:
+        robot: the calibrated one.
+        sag: what is baked in; None for nothing.
+        q: measured configurations in rad, (n, 6).
+        payload: their loads in kg, (n,).
 
     Raises:
         ValueError: if the sag cannot be baked in; the message has the reason.
@@ -52,10 +59,10 @@ def urdf_robot(robot: RobotModel, sag: Sag | None, table: Measurements) -> tuple
     drawn = robot if sag is None else with_baked_sag(robot, sag.payload, sag.q)
     note = not_in_urdf(robot)
     if robot.compliance.any():
-        rigid, payloads = Kinematics(drawn).forward(table.q), np.unique(table.payload)
+        rigid, payloads = Kinematics(drawn).forward(q), np.unique(payload)
         worst = 0.0
-        for payload in [float(each) for each in payloads] if sag is None else [sag.payload]:
-            true = controller_kinematics(robot, payload).forward(table.q)
+        for load in [float(each) for each in payloads] if sag is None else [sag.payload]:
+            true = controller_kinematics(robot, load).forward(q)
             worst = max(worst, float(np.linalg.norm((true - rigid)[:, :3, 3], axis=1).max()))
         loads = "the measured loads" if sag is None else f"{sag.payload:g} kg"
         note += f". Under {loads} its tool is up to {1e3 * worst:.2f} mm off at the measured configurations"

@@ -75,7 +75,16 @@ def plausible_rows(identified: Identified, measurements: Measurements) -> np.nda
     J = Theta[:, 6 - width :, ZEROS]
     variances = np.repeat([noise.rotation_sigma**2, noise.position_sigma**2], 3)[6 - width :]
     V = noise.joint_sigma**2 * J @ np.swapaxes(J, 1, 2) + np.diag(np.maximum(variances, _ROUNDING**2))
-    squared = np.sum(errors * np.linalg.solve(V, errors[..., None])[..., 0], axis=1)
-    spread = max(float(np.median(squared)) / chdtri(width, 0.5), 1.0)
-    largest = chdtri(width, _RISK / max(len(squared), 1))
+    return explained_by_noise(np.sum(errors * np.linalg.solve(V, errors[..., None])[..., 0], axis=1), width)
+
+
+def explained_by_noise(squared: np.ndarray, numbers: np.ndarray | int) -> np.ndarray:
+    """Which predictions are as good as the others, (n,) bool.
+
+    Args:
+        squared: squares of errors in units of their noise, (n,).
+        numbers: how many numbers each is the sum of, (n,) or one for all.
+    """
+    spread = max(float(np.median(squared / chdtri(numbers, 0.5))), 1.0)
+    largest = chdtri(numbers, _RISK / max(len(squared), 1))
     return squared <= _BENEFIT_OF_DOUBT**2 * spread * largest

@@ -1,5 +1,6 @@
 """One adjustment of a robot, of the targets on its tool and of the instruments that saw them."""
 
+from collections.abc import Collection
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -46,7 +47,8 @@ class InstrumentCalibration:
     x: np.ndarray  # parameters of the error model
     compliance: np.ndarray  # (6,) of the joints in rad / (N m), zeros if they are taken as stiff
     setting: Setting  # targets, frames and anchors
-    before: np.ndarray  # (m, 3) m, measured less predicted with the nominal robot, NaN where nothing was
+    nominal_setting: Setting  # those with which the nominal robot fits best
+    before: np.ndarray  # (m, 3) m, measured less predicted by it, NaN where nothing was
     residuals: np.ndarray  # (m, 3) m, with the calibrated one
     noise: np.ndarray  # standard deviations: of the joints in rad, of every instrument in m
     used: np.ndarray  # (m,) bool
@@ -84,6 +86,7 @@ def identify_with_instruments(
     cell: MeasuringCell | None = None,
     joint_errors: tuple[str, ...] = (),
     compliance: bool = False,
+    fixed: Collection[str] = (),
 ) -> InstrumentCalibration:
     """Finds the errors of a robot, the unknown targets, frames and anchors, and the noise.
 
@@ -93,8 +96,10 @@ def identify_with_instruments(
         cell: what is known before.
         joint_errors: kinds of `robots.description.joint_errors` that are parameters, too.
         compliance: whether the joints yield to the robot's weight and its loads; their compliances are found.
+        fixed: names of parameters that stay zero; what of the robot would take their places stays so, too.
 
     Raises:
+        ValueError: if a fixed parameter is unknown.
         IdentificationError: if nothing says where an instrument stands, or the search does not converge.
     """
     if robot.is_calibrated:
@@ -104,7 +109,7 @@ def identify_with_instruments(
     cell = cell or MeasuringCell({}, {}, {}, {})
     model = ErrorModel(robot, joint_errors)
     start = _start(model, observations, cell)
-    problem = InstrumentProblem(model, observations, cell, start, compliance)
+    problem = InstrumentProblem(model, observations, cell, start, compliance, fixed)
     return _Adjustment(problem, cell).result(robot)
 
 
@@ -181,7 +186,7 @@ class _Adjustment:
         values = problem.parameters(fit.u)
         seen = self._everything
         found_by_name = dict(zip(problem.names, values.tolist(), strict=True))
-        nominal = np.where(problem.is_of_robot, 0.0, values)
+        nominal = self._around_nominal(noise, used)
         before = problem.gathered(problem.residuals(nominal[problem.columns] / sizes))
         return InstrumentCalibration(
             robot=robot,
@@ -194,6 +199,7 @@ class _Adjustment:
             x=values[: len(problem.model)],
             compliance=np.array([found_by_name.get(name, 0.0) for name in COMPLIANCE_NAMES]),
             setting=problem.setting(values),
+            nominal_setting=problem.setting(nominal),
             before=np.where(seen, before, np.nan),
             residuals=np.where(seen, problem.gathered(problem.residuals(fit.u)), np.nan),
             noise=np.sqrt(noise.theta),
@@ -201,6 +207,17 @@ class _Adjustment:
             rank=int(np.sum(s > 1.0)),
             iterations=self._iterations,
         )
+
+    def _around_nominal(self, noise: InstrumentNoise, used: np.ndarray) -> np.ndarray:
+        """All parameters with which the nominal robot fits best: targets, frames and anchors, in SI units."""
+        problem, free = self._problem, self._problem.columns
+        problem.active = self._everything & used[:, None]
+        problem.columns = free[~problem.is_of_robot[free]]
+        start, weights = np.zeros(len(problem.columns)), np.ones(len(problem))
+        fit = minimise(problem, start, noise, weights, is_rough=True) if len(start) else None
+        nominal = problem.parameters(fit.u if fit else start)
+        problem.columns, problem.active = free, self._everything
+        return nominal
 
     def _fit(self, u: np.ndarray, noise: InstrumentNoise, is_rough: bool = False) -> Fit:
         fit = minimise(self._problem, u, noise, np.ones(len(self._problem)), is_rough=is_rough)

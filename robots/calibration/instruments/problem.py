@@ -7,6 +7,7 @@ of one configuration belong together, because they share the noise of its joints
 different numbers of lines, what is missing is filled with zeros that weigh nothing.
 """
 
+from collections.abc import Collection
 from dataclasses import dataclass
 
 import numpy as np
@@ -15,6 +16,7 @@ from robots.calibration.error_model import ZEROS, ErrorModel, exponential
 from robots.calibration.instruments.observations import COORDINATES, MeasuringCell, Observations
 from robots.calibration.loads import Loads
 from robots.calibration.prior import OWN_FRAME, parameter_sizes
+from robots.calibration.reduction import ReducibleModel
 from robots.calibration.solver.problem import Linearised
 from robots.calibration.yielding_joints import YIELDING_NAMES, Sag, YieldingJoints, yielding_sizes
 
@@ -50,8 +52,21 @@ class InstrumentProblem:
         cell: MeasuringCell,
         start: Start,
         is_yielding: bool = False,
+        fixed: Collection[str] = (),
     ) -> None:
-        """Puts the parts together; ``is_yielding`` adds compliances of the joints and errors of masses."""
+        """Puts the parts together.
+
+        Args:
+            model: the kinematics.
+            observations: the lines.
+            cell: what is known before; the rest is free.
+            start: where targets, frames and anchors are.
+            is_yielding: whether compliances of the joints and errors of masses are parameters, too.
+            fixed: names of parameters that stay zero.
+
+        Raises:
+            ValueError: if a fixed parameter is unknown.
+        """
         self.model, self.observations, self._start = model, observations, start
         bars = [observations.is_bar(i) for i in range(len(observations.instruments))]
         blocks: list[tuple[list[str], np.ndarray, bool]] = [
@@ -74,7 +89,7 @@ class InstrumentProblem:
         self.names = tuple(name for names, _, _ in blocks for name in names)
         self.sizes = np.concatenate([sizes for _, sizes, _ in blocks])
         free = np.concatenate([np.full(len(sizes), is_free) for _, sizes, is_free in blocks])
-        self.columns = np.flatnonzero(free)
+        self.columns = np.setdiff1d(np.flatnonzero(free), self._not_free(fixed))
         # Those of the robot itself, not of what stands around it.
         number = np.arange(len(self.sizes))
         self.is_of_robot = (number < len(model)) | (number >= self._placed)
@@ -88,6 +103,20 @@ class InstrumentProblem:
         self._slot[order] = np.arange(len(rows)) - first
         self.most = int(self._slot.max()) + 1
         self.width = COORDINATES * self.most
+
+    def _not_free(self, fixed: Collection[str]) -> np.ndarray:
+        """Indices of fixed parameters, and of those of the robot that would take their places."""
+        unknown = [name for name in fixed if name not in self.names]
+        if unknown:
+            raise ValueError(
+                f"identification: no parameter is called {unknown[0]}; there are {', '.join(self.names)}"
+            )
+        chosen = np.array([self.names.index(name) for name in fixed], dtype=int)
+        drawn = chosen[chosen < len(self.model)]
+        if not len(drawn):
+            return chosen
+        independent = ReducibleModel(self.model).independent_with(drawn)
+        return np.union1d(chosen, np.setdiff1d(np.arange(len(self.model)), independent))
 
     def __len__(self) -> int:
         """How many configurations there are, n."""
@@ -157,8 +186,8 @@ class InstrumentProblem:
         return padded.reshape(len(self), self.width, *values.shape[2:])
 
     def gathered(self, values: np.ndarray) -> np.ndarray:
-        """The reverse of `spread`: (n, k) to (m, 3)."""
-        shaped = values.reshape(len(self), self.most, COORDINATES)
+        """The reverse of `spread`: (n, k, ...) to (m, 3, ...)."""
+        shaped = values.reshape(len(self), self.most, COORDINATES, *values.shape[2:])
         return shaped[self.observations.row, self._slot]
 
     def _compared(self, p: np.ndarray, at: Setting) -> np.ndarray:

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
+from robots.calibration.instruments.observations import Observations
 from robots.calibration.measurement_file import measurement_text
 from robots.calibration.measurements import Measurements
 from robots.description.model import load_robot
@@ -87,16 +88,32 @@ def test_a_file_of_known_noise_is_believed(tmp_path: Path):
     assert json.loads(result.stdout)["noise"] == pytest.approx(known)
 
 
-def test_a_table_of_targets_and_instruments_becomes_a_robot(tmp_path: Path):
-    true, seen = observed(count=40)
+def write_lines(file: Path, seen: Observations, rows: range) -> None:
+    """The lines of some configurations, with decimal commas."""
     head = [*(f"q{k}_rad" for k in range(1, 7)), "target", "instrument", "x_m", "y_m", "z_m", "distance_m"]
     lines = [";".join(head)]
     for k, row in enumerate(seen.row):
+        if row not in rows:
+            continue
         numbers = [*seen.q[row], *seen.position[k], seen.distance[k]]
         cells = ["" if np.isnan(value) else repr(float(value)).replace(".", ",") for value in numbers]
         names = [seen.targets[seen.target[k]], seen.instruments[seen.instrument[k]]]
         lines.append(";".join([*cells[:6], *names, *cells[6:]]))
-    (tmp_path / "m.csv").write_text("\n".join(lines))
+    file.write_text("\n".join(lines))
+
+
+def worst_step(robot: Path, true: MatrixRobot, q: np.ndarray, found: dict) -> float:
+    """How wrong ways of target a between configurations are in m, wherever the world of the robot is."""
+    X, X_true = Kinematics(load_robot(str(robot))).forward(q), true.forward(q)
+    places = (1e-3 * np.array(found["targets_mm"]["a"]), PLACES["a"])
+    p, p_true = (each[:, :3, :3] @ a + each[:, :3, 3] for each, a in zip((X, X_true), places, strict=True))
+    steps, true_steps = (np.linalg.norm(np.diff(each, axis=0), axis=1) for each in (p, p_true))
+    return float(np.abs(steps - true_steps).max())
+
+
+def test_a_table_of_targets_and_instruments_becomes_a_robot(tmp_path: Path):
+    true, seen = observed(count=40)
+    write_lines(tmp_path / "m.csv", seen, range(40))
     arguments = ["--measurements", tmp_path / "m.csv", "--robot", "irb1200"]
     result = truetip(
         "calibrate", *arguments, "--write", tmp_path / "r.yaml", "--out", tmp_path / "out", "--json", "-"
@@ -108,10 +125,38 @@ def test_a_table_of_targets_and_instruments_becomes_a_robot(tmp_path: Path):
     assert len(found["residuals"]) == len(seen)
     assert "Every line" in (tmp_path / "out" / "report.html").read_text()
     q = true.configurations(20, np.random.default_rng(5))
-    X, X_true = Kinematics(load_robot(str(tmp_path / "r.yaml"))).forward(q), true.forward(q)
-    places = (1e-3 * np.array(found["targets_mm"]["a"]), PLACES["a"])
-    p, p_true = (each[:, :3, :3] @ a + each[:, :3, 3] for each, a in zip((X, X_true), places, strict=True))
-    steps, true_steps = (np.linalg.norm(np.diff(each, axis=0), axis=1) for each in (p, p_true))
-    assert np.abs(steps - true_steps).max() < 1e-10  # m, wherever the world of the robot is
+    assert worst_step(tmp_path / "r.yaml", true, q, found) < 1e-10
     refused = truetip("calibrate", *arguments, "--position-only", "--out", tmp_path / "no")
     assert "--position-only has no effect on a table of targets and instruments" in refusal(refused)
+
+
+def test_an_adjustment_is_validated_on_lines_of_its_own_and_written_as_urdf(tmp_path: Path):
+    """Noise is known, one line of the fresh ones is bad, a redundant parameter stays zero."""
+    true, seen = observed(count=60, noise=5e-5)
+    seen.position[155] += 0.01
+    write_lines(tmp_path / "m.csv", seen, range(40))
+    write_lines(tmp_path / "v.csv", seen, range(40, 60))
+    (tmp_path / "noise.yaml").write_text("{joint_deg: 0, position_mm: 0.05, rotation_deg: 1}")
+    (tmp_path / "cell.yaml").write_text("sigma_mm: {camera: 0.25, bar: 0.005}")
+    known = ["--noise", tmp_path / "noise.yaml", "--cell", tmp_path / "cell.yaml", "--fixed", "zero_1"]
+    tables = ["--measurements", tmp_path / "m.csv", "--validation", tmp_path / "v.csv"]
+    written = ["--urdf", tmp_path / "r.urdf", "--out", tmp_path / "out", "--json", "-"]
+    result = truetip("calibrate", *tables, *known, *written)
+    assert result.exit_code == 0, result.output
+    found = json.loads(result.stdout)
+    assert found["noise"] == pytest.approx({"joint_deg": 0, "tracker": 0.05, "camera": 0.25, "bar": 0.005})
+    assert "zero_1" not in found["names"]
+    assert found["validation_outliers"] == [155 - int(np.sum(seen.row < 40)) + 2]  # the head is line 1
+    before, after = found["validation"]["before"], found["validation"]["after"]
+    assert all(before[name]["mean_mm"] > 5.0 for name in before)
+    assert after["tracker"]["max_mm"] < 0.3  # three axes, and what 140 lines leave of the robot's errors
+    assert "Validation" in (tmp_path / "out" / "report.html").read_text()
+    q = true.configurations(20, np.random.default_rng(5))
+    assert worst_step(tmp_path / "r.urdf", true, q, found) < 2e-4
+    strange = (tmp_path / "v.csv").read_text().replace(";tracker;", ";other;")
+    (tmp_path / "v.csv").write_text(strange)
+    refused = truetip("calibrate", *tables, "--out", tmp_path / "no")
+    assert (
+        "validation: instrument other is not in the calibration; there are camera, tracker, bar"
+        in refusal(refused)
+    )

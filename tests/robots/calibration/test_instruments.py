@@ -1,6 +1,7 @@
 """Several targets, instruments and distances in one adjustment, against a robot of matrix products."""
 
 import time
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -13,8 +14,9 @@ from robots.calibration.instruments.identify import (
     identify_with_instruments,
 )
 from robots.calibration.instruments.observation_file import read_cell, read_observations
-from robots.calibration.instruments.observations import MeasuringCell
+from robots.calibration.instruments.observations import MeasuringCell, Observations
 from robots.calibration.instruments.problem import InstrumentProblem
+from robots.calibration.instruments.validation import validate_lines
 from robots.calibration.measurement_file import MeasurementFileError, read_measurements
 from robots.description.model import load_robot
 from robots.kinematics.forward import Kinematics
@@ -23,6 +25,12 @@ from tests.robots.calibration.matrix_robot import MatrixRobot
 from tests.robots.calibration.seen import ANCHOR, FACTORS, PLACES, observed
 
 NOTHING = MeasuringCell({}, {}, {}, {})
+
+
+def part_of(seen: Observations, lines: np.ndarray) -> Observations:
+    """Some lines, with the configurations of all."""
+    parts = ("row", "target", "instrument", "position", "distance", "sigma", "lines")
+    return replace(seen, **{name: getattr(seen, name)[lines] for name in parts})
 
 
 def worst_error(found: InstrumentCalibration, true: MatrixRobot) -> float:
@@ -59,6 +67,36 @@ def test_without_noise_robot_targets_and_anchor_are_found_exactly(name: str):
     apart = found.setting.places[1] - found.setting.places[0]
     assert np.linalg.norm(apart) == pytest.approx(np.linalg.norm(PLACES["b"] - PLACES["a"]), abs=1e-12)
     assert np.abs(gaps).max() < 0.05  # as far as the tool itself may be displaced
+
+
+@pytest.mark.parametrize("name", ["irb1200", "ur10"])
+def test_fresh_lines_are_predicted_exactly_and_those_with_gross_errors_named(name: str):
+    """Frames, targets and the anchor are those of the calibration, not fitted to the fresh lines again."""
+    _, seen = observed(name, count=60, seed=3)
+    is_fresh = seen.row >= 40
+    used, fresh = part_of(seen, ~is_fresh), part_of(seen, is_fresh)
+    fresh.position[7] += 0.005
+    found = identify_with_instruments(load_robot(name), used)
+    checked = validate_lines(found, fresh)
+    before, after = checked.distances()
+    assert np.mean(before) > 5e-3
+    assert after.max() < 1e-11
+    assert checked.outliers == (fresh.lines[7],)
+    shifted = replace(fresh, position=fresh.position + 0.01)
+    assert validate_lines(found, shifted).distances(0)[1].min() > 0.005
+
+
+def test_a_fixed_parameter_stays_zero_and_no_other_takes_its_place():
+    """The zero of joint 1 turns the whole robot, as frames can; what joint 3 does nothing else can do."""
+    _, seen = observed()
+    robot = load_robot("irb1200")
+    turned = identify_with_instruments(robot, seen, fixed=("zero_1",))
+    assert "zero_1" not in turned.names
+    assert np.nanmax(np.abs(turned.residuals)) < 1e-12
+    bent = identify_with_instruments(robot, seen, fixed=("zero_3", "joint3_rz", "joint3_ry"))
+    assert np.sqrt(np.nanmean(bent.residuals**2)) > 1e-4
+    with pytest.raises(ValueError, match="no parameter is called zero_7; there are base_x"):
+        identify_with_instruments(robot, seen, fixed=("zero_7",))
 
 
 def test_the_noise_of_every_instrument_and_of_the_joints_is_found():

@@ -1,0 +1,164 @@
+"""An adjustment of several targets and instruments: in words, as numbers, as a page."""
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from experiments.calibration.words import rounded, unit
+from experiments.report.plot_page import Section, sortable_table, write_plot_page
+from robots.calibration.instruments.identify import InstrumentCalibration
+from robots.calibration.instruments.observations import Observations
+from robots.calibration.instruments.validation import FreshLines
+from robots.calibration.measurement_file import RowProblem
+from robots.pose import zyx_from_rotation
+
+_CONFIDENCE = 1.96  # standard deviations to either side hold 95 %
+
+
+def sentence(found: InstrumentCalibration) -> str:
+    """What was reached, in words."""
+    seen = found.observations
+    text = (
+        f"{len(seen)} lines of {len(seen.targets)} targets and {len(seen.instruments)} instruments at "
+        f"{len(seen.q)} configurations, adjusted together in {found.iterations} iterations. "
+    )
+    for number, name in enumerate(seen.instruments):
+        lines = found.used & (seen.instrument == number)
+        before, after = (
+            1e3 * float(np.sqrt(np.nanmean(e[lines] ** 2))) for e in (found.before, found.residuals)
+        )
+        text += (
+            f"{name}: {before:.3f} to {after:.4g} mm (rms), noise {1e3 * found.noise[1 + number]:.2g} mm. "
+        )
+    return text + f"Noise of the joints {np.rad2deg(found.noise[0]):.2g} degrees."
+
+
+def validation_sentence(checked: FreshLines) -> str:
+    """How well fresh lines are predicted, in words."""
+    parts = []
+    for number, name in enumerate(checked.observations.instruments):
+        before, after = (1e3 * each for each in checked.distances(number))
+        if len(after):
+            parts.append(
+                f"{name} {before.mean():.3f} to {after.mean():.4g} mm (mean; {after.max():.3g} at most)"
+            )
+    return f"Validation, {int(checked.used.sum())} fresh lines: {', '.join(parts)}."
+
+
+def instruments_json(
+    found: InstrumentCalibration,
+    file: str,
+    unused: list[tuple[str, RowProblem]],
+    checked: FreshLines | None = None,
+) -> dict[str, Any]:
+    """The numbers of an adjustment, with the keys of other calibrations where they mean the same.
+
+    Args:
+        found: the adjustment.
+        file: of the lines that were used.
+        unused: files, and their lines that cannot be used.
+        checked: predictions of fresh lines; None without a table of them.
+    """
+    seen, at = found.observations, found.setting
+    sigmas = np.sqrt(np.diagonal(found.covariance))
+    left_out = [{"file": name, "row": problem.row, "why": problem.what} for name, problem in unused]
+    left_out += [{"file": file, "row": line, "why": "gross error"} for line in found.outliers]
+    return {
+        "converged": True,
+        "iterations": found.iterations,
+        "rank": found.rank,
+        "names": list(found.names),
+        "values": found.values.tolist(),
+        "sigmas": sigmas.tolist(),
+        "shares": found.shares.tolist(),
+        "correlation": (found.covariance / np.outer(sigmas, sigmas)).tolist(),
+        "noise": {
+            "joint_deg": float(np.rad2deg(found.noise[0])),
+            **{name: 1e3 * float(s) for name, s in zip(seen.instruments, found.noise[1:], strict=True)},
+        },
+        "targets_mm": {
+            name: (1e3 * place).tolist() for name, place in zip(seen.targets, at.places, strict=True)
+        },
+        "frames": {
+            name: {
+                "mm": (1e3 * X[:3, 3]).tolist(),
+                "zyx_deg": np.rad2deg(zyx_from_rotation(X[:3, :3])).tolist(),
+            }
+            for number, (name, X) in enumerate(zip(seen.instruments, at.frames, strict=True))
+            if not seen.is_bar(number)
+        },
+        "anchors_mm": {
+            name: (1e3 * at.anchors[number]).tolist()
+            for number, name in enumerate(seen.instruments)
+            if seen.is_bar(number)
+        },
+        "residuals": [
+            {
+                "row": int(line),
+                "mm": [None if np.isnan(v) else 1e3 * v for v in e.tolist()],
+                "used": bool(used),
+            }
+            for line, e, used in zip(seen.lines, found.residuals, found.used, strict=True)
+        ],
+        "left_out": left_out,
+        "outliers": list(found.outliers),
+        "validation": _validation_json(checked) if checked else None,
+        "validation_outliers": list(checked.outliers) if checked else [],
+    }
+
+
+def _validation_json(checked: FreshLines) -> dict[str, Any]:
+    """Distances by instrument, before and after."""
+    numbers: dict[str, Any] = {"before": {}, "after": {}}
+    for number, name in enumerate(checked.observations.instruments):
+        for when, distances in zip(numbers, checked.distances(number), strict=True):
+            if len(distances):
+                mm = 1e3 * distances
+                numbers[when][name] = {
+                    "lines": len(mm),
+                    "mean_mm": float(mm.mean()),
+                    "p90_mm": float(np.percentile(mm, 90.0)),
+                    "max_mm": float(mm.max()),
+                }
+    return numbers
+
+
+def _lines_table(
+    name: str, seen: Observations, errors: tuple[np.ndarray, np.ndarray], used: np.ndarray
+) -> str:
+    """Every line with its errors (m, 3) in m, before and after."""
+    rows = []
+    for k, line in enumerate(seen.lines.tolist()):
+        before, after = (1e3 * float(np.sqrt(np.nansum(e[k] ** 2))) for e in errors)
+        axes = ["" if np.isnan(value) else f"{1e3 * value:z.4f}" for value in errors[1][k]]
+        names = [seen.targets[seen.target[k]], seen.instruments[seen.instrument[k]]]
+        rows.append(
+            [str(line), *names, f"{before:.3f}", f"{after:.4f}", *axes, "" if used[k] else "left out"]
+        )
+    head = ["line", "target", "instrument", "before mm", "after mm", "Δ1 mm", "Δ2 mm", "Δ3 mm", ""]
+    return sortable_table(name, head, rows)
+
+
+def write_instruments_page(page: Path, found: InstrumentCalibration, checked: FreshLines | None) -> None:
+    """The page for people. Raises OSError if it cannot be written."""
+    errors = (found.before, found.residuals)
+    note = "Along the axes of the instrument; a distance has one number. A click on a head sorts."
+    table = _lines_table("lines", found.observations, errors, found.used)
+    sections = [Section("Every line", note, table)]
+    if checked:
+        table = _lines_table("fresh", checked.observations, (checked.before, checked.after), checked.used)
+        sections.insert(0, Section("Validation", validation_sentence(checked), table))
+    parameters = []
+    sigmas = np.sqrt(np.diagonal(found.covariance))
+    for name, value, sigma, share in zip(found.names, found.values, sigmas, found.shares, strict=True):
+        label, factor = unit(name)
+        shown = rounded(factor * value, _CONFIDENCE * factor * sigma)
+        parameters.append([name, *shown, label, f"{100.0 * share:.1f} %"])
+    note = (
+        "All parameters with 95 % confidence: of the robot, of targets on the tool, of frames on top of "
+        "where the nominal robot puts them, of anchors. What the data do not show has its prior."
+    )
+    head = ["name", "value", "±", "unit", "from the data"]
+    sections.append(Section("Parameters", note, sortable_table("parameters", head, parameters)))
+    write_plot_page(page, f"Calibration, {found.robot.name}", sentence(found), sections)
