@@ -24,8 +24,9 @@ PATIENCE = 120.0  # s
 class Session:
     """One tab of a browser."""
 
-    def __init__(self, address: str) -> None:
-        """Connects to a tab."""
+    def __init__(self, address: str, process: int = 0) -> None:
+        """Connects to a tab of the browser with that process id."""
+        self.process = process
         self._socket = websocket.create_connection(address, timeout=PATIENCE, suppress_origin=True)
         self._numbers = itertools.count(1)
         self.requests: list[str] = []  # addresses that the pages asked for
@@ -119,7 +120,7 @@ def browser() -> Iterator[Session]:
         )
         session = None
         try:
-            session = Session(_tab(Path(profile)))
+            session = Session(_tab(Path(profile)), process.pid)
             yield session
         finally:
             if session:

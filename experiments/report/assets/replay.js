@@ -175,7 +175,7 @@ canvas.onpointerdown = event => { state.isPlaying = false;
 element("speed").onchange = event => { state.speed = Number(event.target.value); };
 element("magnify").onchange = event => { state.magnify = Number(event.target.value); layTrails(); isStale = true; };
 element("elastic").onchange = event => { state.elastic = Number(event.target.value); isStale = true; };
-element("robot").onchange = event => { state.robot = event.target.value; isStale = true; };
+element("robot").onchange = event => { state.robot = event.target.value; setFineness(state.robot === "all"); isStale = true; };
 for (const button of document.querySelectorAll("[data-view]")) button.onclick = () => setView(button.dataset.view);
 for (const button of document.querySelectorAll("button.law")) button.onclick = () => {
   const law = laws.find(each => each.id === button.dataset.law);

@@ -109,11 +109,14 @@ function hasGraphicsCard() {
   if (gl) gl.getExtension("WEBGL_lose_context")?.loseContext();
   return !isSoft;
 }
-try { renderer = new THREE.WebGLRenderer({antialias: devicePixelRatio < 2 && hasGraphicsCard()}); } catch (error) {
+const isSoft = !hasGraphicsCard();
+try { renderer = new THREE.WebGLRenderer({antialias: devicePixelRatio < 2 && !isSoft}); } catch (error) {
   holder.innerHTML = "<p class=note style='padding:80px 20px'>This replay needs WebGL, which the browser does not have or has switched off.</p>";
   throw error;
 }
-renderer.setPixelRatio(Math.min(devicePixelRatio, 2));
+/* Several robots that one sees through cost several times as much: then pixels are coarser without a graphics card. */
+function setFineness(isCrowded) { renderer.setPixelRatio(Math.min(devicePixelRatio, 2) * (isSoft && isCrowded ? 0.6 : 1)); }
+setFineness(false);
 renderer.domElement.setAttribute("role", "img");
 renderer.domElement.setAttribute("aria-label", "The robot on its path");
 holder.append(renderer.domElement);
