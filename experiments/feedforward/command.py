@@ -121,7 +121,9 @@ def _table(study: FeedforwardStudy) -> Table:
     )
     table = Table(box=box.SIMPLE_HEAD, title=escape(title), title_justify="left", title_style="italic")
     for name in TABLE_HEAD:
-        table.add_column(name, justify="left" if name == TABLE_HEAD[0] else "right", no_wrap=True)
+        # Units below the names: eighty columns are few.
+        justify = "left" if name == TABLE_HEAD[0] else "right"
+        table.add_column(name.replace(" ", "\n"), justify=justify, no_wrap=True)
     for row in table_rows(study):
         table.add_row(*row)
     return table

@@ -39,7 +39,10 @@ def surface_figure(study: FeedforwardStudy, angle_deg: int) -> go.Figure:
     for kind, color in COLORS.items():
         style = {"colorscale": [[0.0, color], [1.0, color]], "showlegend": True, "opacity": 0.85}
         figure.add_trace(_surface(study, study.criterion[angle_deg][kind], name=LABELS[kind], **style))
-    return figure.update_layout(scene=_scene({"title": "C in m/s", "type": "log", "dtick": 1}))
+    values = np.array([study.criterion[angle_deg][kind] for kind in KINDS])
+    has_decades = values.max() > 30.0 * values.min()
+    zaxis = {"title": "C in m/s", "type": "log", "dtick": 1 if has_decades else "D2", "tickformat": "~g"}
+    return figure.update_layout(scene=_scene(zaxis))
 
 
 def ratio_figure(study: FeedforwardStudy, angle_deg: int) -> go.Figure:
