@@ -120,7 +120,10 @@ class Candidates:
         unknown = numbers[state[numbers] == _UNKNOWN]
         if len(unknown):
             indices = np.array(np.unravel_index(unknown, self.grid.shape))
-            _, first = np.unique(indices[self._on], axis=1, return_index=True)
+            cases = np.ravel_multi_index(
+                tuple(indices[self._on]), tuple(self._state.shape[i] for i in self._on)
+            )
+            _, first = np.unique(cases, return_index=True)
             allowed = self._admissible(self.grid.configurations(unknown[first]))
             for is_allowed, found in ((allowed, _ALLOWED), (~allowed, _REFUSED)):
                 case: list[slice | np.ndarray] = [slice(None)] * len(indices)

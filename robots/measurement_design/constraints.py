@@ -95,10 +95,11 @@ class AdmissibleConfigurations:
         q = np.asarray(q, dtype=float)
         inside = (q >= self._robot.lower - _TOLERANCE) & (q <= self._robot.upper + _TOLERANCE)
         found = np.asarray(inside.all(axis=1))
-        found &= self._shapes.lowest(q) >= self._floor + self._config.clearance
         if self._config.view is not None or self._config.box is not None:
             X_WE = self._kinematics.forward(q)
             found &= self._is_in_box(X_WE) & self._is_seen(X_WE)
+        rest = np.flatnonzero(found)
+        found[rest] = self._shapes.lowest(q[rest]) >= self._floor + self._config.clearance
         for index in np.flatnonzero(found):
             found[index] = self._shapes.is_clear(q[index])
         return found
