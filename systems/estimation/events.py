@@ -25,6 +25,7 @@ _AFTER = 3  # of them at least have to be behind it
 _SUDDEN = 60.0  # by which chi squared is smaller with a step than with a parabola: e to the 30 to one
 _FOREIGN = 8.0  # sigmas of what robots of this kind may be off by
 _PAUSE = 50  # samples after an event before the next one
+_SCATTER, _LEAST_SCATTER = 500, 100  # samples, in the mean of the camera's noise; and before it is said
 _EXPLAINED = 0.15  # what a cause leaves of the mean error if it is the cause
 
 
@@ -123,6 +124,9 @@ class Innovations:
             by_model=(_RECENT, 6),  # what the estimate could be wrong by then, in variances of the camera
             held=(1,),  # how many of them there are
             doubtful=(1,),  # samples in a row
+            last=(6,),
+            scatter=(6,),  # variances of the camera, from one sample to the next
+            changes=(1,),  # in that mean
         )
 
     def is_false_start(
@@ -210,6 +214,28 @@ class Innovations:
         memory.doubtful[0] += 1.0
         is_long = memory.doubtful[0] > _RECENT // 2
         return Verdict(has_drifted=bool(is_long), is_doubtful=not is_long)
+
+    def measure_noise(self, memory: SimpleNamespace, r: np.ndarray) -> None:
+        """Takes the innovation of a sample that counts, (6,), into the measured noise of the camera.
+
+        What model and estimate are wrong by is nearly the same in the sample before: half of the square of
+        the change is noise alone.
+        """
+        if memory.changes[0] == 0.0:
+            memory.last[:] = r
+        share = 1.0 / min(max(float(memory.changes[0]), 1.0), _SCATTER)
+        kernels.innovations.scatter(r, memory.last, memory.scatter, share)
+        memory.changes[0] += 1.0
+
+    def noise_factor(self, memory: SimpleNamespace) -> float:
+        """The camera's variance as it is measured in units of the one that is believed.
+
+        The larger factor of turns and of shifts: what both say is mixed in the estimate.
+        """
+        if memory.changes[0] < _LEAST_SCATTER:
+            return 1.0
+        factors = memory.scatter / self._variances
+        return max(float(factors[:3].mean()), float(factors[3:].mean()))
 
     def _is_sudden(self, memory: SimpleNamespace) -> bool:
         """Whether a step explains the last samples better than a parabola does."""

@@ -136,9 +136,20 @@ class TipEstimator:
         first = float(memory.first_time[0])
         return 0.0 if math.isnan(first) else time - first
 
+    def variance_factor(self, memory: SimpleNamespace) -> float:
+        """The measured variance of the camera in units of the one that is believed."""
+        return self._innovations.noise_factor(memory.innovations)
+
     def covariance(self, memory: SimpleNamespace) -> np.ndarray:
-        """Covariance of the unknowns in units of their spreads, shape (n, n)."""
-        return np.linalg.inv(memory.keyframes.A + memory.A_open)
+        """Covariance of the unknowns in units of their spreads, shape (n, n).
+
+        The camera's noise is measured: with f times the variance that is believed, weights stay what they
+        are, and P (A_0 + f (A - A_0)) P is the covariance of what they give, P = A^-1. A noisier camera than
+        is believed casts doubt on what was known before, too: then it is f P.
+        """
+        P = np.linalg.inv(memory.keyframes.A + memory.A_open)
+        factor = self.variance_factor(memory)
+        return factor * P + max(0.0, 1.0 - factor) * P @ self.model.prior @ P
 
     def covariance_of_robot(self, memory: SimpleNamespace) -> np.ndarray:
         """The same of `x_robot`."""
@@ -210,6 +221,7 @@ class TipEstimator:
             verdict = self._innovations.judge(innovations, r, H, lambda: self._solve_columns(memory, H))
             if verdict.is_outlier:
                 return None
+            self._innovations.measure_noise(innovations, r)
             if verdict.is_calm:
                 memory.was_settled[0] = self._keyframes.is_settled(memory.keyframes, memory.xi)
             if verdict.is_doubtful and memory.was_settled[0]:
@@ -330,7 +342,7 @@ class TipEstimator:
         memory.event_at[0] = memory.count[0]
         share = 1.0 if again or event.kind == LOAD_CHANGED else _OF_THE_LOAD
         model = self.model
-        P = self.covariance(memory)
+        P = np.linalg.inv(memory.keyframes.A + memory.A_open)
         tool = model.tool_directions()
         P = P + tool @ tool.T
         load = np.zeros(model.size)

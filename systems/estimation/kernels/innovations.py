@@ -1,4 +1,4 @@
-"""What samples say beyond the estimate: their running mean, and the last of them."""
+"""What samples say beyond the estimate: their running mean, the last of them, and how they scatter."""
 
 import math
 
@@ -37,3 +37,11 @@ def enter(r, by_model, number, share, variances, error, spread, recent, by_model
         spread[i] += share * (math.sqrt(by_model[i]) - spread[i])
         most = max(most, abs(error[i]) / math.sqrt(variances[i]))
     return most
+
+
+@compiled
+def scatter(r, last, variance, share):
+    """Takes half of the square of a change, (6,), into a mean; r becomes the last one."""
+    for i in range(len(r)):
+        variance[i] += share * (0.5 * (r[i] - last[i]) ** 2 - variance[i])
+        last[i] = r[i]

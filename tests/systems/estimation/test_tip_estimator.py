@@ -20,10 +20,10 @@ class Session:
         self.estimator.start(self.memory)
         self.time, self.events = 0.0, []
 
-    def learn(self, duration: float, size: float = 0.6, change=None) -> None:
+    def learn(self, duration: float, size: float = 0.6, change=None, noise: float = 1.0) -> None:
         for _ in range(round(duration / PERIOD)):
             self.time += PERIOD
-            pair = self.arm.pair(self.time, size)
+            pair = self.arm.pair(self.time, size, noise)
             event = self.estimator.add(self.memory, change(pair) if change else pair)
             self.events += [event] if event else []
             self.estimator.work(self.memory)
@@ -63,6 +63,18 @@ def test_the_error_is_what_the_covariance_says():
     session = Session(1)
     session.learn(3.0)
     assert session.squares(np.array([1.0, 2.0, 7.0])).max() < 35.0  # chi squared of six, one in 200000
+
+
+@pytest.mark.parametrize("noise", [0.5, 3.0])  # of the camera, in units of the usual one
+def test_the_error_is_what_the_covariance_says_whatever_the_camera_is_believed_to_be(noise):
+    squares = []
+    for seed in range(4):
+        session = Session(seed)
+        session.learn(5.0, noise=noise)
+        factor = session.estimator.variance_factor(session.memory)
+        assert factor == pytest.approx(noise**2 * (5.0 / 6.0) ** 2, rel=0.2)
+        squares.append(session.squares(np.linspace(session.time - 2.0, session.time, 20)).mean())
+    assert 3.0 < np.mean(squares) < 9.0  # chi squared of six, of four robots that are wrong in their own way
 
 
 @pytest.mark.parametrize("seed", [2, 3, 4])
