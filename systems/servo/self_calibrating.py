@@ -157,6 +157,7 @@ class SelfCalibrating(LeafSystem):
         for size in (0.0, 0.1):
             X_WE[0, 3] += size
             self.estimator.add(memory.estimator, pair._replace(X_WE=X_WE))
+        self._learning.steps.hear(memory.steps, q)
         for time in (0.0, 1.0):
             self._learning.encoders.append(memory.encoders, time, np.concatenate((q, still)))
             self._learning.plan.append(memory.plan, time, memory.passed.all)
