@@ -28,6 +28,7 @@ from systems.servo.self_calibrating_config import SelfCalibratingConfig
 from systems.servo.self_calibrating_learning import UNREST, Learning
 
 _STARTING = 1.5  # s
+_FOLLOWED = 4.0  # rad of the lead's frequency, after which nine tenths of a step are followed
 _CAREFUL = 0.25  # of the planned speed, while the dead time or the load is not what it was
 _BEFORE_PATH = 0.6  # s, at which it is held until the dead time is found; a slowed path needs time to stop
 
@@ -120,12 +121,18 @@ class SelfCalibrating(LeafSystem):
             home: where the joints are near at its start, rad, (6,).
         """
         try:
-            self._needs = PathNeeds(self.tip_model, self.estimator.weights, path, home)
+            self._needs = PathNeeds(self.tip_model, self.estimator.weights, path, home, self._late)
         except ValueError:
             return  # out of reach of the nominal robot: whoever starts the run says so
         rate, sharp = 1.0 / self.period, self._config.probe.sharp
         found = designed(self._needs, self._probe, path.path_start, rate, sharp)
         self._probe.pattern, self._forecast = found
+
+    @property
+    def _late(self) -> float:
+        """After so many s a sample acts on the path: delays, the lead, and a camera that is blind."""
+        delays = self._model.camera_delay + self._model.command_delay
+        return delays + _FOLLOWED / self._config.lead_frequency + self._config.probe.blind
 
     def _first_memory(self) -> np.ndarray:
         vector = np.zeros(self._layout.size)

@@ -13,7 +13,6 @@ from systems.reference.cartesian_path import CartesianPath
 
 _MOST_INSTANTS = 48  # of the path, evenly spaced in time
 _INVERSE_STEP = 0.05  # s, between two poses of the inverse kinematics
-_LATE = 0.5  # s, by which samples may be late for use: dead time, lead of the parameters, lost images
 # An angle counts as a way of the tip at an arm of 0.25 m.
 _SCALE = np.array([0.25, 0.25, 0.25, 1.0, 1.0, 1.0])
 
@@ -31,7 +30,9 @@ class Standing(NamedTuple):
 class PathNeeds:
     """The path's columns: how the tip moves with each unknown, at instants all along it."""
 
-    def __init__(self, model: TipModel, weights: np.ndarray, path: CartesianPath, home: np.ndarray) -> None:
+    def __init__(
+        self, model: TipModel, weights: np.ndarray, path: CartesianPath, home: np.ndarray, late: float
+    ) -> None:
         """Works out the joints along the path as the nominal robot would have them.
 
         Args:
@@ -39,6 +40,7 @@ class PathNeeds:
             weights: of the six entries of a pose error, one over their variances.
             path: that will be run.
             home: where the joints are near at its start, rad, (6,).
+            late: s, by which samples may be late for use on the path.
 
         Raises:
             ValueError: if the nominal robot does not reach the path.
@@ -56,7 +58,7 @@ class PathNeeds:
         self._constants = model.constants(model.mean)
         self.H = self.columns(self.q, velocity[chosen], acceleration[chosen])
         self._seconds = length / max(1, len(chosen) - 1)
-        self._blind = math.ceil(_LATE / self._seconds)
+        self._blind = math.ceil(late / self._seconds)
         self._informations = np.array([self.information(H[None]) for H in self.H])
 
     def columns(self, q: np.ndarray, velocity: np.ndarray, acceleration: np.ndarray) -> np.ndarray:

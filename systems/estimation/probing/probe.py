@@ -24,6 +24,7 @@ class ProbeConfig:
     largest_excursion: float = 0.1  # m, of the tip
     begin: float = 0.8  # s after the start
     rest: float = 0.3  # s before the path begins
+    blind: float = 0.35  # s, for which the camera may see nothing on the path: what is needed is shown before
     sharp: float = 3e-5  # m: a tip that will be known so well all along the path needs no oscillations
     vague: float = 2.5e-4  # m: a tip that is known less well than this somewhere on the path is an event
 
@@ -64,7 +65,8 @@ class Probe:
         """Checks the configuration.
 
         Raises:
-            ValueError: if the kind is unknown, or amplitudes are negative or not six.
+            ValueError: if the kind is unknown, amplitudes are negative or not six, or the camera is blind for
+                a negative time.
         """
         if config.kind not in ("smooth", "none"):
             raise ValueError(f"probe: kind must be smooth or none, got '{config.kind}'")
@@ -73,6 +75,8 @@ class Probe:
             raise ValueError(
                 f"probe: amplitude must be six numbers of at least 0 rad, got {config.amplitude}"
             )
+        if not 0.0 <= config.blind < np.inf:
+            raise ValueError(f"probe: blind must be a time of at least 0 s, got {config.blind}")
         self._config, self._amplitude = config, amplitude
         self._lower, self._upper, self._speed = robot.lower, robot.upper, robot.speed
         self.pattern = USUAL._replace(size=amplitude)

@@ -104,6 +104,21 @@ def test_the_tip_is_where_the_law_says_with_encoders_of_any_steps(seed, bits):
 
 
 @pytest.mark.slow
+@pytest.mark.parametrize("gap", [0.25, 0.8])  # s
+def test_a_camera_that_is_blind_on_the_path_costs_what_was_promised(gap):
+    drawn = [f"{name}=4001" for name in ("seed", "station.errors.random.seed", "station.variation.seed")]
+    blind = [f"station.camera.dropouts=[[5, {5 + gap}]]", f"servo.laws.self_calibrating.probe.blind={gap}"]
+    scenario = load_scenario("everything", ["reference.path=circle", *blind, *drawn])
+    experiment = Experiment(scenario, "self_calibrating")
+    experiment.advance(until=5.2 + gap)
+    log = experiment.log()
+    assert log.learnt is not None
+    errors = np.linalg.norm(pose_error(log.X_WE_desired, log.X_WE_true)[:, 3:], axis=1)
+    promised = log.learnt["path"]["before"]["tip_sigma_m"]
+    assert errors[log.time >= 5.0].max() < 2.0 * promised
+
+
+@pytest.mark.slow
 def test_a_dead_time_that_changes_on_the_path_is_learnt_while_the_tip_stays_on_its_track():
     settings = ["station.events=[!DeadTimeChange {at: 6, dead_time: 0.033}]", "seed=1001"]
     experiment = Experiment(load_scenario("everything", settings), "self_calibrating")

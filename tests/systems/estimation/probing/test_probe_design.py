@@ -16,8 +16,8 @@ MODEL = tip_model()
 WEIGHTS = 1.0 / CAMERA**2
 
 
-def needs(shape) -> PathNeeds:
-    return PathNeeds(MODEL, WEIGHTS, make_path(ReferenceConfig(path=shape, settle=4.0)), HOME)
+def needs(shape, late: float = 0.5) -> PathNeeds:
+    return PathNeeds(MODEL, WEIGHTS, make_path(ReferenceConfig(path=shape, settle=4.0)), HOME, late)
 
 
 def expected(of: PathNeeds, probe: Probe, amplitude: np.ndarray) -> float:
@@ -51,6 +51,20 @@ def test_what_the_design_promises_its_motion_shows(shape):
     assert shown == pytest.approx(promised.sigma, rel=0.2)  # knock and tails are not counted in the promise
     assert shown <= 1.02 * usual
     assert shown < 0.1 * nothing
+
+
+def test_the_longer_the_camera_may_be_blind_the_more_is_shown_before():
+    probe = Probe(load_robot("irb1200"), ProbeConfig())
+    sees, blind = needs(Circle(), late=0.05), needs(Circle(), late=2.0)
+    shown = []
+    for of in (sees, blind):
+        probe.pattern, promised = designed(of, probe, 4.0, RATE, sharp=0.0)
+        amplitude = probe.amplitude(of.q[0], of.jacobian(of.q[0]), 4.0)
+        assert promised.sigma > 0.0
+        shown.append([expected(each, probe, amplitude) for each in (sees, blind)])
+    (sees_sees, sees_blind), (_, blind_blind) = shown
+    assert sees_blind > 1.1 * sees_sees  # the same motion promises less
+    assert blind_blind < sees_blind  # and another one more
 
 
 def test_none_where_the_tip_is_known_well_enough():
