@@ -15,6 +15,7 @@ from robots.calibration.instruments.identify import (
 from robots.calibration.instruments.observation_file import read_observations
 from robots.calibration.instruments.observations import MeasuringCell, Observations
 from robots.calibration.instruments.problem import InstrumentProblem
+from robots.calibration.instruments.validation import validate_lines
 from robots.description.model import RobotModel, load_robot
 from robots.dynamics.compliant_kinematics import CompliantKinematics
 from robots.metrology.point_registration import register_points
@@ -100,6 +101,9 @@ def test_gross_errors_of_a_loaded_robot_are_named_and_do_no_harm():
         load_robot("irb1200"), replace(seen, position=position), None, KINDS, True
     )
     assert found.outliers == tuple(seen.lines[bad])
+    again = validate_lines(found, replace(seen, position=position))
+    np.testing.assert_allclose(again.after, found.residuals, atol=1e-12)  # m, loads and joint errors included
+    np.testing.assert_allclose(again.before, found.before, atol=1e-12)
     clean = identify_with_instruments(load_robot("irb1200"), seen, None, KINDS, True)
     assert worst_error(found, true, LOAD) < 1.5 * worst_error(clean, true, LOAD)
     np.testing.assert_allclose(
