@@ -3,6 +3,7 @@
 The criterion of Reiner (2010), section 6.2.1: how much the wrist still accelerates once it should be at rest.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -25,6 +26,8 @@ SPEEDING_UP = 0.5  # s, from rest to the largest speed with the mean acceleratio
 _AXES = 3  # that move
 _WRIST = 5  # the origin of this link is the point where axes 4, 5 and 6 meet
 _MAX_STEP = 2e-3  # s; the ringing of the best feedforward is then right to some percent
+
+Note = Callable[[DiagramBuilder, SimulatedStation], None]
 
 
 @dataclass(frozen=True)
@@ -64,18 +67,29 @@ class Trial:
             From the end of the motion on: times in s, shape (n,), and how the wrist accelerates, in m/s^2,
             shape (n, 3).
         """
+        return self.simulated(progress)[0].found
+
+    def simulated(
+        self, progress: Progress | None = None, note: Note | None = None
+    ) -> tuple["WristWatch", Context]:
+        """Simulates it; returns what the wrist did after the motion, and the context of the diagram.
+
+        Args:
+            progress: is called at the end.
+            note: adds what else is to be logged, see `at_rest`.
+        """
         config = StationConfig(elasticity="structure", payload=self.payload)
         period, ahead = config.period, config.drive.command_delay + config.drive.dead_time
         stop = self.settle + self.profile.duration
         told = commands(self, np.arange(0.0, stop + RINGING, period) + ahead, period)
-        simulator, station, integration = at_rest(self.plant or self.robot, config, told)
+        simulator, station, integration = at_rest(self.plant or self.robot, config, told, note)
         integration.advance(simulator, stop)
         watch = WristWatch(station)
         watch.begin(simulator)
         integration.advance(simulator, stop + RINGING)
         if progress:
             progress(1.0)
-        return watch.found
+        return watch, simulator.get_context()
 
 
 class WristWatch:
@@ -107,15 +121,20 @@ class WristWatch:
 
 
 def at_rest(
-    robot: RobotModel, config: StationConfig, told: np.ndarray
+    robot: RobotModel, config: StationConfig, told: np.ndarray, note: Note | None = None
 ) -> tuple[Simulator, SimulatedStation, Integration]:
-    """A station that will be told commands (n, 3, 6), one row a tick, at rest where they begin."""
+    """A station that will be told commands (n, 3, 6), one row a tick, at rest where they begin.
+
+    A note adds systems that log the station, before the diagram is built.
+    """
     builder = DiagramBuilder()
     station = builder.AddNamedSystem("station", SimulatedStation(robot, config, "cascade", takes_torque=True))
     player = builder.AddNamedSystem("commands", CommandPlayer(told, config.period))
     for index in range(player.num_output_ports()):
         port = player.get_output_port(index)
         builder.Connect(port, station.GetInputPort(port.get_name()))
+    if note:
+        note(builder, station)
     simulator = Simulator(builder.Build())
     context = simulator.get_mutable_context()
     station.set_at_rest(context, told[0, 0], seed=0)

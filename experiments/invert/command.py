@@ -35,6 +35,12 @@ def invert_command(
         float, typer.Option(metavar="SHARE", help="Every spring of the true robot is up to so much off.")
     ] = 0.0,
     seeds: Annotated[int, typer.Option(metavar="N", help="How many robots with such springs.")] = 1,
+    rehearse: Annotated[
+        bool,
+        typer.Option(
+            "--rehearse", help="Also make each motion once to learn the springs from the motors' torques."
+        ),
+    ] = False,
     out: OnlyPictureOption = Path("out/invert.html"),
     json_file: JsonOption = None,
     jobs: JobsOption = None,
@@ -50,11 +56,13 @@ def invert_command(
         at_least("--jobs", 1, jobs)
         model = load_robot(robot)
         mass = model.payload.largest_mass if payload is None else payload
-        runs = max(1, len(KINDS) * grid * grid * (seeds if spring_error else 1))
+        runs = max(1, (len(KINDS) + rehearse) * grid * grid * (seeds if spring_error else 1))
         processes = min(jobs or usable_cores(), runs)
         label = f"{count(runs, 'run')} in {count(processes, 'process', 'processes')}"
         with progress_bar(label) as progress:
-            study = study_inverses(model, mass, angle, grid, spring_error, seeds, processes, progress)
+            study = study_inverses(
+                model, mass, angle, grid, spring_error, seeds, processes, progress, rehearse
+            )
         write_invert_page(page, study)
         output.write(invert_json(study))
     human.print(_table(study))

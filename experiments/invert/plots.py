@@ -19,13 +19,13 @@ def table_rows(study: InvertStudy) -> list[list[str]]:
     """Criterion of each inverse over all positions and true robots."""
     rigid = np.median(study.criterion("rigid"))
     rows = []
-    for kind in KINDS:
-        found = study.found(kind)
+    for kind, is_rehearsed in [(kind, False) for kind in KINDS] + [(kind, True) for kind in study.rehearsed]:
+        found = study.found(kind, is_rehearsed)
         numbers = ("-",) * 3
         if len(found):
             middle = np.median(found)
             numbers = (f"{middle:.4f}", f"{found.max():.4f}", f"{middle / rigid:.4f}")
-        rows.append([FEEDFORWARDS[kind].title, *numbers])
+        rows.append([FEEDFORWARDS[kind].title + ", rehearsed" * is_rehearsed, *numbers])
     return rows
 
 
@@ -40,23 +40,32 @@ def verdict(study: InvertStudy) -> str:
         study.spring_error
     )
     over = f" (median of {of}{robots}), at worst {np.nanmax(ratio):.2f} times" if ratio.size > 1 else ""
+    again = ""
+    if study.rehearsed and np.isfinite(rehearsed := study.rehearsed_ratio).any():
+        worst = f", at worst {np.nanmax(rehearsed):.2f} times" if ratio.size > 1 else ""
+        again = (
+            " With springs learnt from the motors' torques in one motion before it is "
+            f"{np.nanmedian(rehearsed):.2f} times{worst}."
+        )
     return (
         f"After {study.angle_deg:g} degrees the wrist rings {np.nanmedian(ratio):.2f} times as much with the "
-        f"stable inverse as with the best causal one{over}. It takes {study.seconds:.1f} s to compute."
+        f"stable inverse as with the best causal one{over}. It takes {study.seconds:.1f} s to compute.{again}"
     )
 
 
 def ringing_figure(study: InvertStudy) -> go.Figure:
     """How the wrist accelerates after the motion from the first position."""
     figure = go.Figure()
-    for kind in KINDS:
-        one = study.ringing[kind][0][0]
+    curves = [(kind, FEEDFORWARDS[kind].title, study.ringing[kind][0][0], "solid") for kind in KINDS]
+    for kind, of_robots in study.rehearsed.items():
+        curves.append((kind, f"{FEEDFORWARDS[kind].title}, rehearsed", of_robots[0][0], "dot"))
+    for kind, name, one, dash in curves:
         if not len(one.times):
             continue
         size = np.linalg.norm(one.accelerations - one.accelerations.mean(axis=0), axis=1)
-        style = {"color": FEEDFORWARDS[kind].colour}
+        style = {"color": FEEDFORWARDS[kind].colour, "dash": dash}
         time = 1e3 * (one.times - one.times[0])
-        figure.add_trace(go.Scatter(x=time, y=size, name=FEEDFORWARDS[kind].title, line=style))
+        figure.add_trace(go.Scatter(x=time, y=size, name=name, line=style))
     yaxis = {"title": "acceleration in m/s<sup>2</sup>", "type": "log", "dtick": 1, "exponentformat": "none"}
     return figure.update_layout(xaxis={"title": "time after the motion in ms"}, yaxis=yaxis)
 
@@ -82,6 +91,11 @@ def motor_figure(study: InvertStudy) -> go.Figure:
 def write_invert_page(path: Path, study: InvertStudy) -> None:
     """All of it as a page that opens offline."""
     text = "C adds up how much the wrist still accelerates in the 0.9 s after it, Reiner (2010), eq. (6.1)."
+    if study.rehearsed:
+        text += (
+            " Rehearsed: the robot makes the motion once before, with the inverse of a rigid robot, and the "
+            "springs of the model become those that explain the torques of its motors."
+        )
     sections = [
         Section("All motions", text, html_table(TABLE_HEAD, table_rows(study))),
         Section(

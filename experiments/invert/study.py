@@ -9,6 +9,7 @@ import numpy as np
 
 from experiments.cli.workers import Progress, SimulationError, in_processes
 from experiments.feedforward.trial import Trial, commands, criterion
+from experiments.invert.rehearsal import REHEARSED, Rehearsal
 from robots.description.model import NUM_JOINTS, RobotModel
 from robots.description.variation import Factors, varied
 from systems.controller_model import ControllerModel
@@ -44,22 +45,33 @@ class InvertStudy:
     spring_error: float
     poses: np.ndarray  # (k, 6) rad
     ringing: Mapping[str, list[list[Ringing]]]  # by kind, of each true robot and pose
+    rehearsed: Mapping[str, list[list[Ringing]]]  # the same with springs from a rehearsal, where one was made
     example: Mapping[str, np.ndarray]  # by kind, commands (n, 3, 6) at ticks from the first pose
     seconds: float  # that the stable inverse takes
 
-    def criterion(self, kind: str) -> np.ndarray:
+    def criterion(self, kind: str, is_rehearsed: bool = False) -> np.ndarray:
         """C in m/s, shape (s, k)."""
-        return np.array([[one.criterion for one in row] for row in self.ringing[kind]])
+        of = self.rehearsed if is_rehearsed else self.ringing
+        return np.array([[one.criterion for one in row] for row in of[kind]])
 
-    def found(self, kind: str) -> np.ndarray:
+    def found(self, kind: str, is_rehearsed: bool = False) -> np.ndarray:
         """C in m/s in a row, (n,), without those for which there was no stable inverse."""
-        values = self.criterion(kind)
+        values = self.criterion(kind, is_rehearsed)
         return values[np.isfinite(values)]
 
     @property
     def ratio(self) -> np.ndarray:
         """C of the stable inverse over the best of the others, shape (s, k)."""
-        return self.criterion("stable") / np.min([self.criterion(kind) for kind in KINDS[:-1]], axis=0)
+        return self.criterion("stable") / self._best_causal
+
+    @property
+    def rehearsed_ratio(self) -> np.ndarray:
+        """C of the rehearsed stable inverse over the best of the others without rehearsal, shape (s, k)."""
+        return self.criterion("stable", True) / self._best_causal
+
+    @property
+    def _best_causal(self) -> np.ndarray:
+        return np.min([self.criterion(kind) for kind in KINDS[:-1]], axis=0)
 
 
 def study_inverses(
@@ -71,6 +83,7 @@ def study_inverses(
     seeds: int = 1,
     processes: int | None = None,
     progress: Callable[[float], None] | None = None,
+    rehearse: bool = False,
 ) -> InvertStudy:
     """Simulates all of it.
 
@@ -83,9 +96,11 @@ def study_inverses(
         seeds: how many such robots.
         processes: how many work at a time; None for one per core.
         progress: is called now and then with the share that is done, 0 to 1.
+        rehearse: whether each motion is also made once to learn the springs from the motors' torques.
 
     Raises:
-        ValueError: if a number is out of its range, or the robot or a model refuses.
+        ValueError: if a number is out of its range, a rehearsal has nothing to learn, or the robot or a model
+            refuses.
         SimulationError: if a run broke off.
     """
     if grid < 1 or seeds < 1:
@@ -94,6 +109,8 @@ def study_inverses(
         raise ValueError(f"--spring-error must be from 0 to below 1, got {spring_error:g}")
     if not 0.0 < abs(angle_deg) <= 45.0:
         raise ValueError(f"--angle must be up to 45 degrees and not zero, got {angle_deg:g}")
+    if rehearse and not spring_error:
+        raise ValueError("--rehearse learns springs that are off: give --spring-error too, such as 0.2")
     # The criterion is about the wrist, so that is the point which the stable inverse has exact.
     configs = {kind: FeedforwardConfig(kind, point="wrist") for kind in KINDS}
     for config in configs.values():  # what is impossible is refused here and not in a process
@@ -109,8 +126,16 @@ def study_inverses(
         for plant in plants
         for pose in poses
     ]
-    results = iter(in_processes(_ringing, trials, processes, progress))
+    # The longest ones, if any, come first.
+    last = trials[-len(plants) * len(poses) :]
+    rehearsals = [Rehearsal(trial, spring_error, seed) for seed, trial in enumerate(last)] if rehearse else []
+    found = in_processes(_work, [*rehearsals, *trials], processes, progress)
+    results = iter(found[len(rehearsals) :])
     ringing = {kind: [[next(results) for _ in poses] for _ in plants] for kind in KINDS}
+    rehearsed = {}
+    for kind in REHEARSED if rehearse else ():
+        of_kind = iter(each[kind] for each in found)
+        rehearsed[kind] = [[next(of_kind) for _ in poses] for _ in plants]
     example = {}
     seconds = np.nan
     for trial in trials[:: len(plants) * len(poses)]:
@@ -121,7 +146,7 @@ def study_inverses(
             continue
         if trial.config.kind == "stable":
             seconds = time.perf_counter() - started
-    return InvertStudy(robot, payload, angle_deg, spring_error, poses, ringing, example, seconds)
+    return InvertStudy(robot, payload, angle_deg, spring_error, poses, ringing, rehearsed, example, seconds)
 
 
 def example_times(trial: Trial) -> np.ndarray:
@@ -133,7 +158,7 @@ def invert_json(study: InvertStudy) -> dict[str, Any]:
     """The numbers, with the units in their names."""
     ratio = study.ratio
     found = ratio[np.isfinite(ratio)]
-    return {
+    numbers = {
         "robot": study.robot.name,
         "payload_kg": study.payload,
         "angle_deg": study.angle_deg,
@@ -146,6 +171,14 @@ def invert_json(study: InvertStudy) -> dict[str, Any]:
         "worst_ratio_stable": _of(np.max, found),
         "seconds": study.seconds if np.isfinite(study.seconds) else None,
     }
+    if study.rehearsed:
+        again = study.rehearsed_ratio[np.isfinite(study.rehearsed_ratio)]
+        numbers["rehearsed"] = {
+            "criterion": {kind: _of(np.median, study.found(kind, True)) for kind in REHEARSED},
+            "ratio_stable": _of(np.median, again),
+            "worst_ratio_stable": _of(np.max, again),
+        }
+    return numbers
 
 
 def _of(function: Callable[[np.ndarray], Any], values: np.ndarray) -> float | None:
@@ -158,13 +191,18 @@ def _true_robot(robot: RobotModel, share: float, seed: int) -> RobotModel:
     return varied(robot, Factors(gears[:, 0], bearings, beams))
 
 
-def _ringing(trial: Trial, progress: Progress) -> Ringing:
+def _work(job: Trial | Rehearsal, progress: Progress) -> Any:
+    nothing = Ringing(np.zeros(0), np.zeros((0, 3)))
+    kind = job.config.kind if isinstance(job, Trial) else "rehearsal"
     try:
-        return Ringing(*trial.ringing(progress))
+        if isinstance(job, Rehearsal):
+            found = job.run(progress)
+            return {kind: Ringing(*found[kind]) if kind in found else nothing for kind in REHEARSED}
+        return Ringing(*job.ringing(progress))
     except ValueError:  # no bounded motion, or one that begins long before the path
-        return Ringing(np.zeros(0), np.zeros((0, 3)))
+        return nothing
     except RuntimeError as error:
-        raise SimulationError(f"{trial.config.kind}: {' '.join(str(error).split())}") from error
+        raise SimulationError(f"{kind}: {' '.join(str(error).split())}") from error
 
 
 def ahead_of_rigid(study: InvertStudy, kind: str) -> np.ndarray:

@@ -31,11 +31,25 @@ def test_the_stable_inverse_of_a_kr210_leaves_a_quarter_of_the_best_causal_one(t
     assert opened.dom.count("js-plotly-plot") >= 2
 
 
+@pytest.mark.slow
+def test_after_a_rehearsal_wrong_springs_cost_little(tmp_path: Path):
+    """Of the robot and motion whose springs made the stable inverse worse than a causal one."""
+    result = run(
+        tmp_path, "--robot=kr210", "--grid=1", "--spring-error=0.2", "--seeds=2", "--rehearse", "--json=-"
+    )
+    assert result.exit_code == 0, result.output
+    numbers = json.loads(result.stdout)
+    assert numbers["rehearsed"]["worst_ratio_stable"] <= 0.6
+    assert numbers["rehearsed"]["ratio_stable"] < numbers["ratio_stable"]
+    assert "rehearsed" in (tmp_path / "invert.html").read_text()
+
+
 REFUSED = {
     "robot": ("--robot=kr211", "robot 'kr211': no file"),
     "parts": ("--robot=kr16-realistic", "have parts beyond springs, dampers and friction"),
     "grid": ("--grid=0", "--grid and --seeds must be at least 1, got 0 and 1"),
     "springs": ("--spring-error=1", "--spring-error must be from 0 to below 1, got 1"),
+    "rehearsal": ("--rehearse", "--rehearse learns springs that are off: give --spring-error too"),
     "angle": ("--angle=0", "--angle must be up to 45 degrees and not zero, got 0"),
     "jobs": ("--jobs=0", "--jobs must be at least 1, got 0"),
 }  # fmt: skip
