@@ -75,7 +75,7 @@ def feedforward_command(
         mass = model.payload.largest_mass if payload is None else payload
         page = stack.enter_context(staged_file(out / PAGE))
         stack.enter_context(output.staged())
-        runs = len(KINDS) * (1 + len(ANGLES_DEG) * grid * grid)
+        runs = len(KINDS) * (2 + len(ANGLES_DEG) * grid * grid)
         processes = min(jobs or usable_cores(), max(runs, 1))
         label = f"{count(runs, 'run')} in {count(processes, 'process', 'processes')}"
         with progress_bar(label) as progress:

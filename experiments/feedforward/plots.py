@@ -1,11 +1,13 @@
 """The pictures of a feedforward study, as in Reiner (2010), figures 6.1 to 6.8, and its page."""
 
+from collections.abc import Mapping
 from pathlib import Path
 
 import numpy as np
 import plotly.graph_objects as go
 from plotly.subplots import make_subplots
 
+from experiments.feedforward.rectangle import Deviation
 from experiments.feedforward.study import KINDS, FeedforwardStudy
 from experiments.feedforward.trial import RINGING
 from experiments.feedforward.two_joint_arm import TIMES, Solution, TwoJointArm
@@ -58,14 +60,14 @@ def ratio_surface_figure(study: FeedforwardStudy, angle_deg: int) -> go.Figure:
     return figure.update_layout(scene=_scene({"title": "ratio", "rangemode": "tozero"}))
 
 
-def deviation_figure(study: FeedforwardStudy) -> go.Figure:
-    """How far the tip is from the rectangle over the time."""
+def deviation_figure(paths: Mapping[str, Deviation]) -> go.Figure:
+    """How far the tip is from a rectangle over the time."""
     figure = go.Figure()
-    for kind, path in study.path.items():
+    for kind, path in paths.items():
         line = {"color": COLORS[kind]}
         figure.add_trace(go.Scatter(x=path.time, y=1e3 * path.distance, name=LABELS[kind], line=line))
     # Decades alone, where there are many.
-    has_decades = study.path["elastic_structure"].max < 0.01 * study.path["rigid"].max
+    has_decades = paths["elastic_structure"].max < 0.01 * paths["rigid"].max
     yaxis = {
         "title": "distance in mm",
         "type": "log",
@@ -75,9 +77,10 @@ def deviation_figure(study: FeedforwardStudy) -> go.Figure:
     return figure.update_layout(xaxis={"title": "time in s"}, yaxis=yaxis)
 
 
-def table_rows(study: FeedforwardStudy) -> list[list[str]]:
+def table_rows(study: FeedforwardStudy, is_fast: bool = False) -> list[list[str]]:
     """The deviations of table 6.1, relative to the rigid model, and the time of a tick."""
-    rigid = study.path["rigid"]
+    paths = study.fast if is_fast else study.path
+    rigid = paths["rigid"]
     return [
         [
             LABELS[kind],
@@ -88,7 +91,7 @@ def table_rows(study: FeedforwardStudy) -> list[list[str]]:
             f"{1e3 * path.dynamic:.4f}",
             f"{1e6 * study.tick[kind]:.0f}",
         ]
-        for kind, path in study.path.items()
+        for kind, path in paths.items()
     ]
 
 
@@ -98,7 +101,10 @@ def study_verdict(study: FeedforwardStudy) -> str:
     sentences = [
         f"On the rectangle the tip is off by {largest['rigid']:.2g} mm with a rigid model, by "
         f"{largest['flexible_joint']:.2g} mm with elastic joints in it, and by "
-        f"{largest['elastic_structure']:.2g} mm with the elastic structure{_error_note(study)}."
+        f"{largest['elastic_structure']:.2g} mm with the elastic structure{_error_note(study)}.",
+        "On a small one with edges as fast as the joints can go it moves by "
+        f"{1e3 * study.fast['rigid'].dynamic:.2g}, {1e3 * study.fast['flexible_joint'].dynamic:.2g} and "
+        f"{1e3 * study.fast['elastic_structure'].dynamic:.2g} mm from where its sag has it.",
     ]
     sentences += [
         f"After {angle} degrees the wrist rings {np.median(study.ratio(angle)):.2f} times as much as without "
@@ -135,9 +141,16 @@ def write_study_page(path: Path, study: FeedforwardStudy) -> None:
         Section(
             "Distance from the rectangle",
             "Of the true tip, without a camera; the feedforward has to do it alone.",
-            deviation_figure(study),
+            deviation_figure(study.path),
             380,
         ),
+        Section(
+            "Fast edges",
+            "A quarter of the size, the edges as fast as the joints can go: what excites the structure. The "
+            "dynamic part is how far the tip goes from where its sag at rest has it.",
+            html_table(TABLE_HEAD[:-1], [row[:-1] for row in table_rows(study, is_fast=True)]),
+        ),
+        Section("Distance from the rectangle with fast edges", "", deviation_figure(study.fast), 380),
     ]
     for angle in study.criterion:
         sections += [

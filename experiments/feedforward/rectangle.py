@@ -21,7 +21,9 @@ from systems.reference.shapes import Rectangle, Waypoint
 
 LAW = "open_loop"  # no camera: the feedforward has to do it alone
 PACE = 8.0  # 1/s^2, k_a: an edge takes 1.2 s, with sin^2 timing a second
+FAST_PACE, FAST_SIZE = 500.0, 0.25  # of the one that excites: as fast as joints can, a quarter as large
 _FASTEST = 0.95  # share of the largest joint speeds: a robot that is too slow for the pace takes longer
+_RISE = 0.1  # s, the least from rest to the largest speed of a joint
 _SAMPLES = 400  # of the path, for that
 DEPTH, WIDTH = 0.2, 0.4  # of the reach, the edges away from the robot and across
 SETTLE, DWELL = 1.0, 0.5  # s at rest: the arm is first wound up, at the end it rings
@@ -38,6 +40,7 @@ class RectangleTrial:
     config: FeedforwardConfig
     plant: RobotModel | None = None  # in the station, if it is another one than the model's
     timing: str = "polynomial"  # of `systems.reference.timing.TIMINGS`
+    is_fast: bool = False  # small, with edges as fast as the joints can go, in place of wide and calm
 
     def run(self, progress: Progress | None = None) -> "Deviation":
         """Simulates it with an elastic structure.
@@ -98,8 +101,8 @@ def rectangle_scenario(trial: RectangleTrial) -> Scenario:
     home = working_position(trial.robot)
     drive = scenario.station.drive
     reference = ReferenceConfig(
-        Rectangle(rectangle(trial.robot, home)),
-        acceleration=PACE,
+        Rectangle(rectangle(trial.robot, home, FAST_SIZE if trial.is_fast else 1.0)),
+        acceleration=FAST_PACE if trial.is_fast else PACE,
         timing=trial.timing,
         settle=SETTLE,
         dwell=DWELL,
@@ -111,7 +114,7 @@ def rectangle_scenario(trial: RectangleTrial) -> Scenario:
 
 
 def feasible_pace(robot: RobotModel, home: np.ndarray, reference: ReferenceConfig) -> float:
-    """The acceleration along a path, in 1/s^2, lowered where a joint would be too slow for it.
+    """The acceleration along a path, in 1/s^2, lowered where a joint would be too slow or too sudden for it.
 
     Args:
         robot: which follows it.
@@ -124,8 +127,10 @@ def feasible_pace(robot: RobotModel, home: np.ndarray, reference: ReferenceConfi
         q = inverse_kinematics(robot).along(path.sample(times)[0], home)
     except ValueError:
         return reference.acceleration
-    used = float((np.abs(np.diff(q, axis=0)) / np.diff(times)[:, None] / robot.speed).max())
-    return reference.acceleration * min(1.0, _FASTEST / used) ** 2
+    step = times[1] - times[0]
+    speed = float((np.abs(np.diff(q, axis=0)) / step / robot.speed).max())
+    acceleration = float((np.abs(np.diff(q, 2, axis=0)) / step**2 / (robot.speed / _RISE)).max())
+    return reference.acceleration * min(1.0, (_FASTEST / speed) ** 2, 1.0 / acceleration)
 
 
 def working_position(robot: RobotModel) -> np.ndarray:
@@ -148,10 +153,10 @@ def working_position(robot: RobotModel) -> np.ndarray:
     return np.clip(q, robot.lower, robot.upper)
 
 
-def rectangle(robot: RobotModel, home: np.ndarray) -> list[Waypoint]:
+def rectangle(robot: RobotModel, home: np.ndarray, size: float = 1.0) -> list[Waypoint]:
     """A level rectangle around the tip's place at a configuration (rad, shape (6,)), closed."""
     X_WE = Kinematics(robot).forward(home)
     zyx_deg = np.rad2deg(zyx_from_rotation(X_WE[:3, :3]))
-    half = 0.5e3 * reach(robot) * np.array([DEPTH, WIDTH, 0.0])
+    half = 0.5e3 * size * reach(robot) * np.array([DEPTH, WIDTH, 0.0])
     signs = [(-1, -1), (1, -1), (1, 1), (-1, 1), (-1, -1)]
     return [Waypoint(1e3 * X_WE[:3, 3] + half * np.array([x, y, 0.0]), zyx_deg) for x, y in signs]

@@ -32,6 +32,7 @@ class FeedforwardStudy:
     axis_3: np.ndarray  # (n,) rad
     criterion: Mapping[int, Mapping[str, np.ndarray]]  # by angle in degrees and feedforward, (n, n) in m/s
     path: Mapping[str, Deviation]  # of the rectangle, by feedforward
+    fast: Mapping[str, Deviation]  # of the small one with fast edges
     tick: Mapping[str, float]  # s, the median time of a tick with inverse kinematics, by feedforward
 
     def ratio(self, angle_deg: int) -> np.ndarray:
@@ -78,8 +79,11 @@ def study_feedforward(
     axis_2, axis_3 = np.linspace(lower[1:3], upper[1:3] - np.deg2rad(max(ANGLES_DEG)), grid).T
     starts = [np.array([0.0, q2, q3, 0.0, 0.0, 0.0]) for q2 in axis_2 for q3 in axis_3]
     jobs: list[RectangleTrial | Trial] = [
-        RectangleTrial(robot, payload, configs[kind], realistic, timing) for kind in KINDS
+        RectangleTrial(robot, payload, configs[kind], realistic, timing, is_fast)
+        for is_fast in (False, True)
+        for kind in KINDS
     ]
+    rectangles = len(jobs)
     for angle in ANGLES_DEG:
         for kind in KINDS:
             jobs += [
@@ -88,7 +92,8 @@ def study_feedforward(
             ]
     results = in_processes(_work, jobs, processes, progress)
     path: dict[str, Any] = dict(zip(KINDS, results[: len(KINDS)], strict=True))
-    values = np.array(results[len(KINDS) :], dtype=float).reshape(len(ANGLES_DEG), len(KINDS), grid, grid)
+    fast: dict[str, Any] = dict(zip(KINDS, results[len(KINDS) : rectangles], strict=True))
+    values = np.array(results[rectangles:], dtype=float).reshape(len(ANGLES_DEG), len(KINDS), grid, grid)
     criterion = {
         angle: dict(zip(KINDS, of_angle, strict=True))
         for angle, of_angle in zip(ANGLES_DEG, values, strict=True)
@@ -96,7 +101,9 @@ def study_feedforward(
     # Alone on a core, after the rest is done.
     tick = {kind: tick_time(RectangleTrial(robot, payload, configs[kind], timing=timing)) for kind in KINDS}
     plant = "realistic" if realistic else "exact"
-    return FeedforwardStudy(robot, payload, plant, config, timing, axis_2, axis_3, criterion, path, tick)
+    return FeedforwardStudy(
+        robot, payload, plant, config, timing, axis_2, axis_3, criterion, path, fast, tick
+    )
 
 
 def _work(job: RectangleTrial | Trial, progress: Progress) -> Deviation | float:
@@ -108,20 +115,16 @@ def _work(job: RectangleTrial | Trial, progress: Progress) -> Deviation | float:
 
 def study_json(study: FeedforwardStudy) -> dict[str, Any]:
     """The numbers, with the units in their names; deviations relative to the rigid model."""
-    rigid = study.path["rigid"]
     return {
         "robot": study.robot.name,
         "payload_kg": study.payload,
         "plant": study.plant,
         "timing": study.timing,
         "stiffness_error": study.config.stiffness_error,
-        "path": {
-            "integral": {kind: one.integral / rigid.integral for kind, one in study.path.items()},
-            "max": {kind: one.max / rigid.max for kind, one in study.path.items()},
-            "max_mm": {kind: 1e3 * one.max for kind, one in study.path.items()},
-        },
-        "sag": _part(study, "sag"),
-        "dynamic": _part(study, "dynamic"),
+        "path": _deviations(study.path),
+        "sag": _part(study.path, "sag"),
+        "dynamic": _part(study.path, "dynamic"),
+        "fast_edges": {**_deviations(study.fast), "dynamic": _part(study.fast, "dynamic")},
         "criterion": {
             str(angle): {
                 "median_ratio": float(np.median(study.ratio(angle))),
@@ -135,9 +138,18 @@ def study_json(study: FeedforwardStudy) -> dict[str, Any]:
     }
 
 
-def _part(study: FeedforwardStudy, name: str) -> dict[str, dict[str, float]]:
-    """Of the deviation from the rectangle a part, in mm and relative to the rigid model."""
-    values = {kind: getattr(one, name) for kind, one in study.path.items()}
+def _deviations(path: Mapping[str, Deviation]) -> dict[str, dict[str, float]]:
+    rigid = path["rigid"]
+    return {
+        "integral": {kind: one.integral / rigid.integral for kind, one in path.items()},
+        "max": {kind: one.max / rigid.max for kind, one in path.items()},
+        "max_mm": {kind: 1e3 * one.max for kind, one in path.items()},
+    }
+
+
+def _part(path: Mapping[str, Deviation], name: str) -> dict[str, dict[str, float]]:
+    """Of the deviation from a rectangle a part, in mm and relative to the rigid model."""
+    values = {kind: getattr(one, name) for kind, one in path.items()}
     return {
         "mm": {kind: 1e3 * value for kind, value in values.items()},
         "relative": {kind: value / values["rigid"] for kind, value in values.items()},

@@ -9,7 +9,12 @@ import pytest
 from typer.testing import Result
 
 from experiments.feedforward.command import PAGE
-from experiments.feedforward.rectangle import RectangleTrial, rectangle, working_position
+from experiments.feedforward.rectangle import (
+    RectangleTrial,
+    rectangle,
+    rectangle_scenario,
+    working_position,
+)
 from experiments.feedforward.study import KINDS
 from experiments.feedforward.trial import (
     RINGING,
@@ -22,6 +27,7 @@ from robots.description.model import load_robot, shipped_robots
 from robots.dynamics.newton_inverse import inverse_kinematics
 from robots.kinematics.forward import Kinematics
 from systems.feedforward import FeedforwardConfig
+from systems.reference.paths import make_path
 from tests.experiments.browser import open_page
 from tests.experiments.commands import files, refusal, truetip
 
@@ -49,6 +55,7 @@ def test_the_numbers_are_those_of_the_runs_and_the_page_opens(tmp_path: Path):
     assert numbers["sag"]["mm"]["rigid"] == pytest.approx(1e3 * rigid.distance[0])
     moved = np.linalg.norm(flexible.gap - flexible.gap[0], axis=1)
     assert numbers["dynamic"]["mm"]["flexible_joint"] == pytest.approx(1e3 * moved.max())
+    assert set(numbers["fast_edges"]) == {"integral", "max", "max_mm", "dynamic"}
     for angle in ("5", "20"):
         found = numbers["criterion"][angle]
         assert found["positions"] == 4
@@ -73,6 +80,30 @@ def test_the_deviations_from_a_rectangle_are_those_of_table_6_1_or_less():
     # With all elastic parameters a fifth off, to either side.
     for error in (0.2, -0.2):
         assert relative("elastic_structure", error) <= min(0.45, flexible)
+
+
+@pytest.mark.slow
+def test_fast_edges_excite_where_the_wide_rectangle_mostly_sags():
+    wide, fast = (
+        RectangleTrial(ROBOT, 16.0, FeedforwardConfig("rigid"), is_fast=x).run() for x in (False, True)
+    )
+    assert fast.dynamic > 3.0 * fast.sag
+    assert wide.dynamic < 2.0 * wide.sag
+
+
+@pytest.mark.parametrize("name", ["kr16", "kr210", "irb1200"])
+def test_fast_edges_use_a_joint_to_its_limit_and_none_beyond(name: str):
+    robot = load_robot(name)
+    reference = rectangle_scenario(
+        RectangleTrial(robot, 0.0, FeedforwardConfig("rigid"), is_fast=True)
+    ).reference
+    path = make_path(reference)
+    step = 1e-3
+    times = np.arange(path.path_start, path.dwell_start, step)
+    q = inverse_kinematics(robot).along(path.sample(times)[0], working_position(robot))
+    speed = (np.abs(np.diff(q, axis=0)) / step / robot.speed).max()
+    rise = (np.abs(np.diff(q, 2, axis=0)) / step**2 / (robot.speed / 0.1)).max()
+    assert max(speed / 0.95, rise) == pytest.approx(1.0, abs=0.03)
 
 
 @pytest.mark.slow
