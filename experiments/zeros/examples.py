@@ -7,6 +7,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from experiments.report.plot_page import Section, html_table
+from experiments.zeros import low_pass
 from experiments.zeros.driven_beam import MODELS, TIMES, DrivenBeam, deviation
 from experiments.zeros.linear_arm import (
     DISTANCE,
@@ -16,7 +17,14 @@ from experiments.zeros.linear_arm import (
     virtual_outputs,
 )
 from experiments.zeros.linear_arm import TIMES as ARM_TIMES
-from experiments.zeros.plots import arm_locus_figure, beam_figure, locus_figure, plane_figure, time_figure
+from experiments.zeros.plots import (
+    arm_locus_figure,
+    beam_figure,
+    gain_figure,
+    locus_figure,
+    plane_figure,
+    time_figure,
+)
 from experiments.zeros.study import BEAM_MODES, one_json, two_joint_arm_limit, two_joint_arm_zeros
 from robots.dynamics.modal_beam import BOUNDARIES, ModalBeam
 from robots.dynamics.transmission_zeros import Zeros
@@ -211,8 +219,34 @@ def driven_beam() -> Example:
     return Example(numbers, verdict, [Section("Deviation of the end of the beam", note, figure, 420)])
 
 
+def prefilter() -> Example:
+    """Reiner (2010), section 3.4, figure 3.2: which low-pass may stand before an inverse."""
+    beyond = {name: low_pass.overshoot(name) for name in low_pass.NAMES}
+    at = 5.0 * low_pass.HERTZ
+    left = {name: float(low_pass.gain(name, np.array([at]))[0]) for name in low_pass.NAMES}
+    verdict = (
+        f"Low-pass filters of order {low_pass.ORDER} with -3 dB at {low_pass.HERTZ:g} Hz overshoot a step by "
+        + ", ".join(f"{value:.1%} ({name})" for name, value in beyond.items())
+        + ": before an inverse the first two will do, of which Bessel's is the steeper."
+    )
+    answers = {name: low_pass.step_response(name) for name in low_pass.NAMES}
+    rows = [[name, f"{beyond[name]:.2%}", f"{20.0 * np.log10(left[name]):.1f}"] for name in low_pass.NAMES]
+    sections = [
+        Section(
+            "Answer to a step",
+            "Reiner (2010), figure 3.2(a).",
+            time_figure(low_pass.TIMES, answers, "share of the step"),
+            420,
+        ),
+        Section("Gain", "Figure 3.2(b).", gain_figure(), 420),
+        Section("In numbers", "", html_table(("filter", "overshoot", f"dB at {at:g} Hz"), rows)),
+    ]
+    numbers = {"overshoot": beyond, "gain_at_100_hz": left, "order": low_pass.ORDER, "hertz": low_pass.HERTZ}
+    return Example(numbers, verdict, sections)
+
+
 EXAMPLES: dict[str, Callable[[], Example]] = {
-    each.__name__: each for each in (two_joint_arm, beam, driven_beam, observer, virtual_output)
+    each.__name__: each for each in (two_joint_arm, beam, driven_beam, observer, virtual_output, prefilter)
 }
 
 

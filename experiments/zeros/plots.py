@@ -5,6 +5,7 @@ from collections.abc import Callable, Mapping
 import numpy as np
 import plotly.graph_objects as go
 
+from experiments.zeros import low_pass
 from experiments.zeros.study import ZeroStudy
 from robots.dynamics.modal_beam import ModalBeam
 from robots.dynamics.transmission_zeros import Zeros
@@ -89,3 +90,13 @@ def time_figure(times: np.ndarray, curves: Mapping[str, np.ndarray], title: str)
         [go.Scatter(x=times[every], y=curve[every], name=name) for name, curve in curves.items()]
     )
     return figure.update_layout(xaxis={"title": "time in s"}, yaxis={"title": title})
+
+
+def gain_figure() -> go.Figure:
+    """What low-pass filters leave of an amplitude, over the frequency; Reiner (2010), figure 3.2(b)."""
+    hertz = low_pass.FREQUENCIES
+    curves = {name: 20.0 * np.log10(low_pass.gain(name, hertz)) for name in low_pass.NAMES}
+    figure = go.Figure([go.Scatter(x=hertz, y=curve, name=name) for name, curve in curves.items()])
+    figure.add_vline(x=low_pass.HERTZ, line={"dash": "dot", "width": 1})
+    xaxis = {"title": "frequency in Hz", "type": "log", "tickvals": [1, 10, 20, 100]}
+    return figure.update_layout(xaxis=xaxis, yaxis={"title": "gain in dB", "range": [-80.0, 3.0]})

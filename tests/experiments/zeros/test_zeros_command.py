@@ -88,7 +88,7 @@ REFUSED = {
     "robot": ("--robot=kr211", "robot 'kr211': no file"),
     "example": (
         "--example=bridge",
-        "--example must be one of two_joint_arm, beam, driven_beam, observer, virtual_output, got 'bridge'",
+        "must be one of two_joint_arm, beam, driven_beam, observer, virtual_output, prefilter, got 'bridge'",
     ),
     "rigid": ("--elasticity=rigid", "elasticity must be joints or structure"),
     "grid": ("--grid=1", "--grid must be at least 2, got 1"),
