@@ -74,7 +74,8 @@ def _table(study: InvertStudy) -> Table:
     title = f"{study.robot.name}, {study.payload:g} kg: the wrist after {study.angle_deg:g} degrees"
     table = Table(box=box.SIMPLE_HEAD, title=escape(title), title_justify="left", title_style="italic")
     for name in TABLE_HEAD:
-        table.add_column(name, justify="left" if name == TABLE_HEAD[0] else "right", no_wrap=True)
+        is_first = name == TABLE_HEAD[0]
+        table.add_column(name, justify="left" if is_first else "right", no_wrap=not is_first)
     for row in table_rows(study):
         table.add_row(*row)
     return table

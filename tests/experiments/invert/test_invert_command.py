@@ -33,14 +33,12 @@ def test_the_stable_inverse_of_a_kr210_leaves_a_quarter_of_the_best_causal_one(t
 
 @pytest.mark.slow
 def test_after_a_rehearsal_wrong_springs_cost_little(tmp_path: Path):
-    """Of the robot and motion whose springs made the stable inverse worse than a causal one."""
-    result = run(
-        tmp_path, "--robot=kr210", "--grid=1", "--spring-error=0.2", "--seeds=2", "--rehearse", "--json=-"
-    )
+    """Which otherwise leave no more of its advantage over a causal one."""
+    result = run(tmp_path, "--robot=kr210", "--grid=1", "--spring-error=0.2", "--rehearse", "--json=-")
     assert result.exit_code == 0, result.output
     numbers = json.loads(result.stdout)
-    assert numbers["rehearsed"]["worst_ratio_stable"] <= 0.6
-    assert numbers["rehearsed"]["ratio_stable"] < numbers["ratio_stable"]
+    assert numbers["ratio_stable"] > 0.6
+    assert numbers["rehearsed"]["ratio_stable"] <= 0.4
     assert "rehearsed" in (tmp_path / "invert.html").read_text()
 
 
