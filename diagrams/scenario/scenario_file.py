@@ -14,6 +14,24 @@ class ScenarioError(ConfigurationError):
     """A scenario is missing, cannot be read, or asks for something impossible."""
 
 
+class OptionSetting(str):
+    """A change such as ``reference.laps=2`` that another option than ``--set`` has made; messages name it."""
+
+    option: str
+
+    def __new__(cls, key: str, value: object, option: str) -> "OptionSetting":
+        """The change ``key=value`` by an option such as ``--laps``."""
+        # An empty name is a name that does not exist, and not what YAML makes of nothing.
+        made = super().__new__(cls, f"{key}={repr('') if value == '' else value}")
+        made.option = f"{option} {value}"
+        return made
+
+    def __getnewargs__(self) -> tuple[str, str, str]:
+        """For other processes."""
+        key, _, value = self.partition("=")
+        return key, value, self.option.partition(" ")[0]
+
+
 def shipped_scenarios() -> list[str]:
     """The names of the scenarios that come with the package."""
     names = (entry.name for entry in _folder().iterdir())
@@ -55,8 +73,9 @@ def _find(name: str, beside: Path) -> tuple[Path, str]:
     path = beside / name if is_file else Path(str(_folder() / f"{name}.yaml"))
     if not path.is_file():
         allowed, guess = ", ".join(shipped_scenarios()), did_you_mean(name, shipped_scenarios())
+        missing = f"no file {path}" if is_file else "no file of that name comes with truetip"
         raise ScenarioError(
-            f"scenario '{name}': no file {path}; give the path of a YAML file or one of {allowed}{guess}"
+            f"scenario '{name}': {missing}; give the path of a YAML file or one of {allowed}{guess}"
         )
     return path, f"scenario {path if is_file else name}"
 
@@ -64,7 +83,7 @@ def _find(name: str, beside: Path) -> tuple[Path, str]:
 def _setting(setting: str) -> Node:
     """A change as a tree with one entry."""
     key, separator, value = setting.partition("=")
-    label = f"--set {setting}"
+    label = setting.option if isinstance(setting, OptionSetting) else f"--set {setting}"
     if not separator or not key.strip():
         raise ScenarioError(f"{label}: must look like station.camera.delay=0.008")
     node = parse(value, label, has_lines=False)

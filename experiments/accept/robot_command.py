@@ -5,6 +5,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Annotated, Any
 
+import numpy as np
 import typer
 from rich import box
 from rich.markup import escape
@@ -28,6 +29,7 @@ from experiments.cli.prepare import Prepared, prepare, simulated_only
 from experiments.cli.staging import PAGE, staged_file
 from experiments.comparison.compare import RunJob, run_job
 from experiments.report.style import law_title
+from robots.dynamics.newton_inverse import inverse_kinematics
 
 
 def accept_robot_command(
@@ -64,6 +66,7 @@ def accept_robot_command(
         masses = _numbers("--loads", loads, 0.0, 1000.0) or [prepared.scenario.station.payload]
         shares = _numbers("--speeds", speeds, 1.0, 100.0)
         cycle = Cycle(cube_poses(prepared.scenario, 1e-3 * cube), dwell, 1e-3 * band)
+        _check_reach(prepared, cycle, cube)
         page = stack.enter_context(staged_file(out, *PAGE))
         stack.enter_context(output.staged())
         rows: list[Row] = []
@@ -102,6 +105,16 @@ def _row(
     run = run_job(RunJob(square, prepared.robot, law, scenario.seed), lambda x: progress(1.0 + x))
     found, along = visits(visited, poses, cycle, cycles), path_results(run, square, cycle)
     return Row(mass, 100.0 * speed, pose_results(found, cycle) | along.results, found, along)
+
+
+def _check_reach(prepared: Prepared, cycle: Cycle, cube: float) -> None:
+    """Raises ValueError if the robot cannot reach a pose: sooner, and in other words, than a run does."""
+    solver, near = inverse_kinematics(prepared.robot), np.deg2rad(prepared.scenario.home_deg)
+    for number, X in enumerate(cycle.poses, 1):
+        try:
+            solver.nearest(X, near)
+        except ValueError as error:
+            raise ValueError(f"--cube {cube:g}: P{number} of the cube cannot be reached: {error}") from error
 
 
 def _numbers(option: str, text: str | None, low: float, high: float) -> list[float]:

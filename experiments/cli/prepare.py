@@ -9,7 +9,7 @@ from rich.console import Console
 from diagrams.runs.simulation import Experiment, nominal_robot
 from diagrams.scenario.carried import HOME, PATH, carried_over
 from diagrams.scenario.scenario import Scenario, ScenarioError, load_scenario, scenario_text
-from diagrams.scenario.scenario_file import read_scenario_nodes, stated_keys
+from diagrams.scenario.scenario_file import OptionSetting, read_scenario_nodes, stated_keys
 from robots.description.foreign_sources import foreign_sources_note
 from robots.description.model import RobotModel, load_robot
 from robots.kinematics.error_kinematics import ErrorKinematics
@@ -171,14 +171,14 @@ def option_settings(
     laps: int | None = None,
 ) -> list[str]:
     """The changes of a scenario that options of their own make, behind those of --set."""
-    own = {
-        "law": law,
-        "servo.feedforward.kind": feedforward,
-        "station.camera.kind": camera,
-        "reference.laps": laps,
-    }
-    # An empty name is a name that does not exist, and not what YAML makes of nothing.
-    return [
-        *(settings or []),
-        *(f"{key}={repr('') if value == '' else value}" for key, value in own.items() if value is not None),
-    ]
+    own = (
+        OptionSetting(key, value, option)
+        for key, value, option in (
+            ("law", law, "--law"),
+            ("servo.feedforward.kind", feedforward, "--feedforward"),
+            ("station.camera.kind", camera, "--camera"),
+            ("reference.laps", laps, "--laps"),
+        )
+        if value is not None
+    )
+    return [*(settings or []), *own]

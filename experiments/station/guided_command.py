@@ -16,6 +16,7 @@ from diagrams.record.log import RunLog
 from diagrams.record.run_record import RunRecord
 from diagrams.runs.real_time import RealTimeRecord
 from diagrams.scenario.scenario import load_scenario, scenario_text
+from diagrams.scenario.scenario_file import OptionSetting
 from experiments.cli.console import BROKEN_OFF, count, progress_bar, refusing
 from experiments.cli.ending import asking
 from experiments.cli.prepare import Prepared
@@ -44,7 +45,7 @@ def on_station(
     is_guided = with_cell or station in LINK_NAMES
     name = scenario or (_CELLS.get(station or "", "cell") if is_guided else "misaligned")
     kind = station or (load_scenario(name, settings).station.link.kind if with_cell else None)
-    return name, [*settings, *([f"station.kind={kind}"] if kind else [])]
+    return name, [*settings, *([OptionSetting("station.kind", kind, "--station")] if kind else [])]
 
 
 def ask_before_moving(console: Console, prepared: Prepared, is_agreed: bool) -> None:

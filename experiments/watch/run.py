@@ -94,7 +94,10 @@ def watch_simulated(scenario: Scenario, robot: RobotModel, law: str, progress: P
     experiment = Experiment(scenario, law, robot)
     watch = experiment.watch
     if watch is None:
-        raise ValueError("watch: the scenario has no whole images; set station.overview.enabled=true")
+        raise ValueError(
+            "watch: no camera of the scenario takes images of the whole cell; use --scenario watched or "
+            "--set station.overview.enabled=true"
+        )
     experiment.advance(progress=progress)
     times, data = experiment.watched()
     step = max(1, round(_EVERY / scenario.station.period))

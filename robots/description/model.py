@@ -282,8 +282,9 @@ def _find(name: str, beside: Path) -> tuple[Path, str]:
     is_file = name.endswith((".yaml", ".yml")) or is_urdf(name)
     path = beside / name if is_file else Path(str(_data_folder() / f"{name}.yaml"))
     if not path.is_file():
+        missing = f"no file {path}" if is_file else "no file of that name comes with truetip"
         raise RobotFileError(
-            f"robot '{name}': no file {path}; "
+            f"robot '{name}': {missing}; "
             f"give the path of a YAML file or a URDF, or one of {', '.join(shipped_robots())}"
             f"{did_you_mean(name, shipped_robots())}"
         )

@@ -49,13 +49,15 @@ def data_file(name: str, kind: str) -> Path:
         ValueError: if there is no such file.
     """
     folder = files("systems.vision") / "data"
-    path = Path(name) if name.endswith((".yaml", ".yml")) else Path(str(folder / f"{name}_{kind}.yaml"))
+    is_file = name.endswith((".yaml", ".yml"))
+    path = Path(name) if is_file else Path(str(folder / f"{name}_{kind}.yaml"))
     if not path.is_file():
         ending = f"_{kind}.yaml"
         shipped = sorted(
             entry.name.removesuffix(ending) for entry in folder.iterdir() if entry.name.endswith(ending)
         )
+        missing = f"no file {path}" if is_file else "no file of that name comes with truetip"
         raise ValueError(
-            f"{kind} '{name}': no file {path}; give the path of a YAML file or one of {', '.join(shipped)}"
+            f"{kind} '{name}': {missing}; give the path of a YAML file or one of {', '.join(shipped)}"
         )
     return path

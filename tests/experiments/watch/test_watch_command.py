@@ -114,7 +114,7 @@ def test_what_is_wrong_with_a_recording_is_said_in_one_line(recording: Path, tmp
         (["--images", "none"], "--images none: must be a folder with joints.csv"),
         (["--minutes", "-1"], "--minutes must not be negative, got -1"),
         (["--set", "station.kind=egm"], "station.overview.enabled needs station.kind=simulated, got egm"),
-        (["--scenario", "nominal"], "the scenario has no whole images; set station.overview.enabled=true"),
+        (["--scenario", "nominal"], "takes images of the whole cell; use --scenario watched"),
     ],
 )
 def test_wrong_arguments_are_refused_in_one_line(

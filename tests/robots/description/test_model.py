@@ -158,10 +158,14 @@ def test_a_file_that_is_no_mapping_in_yaml_is_refused_in_one_line(tmp_path: Path
     assert "\n" not in str(refused.value)
 
 
-@pytest.mark.parametrize("name", ["irb9999", "nowhere/robot.yaml"])
-def test_a_missing_robot_is_refused_with_the_names_of_those_there_are(name: str):
+@pytest.mark.parametrize(
+    ("name", "missing"),
+    [
+        ("irb9999", "no file of that name comes with truetip"),
+        ("nowhere/robot.yaml", "no file nowhere/robot.yaml"),
+    ],
+)
+def test_a_missing_robot_is_refused_with_the_names_of_those_there_are(name: str, missing: str):
     names = ", ".join(shipped_robots())
-    with pytest.raises(
-        RobotFileError, match=f"^robot '{name}': no file .*; give the path .* one of {names}$"
-    ):
+    with pytest.raises(RobotFileError, match=f"^robot '{name}': {missing}; give the path .* one of {names}$"):
         load_robot(name)

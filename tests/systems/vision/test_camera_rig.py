@@ -86,5 +86,5 @@ def test_a_wrong_cell_file_is_refused_by_file_and_line(tmp_path: Path, old: str,
 
 
 def test_an_unknown_cell_is_refused_with_the_names_of_the_shipped_ones():
-    with pytest.raises(ValueError, match=r"cell 'nowhere': no file .*one of probst"):
+    with pytest.raises(ValueError, match=r"cell 'nowhere': no file of that name .*one of probst"):
         load_cell("nowhere")
