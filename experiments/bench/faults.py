@@ -66,11 +66,8 @@ def main(chosen: list[str]) -> None:
                     outcome = run_case(Path(folder), *case)
                 except RuntimeError as error:
                     outcome = Outcome(str(error), 0.0, (np.nan, np.nan), (np.nan, np.nan), None)
-            at_rest = {True: "yes", False: "NO", None: "-"}[outcome.at_rest]
-            shares = [
-                "/".join(f"{share:.2f}" for share in pair) for pair in (outcome.commands, outcome.links)
-            ]
-            table.add_row(*case, outcome.ended, f"{outcome.recorded:.1f} s", *shares, at_rest)
+            ended, *shares = outcome.cells()
+            table.add_row(*case, ended, f"{outcome.recorded:.1f} s", *shares)
             progress((number + 1) / len(cases))
     Console(width=None if sys.stdout.isatty() else 160).print(table)
     print("commands and links: largest shares of the limits of speed / acceleration")

@@ -15,7 +15,10 @@ import numpy as np
 
 from diagrams.record.read_record import read_record
 from diagrams.runs.virtual_cell import CellRecord
+from diagrams.scenario.scenario import load_scenario
+from diagrams.servo import law_config
 from robots.description.model import RobotModel, load_robot
+from systems.servo import LAWS
 
 CIRCLE = ("reference.path=circle", "reference.acceleration=1", "reference.settle=1", "reference.dwell=4")
 _SCENARIO = "cell"
@@ -35,6 +38,11 @@ class Outcome:
     links: tuple[float, float]  # the same of the true links
     at_rest: bool | None  # whether the true robot stands at the end
 
+    def cells(self) -> tuple[str, ...]:
+        """Of a table: how it ended, both pairs of shares, and whether the robot stands."""
+        shares = ("/".join(f"{share:.2f}" for share in pair) for pair in (self.commands, self.links))
+        return self.ended, *shares, {True: "yes", False: "NO", None: "-"}[self.at_rest]
+
 
 class ThreeProcesses:
     """They share nothing but their ports; what is left of them at the end of the block is killed."""
@@ -46,6 +54,8 @@ class ThreeProcesses:
         resumes: bool = False,
         patience: float = _PATIENCE,
         with_truth: bool = True,
+        law: str = "numerical_ik",
+        faults: str = "",
     ) -> None:
         """Starts nothing.
 
@@ -55,8 +65,11 @@ class ThreeProcesses:
             resumes: whether the client goes on after a stop.
             patience: s, in which everything comes to its end.
             with_truth: whether the cell notes the true motion, for which its memory grows.
+            law: of the client.
+            faults: of the cell's wire, as ``truetip cell --faults`` takes them.
         """
-        self._has_truth = with_truth
+        self._has_truth, self._law, self._faults = with_truth, law, faults
+        self._sends_speeds = law_config(load_scenario(_SCENARIO), LAWS.find(law)).drive == "velocity"
         self.folder, self._path, self._resumes, self._patience = folder, path, resumes, patience
         self.port, self.camera_port, self.relay_port = _free_port(), 0, 0
         self.processes: dict[str, subprocess.Popen] = {}
@@ -96,7 +109,8 @@ class ThreeProcesses:
             f"station.link.port={self.port}",
             f"station.link.camera.server.port={self.camera_port}",
         ]
-        return [*_truetip("cell", ports), "--announce", "--until-eof", *truth]
+        faults = ["--faults", self._faults] if self._faults else []
+        return [*_truetip("cell", ports), "--announce", "--until-eof", *truth, *faults]
 
     def _relay(self) -> list[str]:
         return [
@@ -116,7 +130,7 @@ class ThreeProcesses:
             "station.link.resume_within=30",
             f"servo.guard.resume={str(self._resumes).lower()}",
         ]
-        out = ["--law", "numerical_ik", "--station", "egm", "--out", str(self.folder / f"run{self._runs}")]
+        out = ["--law", self._law, "--station", "egm", "--out", str(self.folder / f"run{self._runs}")]
         return [*_truetip("run", [*self._path, *settings]), *out]
 
     def records(self) -> list[Path]:
@@ -142,6 +156,15 @@ class ThreeProcesses:
         lines = [line.removeprefix("truetip: ") for line in said.splitlines() if line.startswith("truetip: ")]
         return f"{client.returncode}: {lines[-1] if lines else 'its path is over'}"
 
+    def has_ended(self, who: str) -> bool:
+        """Whether its process is over."""
+        return self.processes[who].poll() is not None
+
+    def stopped_client_end(self) -> str:
+        """Of a client that is told to stop."""
+        self.processes["client"].send_signal(signal.SIGTERM)
+        return self.client_end()
+
     def end(self, who: str) -> None:
         """Ends one of them as its parent would."""
         process = self.processes[who]
@@ -159,7 +182,9 @@ class ThreeProcesses:
             joints, command = topics["/joint_sample"], topics["/command"]
             _, of_joints, of_command = np.intersect1d(joints.time, command.time, return_indices=True)
             stamps = joints.columns["stamp"][of_joints, 0].astype(float)
-            shares.append(_shares(robot, stamps, command.columns["position"][of_command]))
+            which = "velocity" if self._sends_speeds else "position"
+            of_limits = _shares_of_speeds if self._sends_speeds else _shares
+            shares.append(of_limits(robot, stamps, command.columns[which][of_command]))
         links, at_rest = (np.nan, np.nan), None
         truth = self.folder / "truth.npz"
         if truth.exists():
@@ -176,14 +201,31 @@ def _shares(robot: RobotModel, time: np.ndarray, q: np.ndarray) -> tuple[float, 
     known = np.isfinite(q).all(axis=1)
     time, q = time[known], q[known]
     h = np.diff(time)
-    velocity = np.diff(q, axis=0) / h[:, None]
+    velocity = np.diff(q, axis=0)[h != 0.0] / h[h != 0.0, None]
+    h = h[h != 0.0]
     # Where messages are missing the speed between is a mean; an acceleration is that of neighbours only.
-    near = (h[1:] < 1.5 * _PERIOD) & (h[:-1] < 1.5 * _PERIOD)
+    # Where the clock was set nobody can say from the stamps what time has passed.
+    near = _is_one_period(h[1:]) & _is_one_period(h[:-1])
     acceleration = np.diff(velocity, axis=0)[near] / (0.5 * (h[1:] + h[:-1]))[near, None]
     return (
-        float((np.abs(velocity) / robot.speed).max()),
+        float((np.abs(velocity[h > 0.0]) / robot.speed).max()),
         float((np.abs(acceleration) / robot.acceleration).max()),
     )
+
+
+def _shares_of_speeds(robot: RobotModel, time: np.ndarray, v: np.ndarray) -> tuple[float, float]:
+    """As `_shares`, in speeds (n, 6) in rad/s that are all that is sent."""
+    known = np.isfinite(v).all(axis=1)
+    h, change = np.diff(time[known]), np.diff(v[known], axis=0)
+    near = _is_one_period(h)
+    return (
+        float((np.abs(v[known]) / robot.speed).max()),
+        float((np.abs(change[near] / h[near, None]) / robot.acceleration).max()),
+    )
+
+
+def _is_one_period(h: np.ndarray) -> np.ndarray:
+    return (h > 0.5 * _PERIOD) & (h < 1.5 * _PERIOD)
 
 
 def _seconds(path: Path) -> float:
