@@ -169,7 +169,7 @@ def test_a_bad_line_leaves_samples_in_their_order_each_once():
         for number in range(1, 501):
             rig.server.publish(4000 * number, number, {"tool": RigidTransform([1e-3 * number, 0.0, 0.0])})
             sample = rig.receiver.poll(10.0 + 4e-3 * number)
-            # The kernel's age of a frame is real: one that waited for a busy machine may not fit the test's clock.
+            # A frame's age is real: one that waited for a busy machine may not fit the test's clock.
             found += [sample.X_WE] if sample is not None and sample.valid else []
         order = [(X_WM.inverse() @ X @ X_BE.inverse()).translation()[0] for X in found]
         assert np.all(np.diff(order) > 0.5e-3)
