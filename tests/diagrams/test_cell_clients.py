@@ -39,6 +39,7 @@ def moved_by(package: str, mode: str) -> dict:
     return json.loads(output.splitlines()[-1])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("package", ["ABBRobotEGM", "abb_robot_client"])
 @pytest.mark.parametrize(
     ("mode", "what", "expected", "within"),

@@ -24,6 +24,7 @@ def tips(law: str, duration: float, *settings: str) -> np.ndarray:
     return experiment.log().X_WE_true[:, :3, 3]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("law", "payload", "scheme"),
     [*((law, 7.0, "runge_kutta3") for law in LAWS), ("numerical_ik", 0.0, "radau3")],

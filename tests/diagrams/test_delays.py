@@ -84,6 +84,7 @@ def test_a_position_command_is_reached_its_delay_and_dead_time_after_its_issue(d
     assert np.abs(late).max() < 2e-6  # s
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("delay", COMMAND_DELAYS)
 def test_a_velocity_command_acts_its_delay_and_dead_time_after_its_issue(delay: float):
     """The set-point moves by the integral of the velocity commands, shifted by the delay."""

@@ -153,6 +153,7 @@ def test_a_default_context_has_the_friction_of_the_motors():
     np.testing.assert_allclose(torque - inertia * rates, braking, rtol=1e-9)
 
 
+@pytest.mark.slow
 def test_energy_is_conserved_between_links_motors_gravity_and_gears_that_stiffen():
     """Without friction, damping and gains; the drives give what they hold the load with, tick by tick."""
     robot = robot_of(True)

@@ -24,6 +24,7 @@ def ages(seconds: float, catches_up: bool, messages: int = 480) -> np.ndarray:
     return np.array(found)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("catches_up", [False, True])
 def test_a_clock_that_stood_still_puts_no_sample_into_the_future(catches_up: bool):
     """It would be the newest one until then, and the law blind; in a second the clock is known again."""

@@ -57,6 +57,7 @@ def test_a_slipped_joint_turns_the_tip_about_its_axis(undisturbed: RunLog):
     assert np.array_equal(log.joint_position[: i + 1], undisturbed.joint_position[: i + 1])
 
 
+@pytest.mark.slow
 def test_a_load_that_is_picked_up_bends_the_robot_as_the_same_load_from_the_start():
     still = ["reference.settle=20", "station.drive.payload=0", "station.errors.tool_zyx_deg=[0, 0, 0]"]
     always = ran("station.payload=7", *still, until=1.5)

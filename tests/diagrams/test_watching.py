@@ -25,6 +25,7 @@ def experiment(*settings: str) -> tuple[Experiment, Watch]:
     return Experiment(scenario, "open_loop", watch=watch), watch
 
 
+@pytest.mark.slow
 def test_a_decision_knows_images_that_are_as_old_as_the_parts_of_the_chain_say():
     watched, watch = experiment()
     watched.advance(until=1.2)

@@ -49,6 +49,7 @@ def test_a_cycle_is_a_run_with_its_own_seed_bit_for_bit(scenario):
     assert dict(os.environ) == environment
 
 
+@pytest.mark.slow
 def test_a_run_that_breaks_off_ends_the_comparison_and_its_processes(scenario):
     broken = replace(scenario, integrator=replace(scenario.integrator, scheme="magic"))
     with pytest.raises(SimulationError, match=r"law open_loop, seed 5: .*magic"):

@@ -28,6 +28,7 @@ class InThisProcess:
 SETTINGS = [setting.removeprefix("--set=") for setting in SHORT]
 
 
+@pytest.mark.slow
 def test_a_comparison_has_the_logs_of_single_runs_and_says_what_came_out(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ):

@@ -73,6 +73,7 @@ def test_a_folder_without_permission_is_refused_before_anything_runs(tmp_path):
     assert refused == "truetip: cannot write in folder closed: permission denied\n"
 
 
+@pytest.mark.slow
 def test_a_command_starts_without_what_few_need():
     """A refusal or a help text would wait a second for it, and so would every process of a comparison."""
     read = "from diagrams.scenario.scenario import load_scenario; load_scenario('everything')"
@@ -83,6 +84,7 @@ def test_a_command_starts_without_what_few_need():
     assert said.stdout.strip() == "set()"
 
 
+@pytest.mark.slow
 def test_a_comparison_gives_the_same_bytes_whatever_the_number_of_processes(tmp_path):
     shared = [*SHORT, "--cycles=2", "--laws=pbvs"]
     two = truetip("compare", *shared, "--jobs=2", "--out=a/b", "--json=copy.json")
@@ -105,6 +107,7 @@ def test_a_comparison_gives_the_same_bytes_whatever_the_number_of_processes(tmp_
     assert not [name for name in files(tmp_path) if "truetip-" in name]
 
 
+@pytest.mark.slow
 def test_another_seed_gives_other_numbers(tmp_path):
     for seed in (0, 1):
         assert truetip("run", *SHORT, f"--set=seed={seed}", f"--out={seed}").exit_code == 0
@@ -143,6 +146,7 @@ def test_quick_takes_one_cycle_of_a_faster_path_with_the_laws_that_one_compares_
     assert "# misaligned (" in (tmp_path / "out/report.html").read_text()
 
 
+@pytest.mark.slow
 def test_a_run_reports_one_law_and_replaces_older_results_only(tmp_path):
     (tmp_path / "out").mkdir()
     (tmp_path / "out/notes.txt").write_text("mine")

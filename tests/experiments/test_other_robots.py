@@ -20,6 +20,7 @@ def robot(request: pytest.FixtureRequest, tmp_path: Path, monkeypatch: pytest.Mo
     return str(published(name)) if name.endswith(".urdf") else name
 
 
+@pytest.mark.slow
 def test_a_scenario_is_carried_over_unless_it_says_otherwise(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
     monkeypatch.chdir(tmp_path)
     robot = str(published("ur10_robot.urdf"))

@@ -25,6 +25,7 @@ class Mine(Feedforward):
 """
 
 
+@pytest.mark.slow
 def test_the_same_model_in_a_file_of_ones_own_does_the_same_bit_for_bit(tmp_path: Path):
     (tmp_path / "own.py").write_text(OWN)
     kinds = {"rigid": "rigid", "own": f"{tmp_path / 'own.py'}:Mine"}

@@ -97,6 +97,7 @@ class Bare(LeafSystem):
         discrete_state.set_value(1, np.linalg.solve(self._kinematics.jacobian(q), V[0]))
 
 
+@pytest.mark.slow
 def test_any_system_with_the_ports_is_a_law_made_already_or_as_a_class_or_in_a_diagram():
     scenario = load_scenario("misaligned", [s.removeprefix("--set=") for s in SHORT])
     shipped = Experiment(scenario, "open_loop")

@@ -82,6 +82,7 @@ def test_coverage_is_that_of_the_worst_run_and_of_all_samples():
     assert "coverage" not in judged([row(1, [1.0])])
 
 
+@pytest.mark.slow
 def test_the_command_prints_a_row_of_each_law_and_writes_the_numbers(tmp_path: Path):
     file = tmp_path / "numbers.json"
     settings = [part for setting in QUICK for part in ("--set", setting)]

@@ -80,6 +80,7 @@ def test_the_camera_sees_the_truth_with_the_noise_of_the_scenario(misaligned):
     np.testing.assert_allclose(noise[:, :3].std(axis=0), np.deg2rad(0.01), rtol=0.045)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("law", LAWS)
 @pytest.mark.parametrize("gain", [2.5, 5.0])
 def test_a_step_of_10_mm_is_gone_with_the_time_constant_of_the_gain(law: str, gain: float):

@@ -16,6 +16,7 @@ def counted(experiment: Experiment) -> dict[str, int]:
     return {kind: count for kind, count in experiment.log().guard_counts.items() if count}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("law", LAWS)
 def test_a_gap_of_40_ms_is_never_noticed_and_the_correction_goes_on(law: str):
     """It costs the correction of 40 ms, which is made up for afterwards."""
@@ -56,6 +57,7 @@ def test_a_gap_of_a_second_is_held_after_50_ms_and_stopped_for_good_after_500_ms
     assert counted(experiment)["stopped"] > 100
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("law", LAWS)
 def test_a_camera_that_is_later_than_the_longest_gap_still_serves(law: str):
     """What counts as a gap is the time between two arrivals, not how long a sample was on its way."""

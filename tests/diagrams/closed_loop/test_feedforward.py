@@ -43,6 +43,7 @@ def errors(kind: str, law: str, stiffness_error: float = 0.0, path: str = "recta
     return summary("", {law: [log]})["runs"][law]["true"]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("path", PATHS)
 def test_the_elastic_inverse_keeps_the_tip_on_the_path_without_a_camera(path: str):
     found = errors("flexible_joint", "open_loop", path=path)
@@ -116,6 +117,7 @@ def test_on_the_test_path_an_elastic_structure_is_left_by_hundredths_of_a_millim
     assert max(true("position_level", "servo.feedforward.stiffness_error=0.2")["static_mm"]) <= 0.02
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "law",
     ["numerical_ik", *(pytest.param(law, marks=pytest.mark.slow) for law in ("pbvs", "position_level"))],

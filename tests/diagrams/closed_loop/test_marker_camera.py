@@ -39,6 +39,7 @@ def test_the_same_seed_gives_the_same_log():
         assert not np.array_equal(getattr(other, name), getattr(once, name))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", ["features", "images"])
 def test_the_tip_moves_as_under_a_pose_camera_without_noise(kind: str):
     """What differs is noise of some 20 um, which the law follows."""

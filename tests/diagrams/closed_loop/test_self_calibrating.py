@@ -20,6 +20,7 @@ def tip_errors(log) -> tuple[np.ndarray, np.ndarray]:
     return errors[log.time >= log.path_start], errors[log.time >= log.path_end - 0.5]
 
 
+@pytest.mark.slow
 def test_the_tip_comes_onto_the_path_before_it_begins():
     late = [
         "station.camera.clock_offset=-0.003",
@@ -40,6 +41,7 @@ def test_the_tip_comes_onto_the_path_before_it_begins():
     assert log.learnt["coverage"]["share"] >= 0.8  # 0.95 of eight, where one may be outside
 
 
+@pytest.mark.slow
 def test_the_same_seed_gives_the_same_commands():
     scenario = load_scenario("misaligned", ["reference.settle=2"])
     commands = []

@@ -51,6 +51,7 @@ def test_a_held_path_is_late_by_the_pause_and_as_accurate(logs):
     np.testing.assert_allclose(held.X_WE_desired[-1], as_planned.X_WE_desired[-1], atol=1e-12)
 
 
+@pytest.mark.slow
 def test_a_law_may_slow_the_path():
     experiment = Experiment(scenario("nominal", *QUICK), Cautious)
     experiment.advance()
@@ -69,6 +70,7 @@ class Halting(Cautious):
     share = 0.0
 
 
+@pytest.mark.slow
 def test_a_path_that_is_held_for_long_ends_the_run_with_an_event(monkeypatch):
     monkeypatch.setattr(simulation, "_LONGEST_HOLD", 1.0)
     experiment = Experiment(scenario("nominal", *QUICK, "station.elasticity=rigid"), Halting)

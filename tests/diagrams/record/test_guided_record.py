@@ -1,6 +1,7 @@
 """A run on a station is logged while it goes on: the file says what the log says."""
 
 import numpy as np
+import pytest
 
 from diagrams.record.read_record import read_record
 from diagrams.record.run_record import RunRecord
@@ -12,6 +13,7 @@ from tests.diagrams.lockstep import Lockstep
 FAST = ["reference.acceleration=6", "reference.settle=0.5", "reference.path=circle", "reference.dwell=0.3"]
 
 
+@pytest.mark.slow
 def test_the_record_is_the_log(tmp_path):
     scenario = load_scenario("cell", [*FAST, "station.faults.stall_at=2.4", "station.faults.stall_for=0.06"])
     wire, path = Lockstep(scenario), tmp_path / "run.mcap"

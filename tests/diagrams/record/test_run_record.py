@@ -102,6 +102,7 @@ def test_a_file_that_was_cut_anywhere_is_read_as_far_as_it_goes(share: float, lo
     assert len(found.topics[JOINTS].time) >= 50 * int(8 * (share - 0.2))
 
 
+@pytest.mark.slow
 def test_writing_needs_no_more_memory_the_longer_it_takes(tmp_path):
     record, six = RunRecord(tmp_path / "run.mcap", ""), np.zeros(6)
 

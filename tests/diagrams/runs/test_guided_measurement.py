@@ -54,6 +54,7 @@ def simulated(scenario: Scenario, q: np.ndarray) -> Measurements:
     return MeasurementRun(scenario).measure(q).measured
 
 
+@pytest.mark.slow
 def test_over_a_bad_wire_it_writes_down_what_the_simulated_run_does():
     """Without noise of the camera the two differ by how still the robot is after half a second."""
     scenario = load_scenario("cell", [*QUIET, *FAULTS])
@@ -64,6 +65,7 @@ def test_over_a_bad_wire_it_writes_down_what_the_simulated_run_does():
     np.testing.assert_allclose(found.q, expected.q, atol=2e-4)
 
 
+@pytest.mark.slow
 def test_an_end_keeps_what_was_measured():
     found, _ = recorded(load_scenario("cell", QUIET), PLACES, is_asked_to_end=lambda rows: rows == 1)
     assert found.rows.tolist() == [1]

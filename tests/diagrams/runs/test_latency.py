@@ -29,6 +29,7 @@ def measured(*settings: str, **config) -> Latency:
     return evaluate(record)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "dead_time",
     [pytest.param(0.012, marks=pytest.mark.slow), 0.052, pytest.param(0.14, marks=pytest.mark.slow)],
@@ -41,6 +42,7 @@ def test_a_dead_time_is_found_to_a_millisecond(dead_time: float):
     assert found.camera == pytest.approx(0.0, abs=3e-4)
 
 
+@pytest.mark.slow
 def test_lost_and_late_messages_only_add_what_they_cost():
     """Jitter of up to 3 ms makes a reply miss a cycle now and then, a lost one holds the last command."""
     found = measured(
@@ -113,6 +115,7 @@ def test_the_motion_begins_and_ends_at_rest_and_its_speed_is_its_derivative():
     assert np.abs(position).max() <= np.deg2rad(config.amplitude_deg)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("config", "message"),
     [

@@ -49,6 +49,7 @@ def test_each_reply_is_out_before_anything_is_learnt(prompt):
     assert len(record.log.learnt["parameters"]) > 30
 
 
+@pytest.mark.slow
 def test_a_run_begins_when_the_camera_sees_the_tool():
     scenario = load_scenario("cell", ["station.link.connect=1"])
     blind: Any = SimpleNamespace(poll=lambda now: PoseSample(), report=lambda: SimpleNamespace(last_error=""))
@@ -57,6 +58,7 @@ def test_a_run_begins_when_the_camera_sees_the_tool():
         run.run(wire.link, blind, now=wire.now)
 
 
+@pytest.mark.slow
 def test_when_it_is_learnt_makes_no_difference_to_a_command(prompt):
     late, *_ = guided(asks=False)
     early = prompt[0].log

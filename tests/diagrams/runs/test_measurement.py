@@ -26,6 +26,7 @@ def statics(scenario: Scenario, q: np.ndarray) -> np.ndarray:
     return CompliantKinematics(static_deflection, scenario.station.payload).forward(q)
 
 
+@pytest.mark.slow
 def test_without_noise_it_writes_down_the_statics():
     """What is left of an oscillation is below the procedure's stillness, 2 micrometres."""
     scenario = load_scenario("misaligned", QUIET)
@@ -52,6 +53,7 @@ def test_encoders_that_err_put_the_links_elsewhere():
     assert np.abs(pose_error(record.measured.X_WE, statics(scenario, record.measured.q))).max() > 5e-5
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("period", [0.11, 0.7, pytest.param(1.0, marks=pytest.mark.slow)])
 def test_a_slow_camera_shows_the_robot_at_rest_and_not_on_its_way(period: float):
     """An exposure from the motion is off by up to 279 mm.
@@ -66,6 +68,7 @@ def test_a_slow_camera_shows_the_robot_at_rest_and_not_on_its_way(period: float)
     assert np.abs(pose_error(record.measured.X_WE, record.truth.X_WE)).max() < 5e-5
 
 
+@pytest.mark.slow
 def test_a_place_that_a_slow_camera_sees_only_once_is_left_out():
     blind_after = "station.camera.dropouts=[[0.8, 30.0]]"  # exposures at 0.7 s and then from 30.1 s on
     scenario = load_scenario("misaligned", [*QUIET, "station.camera.period=0.7", blind_after])
@@ -90,6 +93,7 @@ def test_it_can_be_done_again_with_the_same_result_and_another_seed_differs():
     assert not np.array_equal(once, other)
 
 
+@pytest.mark.slow
 def test_what_the_camera_does_not_see_is_left_out_and_nothing_at_all_is_said():
     procedure = MeasurementProcedure(settle=0.1)
     first = MeasurementRun(load_scenario("misaligned", ["station.camera.dropouts=[[0.0, 0.8]]"]), procedure)

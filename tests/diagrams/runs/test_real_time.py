@@ -41,6 +41,7 @@ def largest_and_static(log, e: np.ndarray) -> tuple[float, float]:
     return 1e3 * largest, 1e3 * float(np.linalg.norm(e[rest, 3:].mean(axis=0)))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("law", "settings"),
     [
@@ -148,6 +149,7 @@ def test_a_controller_that_does_not_come_back_ends_the_run():
     assert record.ended == "the controller did not come back"
 
 
+@pytest.mark.slow
 def test_a_station_that_is_not_there_or_another_one_is_named_before_anything_moves():
     wire = Lockstep(quick())
     wire.switch_motors_off()

@@ -34,6 +34,7 @@ def largest_error(time: np.ndarray, wanted: np.ndarray, true: np.ndarray, start:
     return float(np.linalg.norm(pose_error(wanted, true)[time >= start, 3:], axis=1).max())
 
 
+@pytest.mark.slow
 def test_the_tip_is_as_far_off_its_path_as_in_simulation():
     scenario = load_scenario("cell-kuka", SHORT)
     wire = RsiLockstep(scenario)

@@ -108,6 +108,7 @@ def test_the_home_position_of_a_robot_file_counts():
     np.testing.assert_allclose(middle, home, atol=0.01)
 
 
+@pytest.mark.slow
 def test_a_robot_that_can_follow_no_path_is_refused():
     robot = load_robot("kr16")
     for joint in robot.joints:

@@ -71,6 +71,7 @@ def test_a_heavier_load_than_the_robot_may_carry_can_be_believed():
     np.testing.assert_allclose(model.robot.payload.inertia, 9.0 / limits.largest_mass * limits.inertia)
 
 
+@pytest.mark.slow
 def test_a_wrong_belief_of_the_stiffness_leaves_the_open_loop_beside_its_path():
     """The feedforward winds the gears up for half their weight's deflection too much."""
     feedforward = ["servo.feedforward.kind=flexible_joint", "initial_error_mm=[0, 0, 0]", *QUIET, *SETTLE]

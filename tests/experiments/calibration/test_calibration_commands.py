@@ -34,6 +34,7 @@ def calibrated(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
+@pytest.mark.slow
 def test_a_design_is_written_with_its_bound_and_its_picture(tmp_path: Path):
     table, page = tmp_path / "design.csv", tmp_path / "design.html"
     result = truetip("design", "--count", "12", "--json", "-", "--out", str(table), "--report", str(page))
@@ -67,6 +68,7 @@ def test_a_calibration_tells_what_it_is_worth(calibrated: Path):
     assert result["design"]["b3"] <= result["design"]["bound"]
 
 
+@pytest.mark.slow
 def test_its_tables_serve_as_measurements_and_give_the_same_robot(calibrated: Path, tmp_path: Path):
     tables = [
         "--measurements",
@@ -86,6 +88,7 @@ def test_its_tables_serve_as_measurements_and_give_the_same_robot(calibrated: Pa
         np.testing.assert_allclose(a.placement.translation, b.placement.translation, atol=1e-9)
 
 
+@pytest.mark.slow
 def test_a_run_with_the_calibrated_robot_is_on_its_path_without_a_camera(calibrated: Path, tmp_path: Path):
     robot = str(calibrated / "robot.yaml")
     result = truetip("run", "--law", "open_loop", "--robot", robot, *SMALL, "--out", str(tmp_path))
@@ -145,6 +148,7 @@ def test_measurements_that_hide_parameters_are_refused_by_name(calibrated: Path,
     assert not (tmp_path / "out").exists()
 
 
+@pytest.mark.slow
 def test_the_page_of_a_calibration_opens_offline_without_errors(calibrated: Path):
     opened = open_page(calibrated / "report.html")
     # The three-dimensional picture draws advice on speed from the browser.

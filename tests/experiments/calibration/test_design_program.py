@@ -7,6 +7,7 @@ import pytest
 from tests.experiments.commands import files, refusal, truetip
 
 
+@pytest.mark.slow
 def test_the_run_stands_beside_the_configurations(tmp_path: Path):
     written = {"run.src", "run.dat"}
     arguments = ["--count", 12, "--out", tmp_path / "run.csv", "--report", tmp_path / "page.html"]

@@ -50,6 +50,7 @@ def test_a_calibration_from_a_file_is_the_one_that_wrote_it(tmp_path: Path):
     assert other["largest_error_over_standard_deviation"] is None
 
 
+@pytest.mark.slow
 def test_the_table_is_that_of_motion_capture(tmp_path: Path):
     result = run("calibrate", "--places=200", f"--out={tmp_path / 'c.html'}")
     assert result.exit_code == 0, result.output

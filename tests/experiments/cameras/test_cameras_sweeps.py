@@ -27,6 +27,7 @@ def test_the_pose_is_as_uncertain_as_the_pixels():
     assert whole.workspace.rotation == pytest.approx(2.0 * half.workspace.rotation)
 
 
+@pytest.mark.slow
 def test_more_cameras_more_markers_and_a_larger_body_know_more():
     for name, values in (("cameras", (2, 4, 7, 10)), ("markers", (4, 6, 8, 11))):
         positions = [point.path.position for point in swept(name, *values)]

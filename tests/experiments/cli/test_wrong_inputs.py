@@ -22,6 +22,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return found
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("line", "reason"), REFUSED.items(), ids=REFUSED)
 def test_wrong_input_is_refused_in_one_line_and_nothing_is_written(
     line: str, reason: str, folder: Path, monkeypatch: pytest.MonkeyPatch

@@ -10,6 +10,7 @@ from tests.experiments.browser import open_page
 from tests.experiments.commands import refusal, truetip
 
 
+@pytest.mark.slow
 def test_the_pictures_open_and_the_inverse_compensates(tmp_path: Path):
     result = truetip("drivetrain", "--out", tmp_path / "page.html", "--json", "-")
     assert result.exit_code == 0, result.output
@@ -31,6 +32,7 @@ def test_the_gear_of_figure_2_4_starts_only_against_its_losses():
     assert speed[(times > 1.0) & (times < 1.5)].min() > 0.1
 
 
+@pytest.mark.slow
 def test_a_folder_that_cannot_be_written_is_refused(tmp_path: Path):
     (tmp_path / "file").write_text("")
     assert "cannot write" in refusal(truetip("drivetrain", "--out", tmp_path / "file" / "page.html"))

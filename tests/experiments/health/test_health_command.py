@@ -49,6 +49,7 @@ def test_a_history_goes_on_and_a_joint_that_drifts_is_named(tmp_path: Path):
     assert pq.read_table(tmp_path / "h.parquet").num_rows == worn["checks"] == 4
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
@@ -68,6 +69,7 @@ def test_wrong_arguments_are_refused_in_one_line(
     assert files(tmp_path) == set()
 
 
+@pytest.mark.slow
 def test_a_file_that_is_no_history_is_refused_and_stays(tmp_path: Path):
     path = tmp_path / "h.parquet"
     path.write_text("something else")

@@ -98,6 +98,7 @@ def test_wrong_column_maps_are_refused(tmp_path: Path):
     assert "has no body 'link_9'" in refusal(run(tmp_path, f"--recording={path}"))
 
 
+@pytest.mark.slow
 def test_slow_motions_of_a_recording_give_load_spring_and_friction(tmp_path: Path):
     robot = load_robot("kr210")
     motion = slow_motion(robot)

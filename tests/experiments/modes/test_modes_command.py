@@ -69,6 +69,7 @@ def test_a_mode_can_be_watched_live(tmp_path: Path):
     assert "Mode 2 swings at http://localhost:" in result.stdout
 
 
+@pytest.mark.slow
 def test_the_pages_open(tmp_path: Path):
     assert run(tmp_path, "--robot=kr16").exit_code == 0
     opened = open_page(tmp_path / "modes.html")

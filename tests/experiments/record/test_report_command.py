@@ -23,6 +23,7 @@ def logs() -> dict[str, list[RunLog]]:
     return {law: list(found[law]) for law in ("open_loop", "pbvs")}
 
 
+@pytest.mark.slow
 def test_the_report_of_records_is_that_of_the_runs(logs: dict[str, list[RunLog]], tmp_path: Path):
     write_records(tmp_path, "# line one (payload=3)\nseed: 0\n", logs)
     records = sorted(tmp_path.glob("*.mcap"))
@@ -78,6 +79,7 @@ def test_words_in_the_filter_hide_the_other_lines(logs: dict[str, list[RunLog]],
     assert opened.dom.count('<tr hidden="">') == 1
 
 
+@pytest.mark.slow
 def test_two_runs_side_by_side_show_what_differs_and_by_how_much(tmp_path: Path):
     shared = ["run", "--law=pbvs", *SHORT]
     for name, delay in (("early", "0.004"), ("late", "0.012")):

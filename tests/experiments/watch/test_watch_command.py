@@ -89,6 +89,7 @@ def test_videos_are_read_image_by_image_and_end_when_they_end(tmp_path: Path):
     assert recording.ended == {"left": 3}
 
 
+@pytest.mark.slow
 def test_what_is_wrong_with_a_recording_is_said_in_one_line(recording: Path, tmp_path: Path):
     broken, out = tmp_path / "broken", tmp_path / "out"
     out.mkdir()

@@ -32,6 +32,7 @@ def test_a_robot_with_an_elastic_structure_has_no_stable_inverse_anywhere(
         assert numbers["slowest_rhp"] == min(min(row) for row in numbers["slowest_rhp_map"])
 
 
+@pytest.mark.slow
 def test_the_examples_give_the_published_figures(tmp_path: Path):
     arm = json.loads(run(tmp_path, "--example=two_joint_arm", "--json", "-").stdout)
     assert [re for re, _ in arm["zeros"]] == pytest.approx([-292.19, 305.58], abs=0.01)

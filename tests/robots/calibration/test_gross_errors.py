@@ -54,6 +54,7 @@ def masked(count: int, bad: int, seeds: range) -> None:
     assert np.mean(with_bad) <= 1.5 * np.mean(clean)
 
 
+@pytest.mark.slow
 def test_three_of_twenty_rows_that_hide_each_other_are_found():
     masked(20, 3, range(3))
 
@@ -96,6 +97,7 @@ def test_what_oscillates_by_a_micrometre_is_no_gross_error():
     assert identify(NOMINAL, spoilt(quiet, np.array([5, 6]), 1e-3, rng)).outliers == (6, 7)
 
 
+@pytest.mark.slow
 def test_a_row_a_metre_off_is_named_whether_it_is_used_or_not():
     rng = np.random.default_rng(1)
     table, true = noisy_table(75, rng)

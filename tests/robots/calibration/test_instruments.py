@@ -110,6 +110,7 @@ def test_the_noise_of_every_instrument_and_of_the_joints_is_found():
     assert not found.outliers
 
 
+@pytest.mark.slow
 def test_a_ball_bar_beside_a_tracker_makes_the_robot_more_accurate():
     """Ten times as good as the tracker, at half of the configurations; in the mean of six robots."""
     robot, errors = load_robot("irb1200"), []

@@ -64,6 +64,7 @@ def worst_error(found: InstrumentCalibration, true: MatrixRobot, mass: float) ->
     return float(np.abs(register_points(np.vstack(p), np.vstack(p_true)).residual).max())
 
 
+@pytest.mark.slow
 def test_derivatives_are_those_of_differences():
     seen = observed(count=15, loaded=loaded)[1]
     model = ErrorModel(load_robot("irb1200"), KINDS)
@@ -126,6 +127,7 @@ def test_a_load_is_read_for_every_configuration(tmp_path):
     assert [(each.row, each.what) for each in problems] == [(5, "payload_kg must not be negative, got -1")]
 
 
+@pytest.mark.slow
 def test_a_load_that_the_robot_may_not_carry_is_refused():
     _, seen = observed(count=20, loaded=loaded)
     with pytest.raises(ValueError, match="must be between 0 and 7"):

@@ -44,6 +44,7 @@ def is_covered(result: Identified, true: MatrixRobot) -> np.ndarray:
     return np.abs(found.values - truth) <= 1.96 * np.sqrt(np.diagonal(covariance))
 
 
+@pytest.mark.slow
 def test_estimated_noise_is_as_good_as_known_noise():
     """Ten tables: within 5 % of the accuracy, and 300 intervals that hold as often as they say."""
     errors, covered = {"known": [], "estimated": []}, []
@@ -68,6 +69,7 @@ def test_intervals_hold_as_often_as_they_say():
     assert covered.mean(axis=0).max() <= 0.99
 
 
+@pytest.mark.slow
 def test_the_three_noises_are_found():
     """15 tables of 450 numbers: joints to a few percent, position to a tenth, rotation between."""
     found = np.array([[*vars(identify(NOMINAL, table_of(seed)[0]).noise).values()] for seed in range(15)])
@@ -75,6 +77,7 @@ def test_the_three_noises_are_found():
     np.testing.assert_allclose(found.mean(axis=0), wanted, rtol=0.15)
 
 
+@pytest.mark.slow
 def test_rows_that_say_how_noisy_they_are_are_weighed_so():
     """A second instrument, ten times worse, wrote half of the rows; its columns say so."""
     worse = replace(SOURCE_NOISE, position_sigma=1e-3, rotation_sigma=10 * SOURCE_NOISE.rotation_sigma)
@@ -105,6 +108,7 @@ def test_noise_that_is_believed_too_small_shows_in_the_misfit():
     assert identify(NOMINAL, table, IdentificationConfig(noise=tenth)).misfit == pytest.approx(10.0, abs=1.5)
 
 
+@pytest.mark.slow
 def test_a_radian_is_not_weighed_as_a_metre():
     """Orientations thirty times worse than in the source do no harm: positions alone are no better."""
     bad = replace(SOURCE_NOISE, rotation_sigma=30 * SOURCE_NOISE.rotation_sigma)

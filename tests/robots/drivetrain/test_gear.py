@@ -140,6 +140,7 @@ def test_a_gap_transmits_nothing_and_beyond_it_the_spring_acts():
     assert gear.torque(np.array(0.1011), np.array(1.0)) == pytest.approx(2.0 + 10.0)
 
 
+@pytest.mark.slow
 def test_the_visco_elastic_gear_loses_energy_in_every_cycle_and_can_be_inverted():
     gear = ViscoElasticGear(CubicSpring(500.0, 7e5), 2e3, 1e3, 40.0)
     dt, work, x = 1e-5, 0.0, np.array(0.0)

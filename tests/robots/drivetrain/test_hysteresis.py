@@ -118,6 +118,7 @@ def test_a_hysteresis_of_torques_moves_as_its_rate_says_and_stays_bounded():
     np.testing.assert_allclose(jumped, z, atol=2e-7)
 
 
+@pytest.mark.slow
 @given(arrays(float, 12, elements=st.floats(-5e-3, 5e-3)))
 def test_a_hysteresis_of_torques_loses_energy_in_every_cycle(corners: np.ndarray):
     """Once around a closed path of deflections, from wherever it has come to: work less what is stored."""

@@ -165,6 +165,7 @@ def test_at_rest_nothing_accelerates(name: str):
     assert np.abs(rates).max() < 1e-6  # rad/s^2, what the last correction of the sag leaves
 
 
+@pytest.mark.slow
 def test_energy_is_conserved_in_free_vibration_without_losses():
     robot = load_robot("kr210")
     for joint in robot.joints:

@@ -52,6 +52,7 @@ def test_the_jacobian_knows_that_errors_change_with_the_angle(compliance: float)
     np.testing.assert_allclose(X, kinematics.forward(Q), atol=1e-15)
 
 
+@pytest.mark.slow
 def test_they_are_identified_kept_in_a_file_and_inverted(tmp_path):
     """Without noise: eccentric gears of 0.03 degrees and wrist axes that turn each other along."""
     rng = np.random.default_rng(1)

@@ -128,6 +128,7 @@ def test_one_elastic_joint_swings_at_its_analytic_frequency_and_decay(damping: f
     np.testing.assert_allclose(swing, 1e-4 * analytic, atol=1e-8)  # a phase error of 1e-4 rad
 
 
+@pytest.mark.slow
 def test_energy_is_conserved_in_free_motion_without_losses():
     parts, context = build(robot=without_losses())
     parts.set_at_rest(context, BENT)

@@ -35,6 +35,7 @@ def test_a_way_that_is_clear_stays_straight():
     assert len(ways.between(LEFT, RIGHT)) == 0
 
 
+@pytest.mark.slow
 def test_around_a_wall_there_is_a_way_that_is_clear_all_along():
     check = admissible(WALL)
     ways = ClearWays(ROBOT, check, CLEARANCE)

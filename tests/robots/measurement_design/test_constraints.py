@@ -98,6 +98,7 @@ def test_the_grid_has_the_robot_s_own_ranges():
     assert [axis.lower_deg for axis in own_ranges(load_robot("irb1200"))] == [-100, -45, -90, -180, -90, -180]
 
 
+@pytest.mark.slow
 def test_narrow_ranges_are_no_reason_to_refuse_a_design():
     robot = load_robot("kr16")
     for joint, middle in zip(robot.joints, (0.0, -70.0, 80.0, 0.0, 40.0, 0.0), strict=True):

@@ -75,6 +75,7 @@ def test_one_screening_proves_the_bound(best: MeasurementDesign, grid: Candidate
     assert 75 * grid.screen(best.certificate).max() == pytest.approx(best.bound, rel=1e-12)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", NAMES)
 @given(seed=st.integers(0, 10**6))
 @settings(max_examples=15, deadline=None)
@@ -118,6 +119,7 @@ def test_the_same_seed_gives_the_same_design():
     assert not np.array_equal(once.configurations, other.configurations)
 
 
+@pytest.mark.slow
 def test_only_allowed_configurations_are_chosen_and_the_bound_is_theirs():
     allowed = AdmissibleConfigurations(ROBOT, AdmissibleConfig(view=View()))
     design = design_measurements(ROBOT, 30, ranges=COARSE, admissible=allowed)

@@ -63,6 +63,7 @@ def test_where_there_is_no_direct_solution_the_last_one_stays():
     np.testing.assert_array_equal(model.correction(stretched(ROBOT), DEFLECTION, far, last), last)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("method", CORRECTIONS)
 @pytest.mark.parametrize(
     "q", [stretched(ROBOT), UPRIGHT, OVER_AXIS_1], ids=["stretched", "upright", "wrist over axis 1"]

@@ -22,6 +22,7 @@ def train(**parts) -> DriveTrain:
     return DriveTrain(ratio=100.0, rotor_inertia=3e-5, stiffness=4.5e4, damping=80.0, **parts)
 
 
+@pytest.mark.slow
 def test_the_deflection_under_the_torque_of_a_drive_train_is_the_one_that_made_it():
     """Loads that keep their sign, so that the gap is closed; there the smooth crossing is exact."""
     trains = DriveTrains(

@@ -41,6 +41,7 @@ def change_with_the_tick(robot_name: str, kind: str, timing: str) -> float:
     return float((gap.max(axis=0) / np.ptp(fine, axis=0)).max())
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", ["flexible_joint", "elastic_structure"])
 @pytest.mark.parametrize("robot_name", DURATIONS)
 def test_on_a_smooth_path_torques_hardly_change_with_the_tick(robot_name: str, kind: str):

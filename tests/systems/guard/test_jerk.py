@@ -87,6 +87,7 @@ def check(sequence, share: float, jerk: float, resume: bool, is_speed_only: bool
         assert_jerk(robot, np.array(swing.positions), velocities)
 
 
+@pytest.mark.slow
 @settings(max_examples=20, deadline=None)
 @drawn
 def test_no_sequence_of_faults_jerks_a_joint(sequence, share, jerk, resume, is_speed_only):

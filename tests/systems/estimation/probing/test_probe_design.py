@@ -39,6 +39,7 @@ def test_columns_are_how_the_tip_moves():
     np.testing.assert_allclose(of.columns(q, still, still)[0, 3:, i], step, rtol=1e-3, atol=1e-7)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("shape", [Rectangle(), Circle()])
 def test_what_the_design_promises_its_motion_shows(shape):
     of, probe = needs(shape), Probe(load_robot("irb1200"), ProbeConfig())

@@ -37,6 +37,7 @@ def test_bodies_of_the_documented_form_are_found_in_their_order(xml: str, bodies
     assert parse_bodies(xml) == bodies
 
 
+@pytest.mark.slow
 @given(st.lists(st.text(st.characters(codec="utf-8", exclude_categories=["C", "Z"]), min_size=1), max_size=5))
 def test_any_name_survives(names: list[str]):
     assert [body.name for body in parse_bodies(parameters_xml("1.25", [bodies_xml(names)]))] == names

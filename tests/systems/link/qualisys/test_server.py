@@ -197,6 +197,7 @@ def test_a_rate_holds_when_a_measurement_begins_anew(server: VirtualCameraServer
     assert found == [1001, 1003, 1005, 1, 3, 5]
 
 
+@pytest.mark.slow
 def test_several_clients_are_served_and_one_that_does_not_read_holds_up_nobody(
     server: VirtualCameraServer, connect
 ):

@@ -103,6 +103,7 @@ def test_length_and_place_of_the_wand_come_out_as_they_were():
     np.testing.assert_allclose(length, 1e-3 * KIT.wand_length_mm, atol=6e-5)  # adjusted, 10 um are allowed
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("factor", "reason"),
     [
@@ -139,6 +140,7 @@ def exchanged(run: WandRun, camera: int, places: slice) -> WandRun:
     return replace(run, wand_pixels=pixels)
 
 
+@pytest.mark.slow
 def test_ends_that_one_camera_exchanges_are_left_out_or_refused():
     """In a quarter of the places they are outliers; in all of them the camera contradicts the others."""
     run = waved(1, places=200)

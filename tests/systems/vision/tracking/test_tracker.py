@@ -104,6 +104,7 @@ def test_after_a_second_without_view_the_next_picture_is_enough():
     assert np.abs(pose_error(found[350].X_WE, poses[350])[3:]).max() < 2e-4
 
 
+@pytest.mark.slow
 def test_a_wrong_prediction_is_corrected_or_refused_but_never_kept():
     """Wherever the tracker believes the body to be, up to a marker's distance away and turned at will."""
     rng, refused = np.random.default_rng(4), 0
