@@ -11,6 +11,8 @@ from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any
 
+import numpy as np
+
 from diagrams.runs.virtual_cell import VirtualCell
 from diagrams.scenario.scenario import Scenario
 from robots.description.model import load_robot
@@ -46,6 +48,7 @@ class Lockstep:
         self._replies: list = []  # (time, order, data) to the controller
         self.sent: list[tuple[float, bytes]] = []  # time and bytes of every command
         self.stamps: list[float] = []  # s, of the messages that they answer
+        self.measured: list[np.ndarray] = []  # (6,) rad, joints in those
         self._heard_stamp = 0.0  # s, of the newest message
         # When the cell stands still (s of its own time), for how long, and whether it then catches up in a
         # burst; otherwise it stays behind, as its clock does that stood still too.
@@ -103,6 +106,8 @@ class Lockstep:
             return False
         self.sent.append((self.time, data))
         self.stamps.append(stamp)
+        last = self.session.last
+        self.measured.append(last.position if last else np.full(6, np.nan))
         for delivery in self.from_client.pass_on(self.time + TURN_AROUND, data):
             if not delivery.is_foreign:
                 heapq.heappush(self._replies, (delivery.time, next(self._order), delivery.data))

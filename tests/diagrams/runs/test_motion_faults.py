@@ -4,8 +4,6 @@ import re
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
 
 from diagrams.runs.real_time import REQUESTED, RealTimeRecord, RealTimeRun
 from diagrams.scenario.scenario import Scenario, ScenarioError, load_scenario
@@ -44,18 +42,18 @@ def commands(wire: Lockstep) -> tuple[np.ndarray, np.ndarray | None, np.ndarray]
 
 
 def longest_passed(here: np.ndarray, stamped: np.ndarray) -> np.ndarray:
-    """Most that may have passed from message to message in s, where the stamps do not say.
+    """Most that may have passed from message to message in s: what the stamps say, as far as it is owed.
 
-    Over a gap between stamps it is what is still owed of the time here; where they stand or go back for long,
-    a period.
+    Owed is the time here that has not been counted yet, of which up to `LONGEST_OWED` is kept for messages
+    that come early after late ones, and one period besides. Where stamps stand or go back for long it is a
+    period.
     """
     passed, owed = np.maximum(stamped, 0.0), PERIOD
     for message, waited in enumerate(here):
         owed += waited
-        if passed[message] > LONGEST_STEP:
-            passed[message] = min(passed[message], owed)
-        elif passed[message] == 0.0 and waited > LONGEST_STEP:
-            passed[message] = min(PERIOD, owed)
+        if passed[message] == 0.0 and waited > LONGEST_STEP:
+            passed[message] = PERIOD
+        passed[message] = min(passed[message], owed)
         owed = min(owed - passed[message], LONGEST_OWED)
     return passed
 
@@ -64,23 +62,21 @@ def assert_unsurprising(wire: Lockstep) -> None:
     """From message to message within speed and acceleration, in the time that really passed.
 
     That is the time of the messages that are answered, by the controller's clock, and in sum no more than has
-    passed here: one that came late is followed by others that seem early, and a period is granted to both
-    together. Where the stamps do not say it, it is the time in which the robot goes as far at its velocity,
-    and never more than may have passed.
+    passed here. Where the stamps do not say it, it is the time in which the robot goes as far at its
+    velocity, and never more than may have passed.
     """
     times, position, velocity = commands(wire)
     here, stamped = np.diff(times), np.diff(wire.stamps)
     passed = longest_passed(here, stamped)
-    late = np.maximum.accumulate(np.concatenate([[0.0], np.cumsum(here - passed)]))
-    assert (np.cumsum(here - passed) >= late[:-1] - LONGEST_OWED - PERIOD).all()
     assert (np.abs(np.diff(velocity, axis=0)) <= ROBOT.acceleration * passed[:, None] * SLACK + 1e-9).all()
     assert (np.abs(velocity) <= ROBOT.speed * SLACK).all()
     if position is not None:
         way, mean = np.diff(position, axis=0), 0.5 * (velocity[1:] + velocity[:-1])
-        is_known = (stamped > 0.0) & (stamped <= LONGEST_STEP)
+        is_known = (stamped > 0.0) & (stamped <= LONGEST_STEP) & (passed > stamped - 1e-9)
         # At rest, or after a silence, a robot is led on from where it says that it stands.
         is_anew = ~velocity[1:].any(axis=1) & ~(is_known & velocity[:-1].any(axis=1))
-        assert (np.abs(way) <= ROBOT.speed * LONGEST_STEP).all(where=is_anew[:, None])
+        off = np.abs(position - np.array(wire.measured))[1:][is_anew & way.any(axis=1)]
+        assert (off <= ROBOT.speed * PERIOD).all()
         way[is_anew] = 0.0
         fitted = (way * mean).sum(axis=1) / np.maximum((mean**2).sum(axis=1), 1e-12)
         passed = np.where(is_known | is_anew, passed, np.clip(fitted, 0.0, passed))
@@ -190,12 +186,6 @@ def test_a_cell_that_stood_still_is_led_on_from_where_it_was(law, seconds, catch
     assert_unsurprising(wire)
 
 
-instants = st.floats(1.2, 2.4)
-halts = st.lists(
-    st.tuples(instants, st.sampled_from([0.01, 0.05, 0.09, 0.12, 0.2, 1.0]), st.booleans()),
-    min_size=1,
-    max_size=3,
-)
 SILENCES = ["stall_at={at},stall_for=0.05", "stall_at={at},stall_for=0.3", "stop_at={at}"]
 ANY = [
     *SILENCES,
@@ -204,13 +194,23 @@ ANY = [
     "joint_jump_at={at}",
     "loss=0.1,reordering=0.1,duplication=0.1,jitter=0.006,burst=0.01,burst_length=5",
 ]
-laws = st.sampled_from(["numerical_ik", "pbvs"])
+HALTED_FOR = (0.01, 0.05, 0.09, 0.12, 0.2, 1.0)  # s
 
 
-def sequences(faults: list[str]) -> st.SearchStrategy:
-    """Up to two faults and when they happen, each kind once."""
-    rows = st.tuples(st.sampled_from(faults), instants)
-    return st.lists(rows, max_size=2, unique_by=lambda row: row[0].split("_at")[0])
+def drawn(seed: int, faults: list[str]) -> tuple[list, list, str, bool]:
+    """Up to three halts, up to two faults and when they happen, a law, and whether it goes on after a stop.
+
+    The same wherever it runs: drawn by hypothesis they depend on what else has been imported.
+    """
+    rng = np.random.default_rng(seed)
+    halts = [
+        (rng.uniform(1.2, 2.4), float(rng.choice(HALTED_FOR)), bool(rng.integers(2)))
+        for _ in range(rng.integers(1, 4))
+    ]
+    kinds = rng.choice(faults, size=rng.integers(3), replace=False)
+    chosen = {str(kind).split("_at")[0]: (str(kind), rng.uniform(1.2, 2.4)) for kind in kinds}  # each once
+    law = ("numerical_ik", "pbvs")[rng.integers(2)]
+    return halts, list(chosen.values()), law, bool(rng.integers(2))
 
 
 def halted_with(halts: list, chosen: list, law: str, resume: bool) -> Lockstep:
@@ -228,19 +228,16 @@ def halted_with(halts: list, chosen: list, law: str, resume: bool) -> Lockstep:
 
 
 @pytest.mark.slow
-@settings(max_examples=15, deadline=None)
-@given(halts=halts, chosen=sequences(SILENCES), law=laws, resume=st.booleans())
-def test_nor_does_any_sequence_of_halts_and_silences_surprise(halts, chosen, law, resume):
-    assert_unsurprising(halted_with(halts, chosen, law, resume))
+@pytest.mark.parametrize("seed", range(20))
+def test_nor_does_any_sequence_of_halts_and_silences_surprise(seed: int):
+    assert_unsurprising(halted_with(*drawn(seed, SILENCES)))
 
 
 @pytest.mark.slow
-@settings(max_examples=15, deadline=None)
-@given(halts=halts, chosen=sequences(ANY), law=laws)
-def test_whatever_comes_no_message_is_further_than_a_robot_gets_in_the_longest_gap_bridged(
-    halts, chosen, law
-):
+@pytest.mark.parametrize("seed", range(20))
+def test_whatever_comes_no_message_is_further_than_a_robot_gets_in_the_longest_gap_bridged(seed: int):
     """Also where stamps go back in a burst, so that nobody can say what time has passed."""
+    halts, chosen, law, _ = drawn(seed, ANY)
     _, position, velocity = commands(halted_with(halts, chosen, law, resume=False))
     assert (np.abs(velocity) <= ROBOT.speed * SLACK).all()
     assert (np.abs(np.diff(velocity, axis=0)) <= ROBOT.acceleration * LONGEST_STEP).all()
