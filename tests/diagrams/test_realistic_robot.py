@@ -1,6 +1,7 @@
 """A station whose robot has drive trains with parts: the same equations, at rest, reproducible."""
 
 import numpy as np
+import pytest
 
 from diagrams.record.log import RunLog
 from diagrams.runs.simulation import Experiment
@@ -18,6 +19,7 @@ def driven(robot: RobotModel, until: float, *settings: str) -> RunLog:
     return experiment.log()
 
 
+@pytest.mark.slow
 def test_a_friction_that_is_named_moves_the_robot_like_the_same_friction_in_the_drive_train():
     """The same equations in two systems, with the same steps."""
     plain, named = load_robot("irb1200"), load_robot("irb1200")

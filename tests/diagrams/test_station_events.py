@@ -68,6 +68,7 @@ def test_a_load_that_is_picked_up_bends_the_robot_as_the_same_load_from_the_star
     np.testing.assert_allclose(sag[2], sag[0], atol=2e-6)
 
 
+@pytest.mark.slow
 def test_commands_come_later_by_the_change_of_the_dead_time():
     """A faster and a slower interface lead to the same path, one later than the other."""
     before = ran(*RIGID, "station.drive.dead_time=0.02")

@@ -169,6 +169,7 @@ def test_an_interrupted_comparison_leaves_nothing(tmp_path, monkeypatch):
     assert files(tmp_path) == set()
 
 
+@pytest.mark.slow
 def test_the_pace_of_a_run_can_be_set(tmp_path):
     assert truetip("run", "--law=open_loop", "--pace=1.5", *SHORT).exit_code == 0
     timing = json.loads((tmp_path / "out/timing.json").read_text())["runs"]["open_loop"]
@@ -176,6 +177,7 @@ def test_the_pace_of_a_run_can_be_set(tmp_path):
     assert timing["real_time_factor"] < 1.5 * 1.05
 
 
+@pytest.mark.slow
 def test_a_run_can_be_watched_in_real_time(tmp_path, monkeypatch):
     monkeypatch.setattr(run_command, "_PATIENCE", 0.0)
     result = truetip("run", "--law=open_loop", "--live", *SHORT)

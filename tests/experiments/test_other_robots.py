@@ -38,6 +38,7 @@ def test_a_scenario_is_carried_over_unless_it_says_otherwise(tmp_path: Path, mon
     assert free.scenario.reference.path.kind == "rectangle"
 
 
+@pytest.mark.slow
 def test_the_diagram_is_drawn(robot: str):
     assert truetip("diagram", "--robot", robot).exit_code == 0
     assert Path("diagram.svg").is_file()

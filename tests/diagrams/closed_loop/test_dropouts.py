@@ -35,6 +35,7 @@ def test_a_gap_of_40_ms_is_never_noticed_and_the_correction_goes_on(law: str):
     assert gap[-1] < 0.01 * gap[0]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("law", LAWS)
 def test_a_gap_of_a_second_is_held_after_50_ms_and_stopped_for_good_after_500_ms(law: str):
     """On the moving path: the robot goes on along it without correction, then it comes to rest."""

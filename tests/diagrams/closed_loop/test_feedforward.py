@@ -158,6 +158,7 @@ def test_torque_arrives_as_late_as_the_positions_that_it_belongs_to(dead_time: f
     assert 1e3 * gap[log.time >= log.path_start].max() < 0.01
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("prefilter", ["none", "bessel"])
 def test_its_commands_are_those_of_an_open_loop_with_its_offsets(prefilter: str):
     """A feedforward drives a robot by itself; a law without a camera adds nothing."""

@@ -8,6 +8,7 @@ import pytest
 from tests.experiments.commands import files, refusal, truetip
 
 
+@pytest.mark.slow
 def test_noise_of_pixels_decides_whether_cameras_pass(tmp_path: Path):
     def passed(sigma: float) -> dict:
         out = ["--report", tmp_path / "c.html", "--json", tmp_path / "c.json"]

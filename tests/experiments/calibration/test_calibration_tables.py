@@ -30,6 +30,7 @@ def tables(folder: Path, name: str, position_only: bool = False) -> MatrixRobot:
     return true
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("name", "position_only"), [("ur10", False), ("puma560", True)])
 def test_a_robot_without_analytic_inverse_is_calibrated_from_a_tracker(
     name: str, position_only: bool, tmp_path: Path

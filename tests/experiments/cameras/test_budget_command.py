@@ -16,6 +16,7 @@ def budget(tmp_path: Path, *options: str) -> dict:
     return json.loads(result.stdout)
 
 
+@pytest.mark.slow
 def test_the_shares_are_a_whole_and_late_stamps_take_over(tmp_path: Path):
     """With 100 draws the spread is known to 4 %, at five poses the worst of them to 12."""
     found = budget(tmp_path, "--time-ms", "1")

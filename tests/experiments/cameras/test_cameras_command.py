@@ -37,6 +37,7 @@ def test_a_simulated_calibration_finds_the_cell_it_came_from(tmp_path: Path):
         assert row["position_mm"] == pytest.approx(camera.position_mm)
 
 
+@pytest.mark.slow
 def test_a_calibration_from_a_file_is_the_one_that_wrote_it(tmp_path: Path):
     table = tmp_path / "seen.csv"
     arguments = ("calibrate", "--places=200", f"--out={tmp_path / 'c.html'}", "--json=-")

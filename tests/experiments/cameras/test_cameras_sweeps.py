@@ -21,6 +21,7 @@ def swept(name: str, *values: float) -> list[SweepPoint]:
     return [SWEEPS[name].study(setup(), value) for value in values]
 
 
+@pytest.mark.slow
 def test_the_pose_is_as_uncertain_as_the_pixels():
     half, whole = swept("pixel_noise", 0.05, 0.1)
     assert whole.path.position == pytest.approx(2.0 * half.path.position)
@@ -43,6 +44,7 @@ def test_farther_away_the_position_is_uncertain_in_proportion():
     assert far.path.position / near.path.position == pytest.approx(ratio, rel=0.1)
 
 
+@pytest.mark.slow
 def test_exposure_has_an_optimum():
     """Too short is dark, too long is saturated and smeared."""
     dark, right, long = swept("exposure", 0.2, 0.4, 3.2)
@@ -59,6 +61,7 @@ def test_what_no_camera_can_do_is_a_value_without_a_result():
     assert point.as_dict()["pixel_sigma"] is None
 
 
+@pytest.mark.slow
 def test_more_pixels_are_worth_more_than_in_proportion():
     """Twice as many along an edge halve the angle of a pixel, and the centroid has more of them."""
     coarse, fine = swept("resolution", 1.0, 2.0)

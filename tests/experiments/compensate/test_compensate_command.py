@@ -37,6 +37,7 @@ def options(folder: Path, **changes: object) -> list[object]:
     return [f"--{name}={value}" for name, value in named.items()]
 
 
+@pytest.mark.slow
 def test_from_a_module_to_a_corrected_one(folder: Path):
     result = truetip("compensate", folder / "m.mod", *options(folder, json="-"))
     found = json.loads(result.stdout)

@@ -29,6 +29,7 @@ def opened(speed: float | None = None) -> tuple[Experiment, LiveView]:
     return experiment, LiveView(experiment, robot, port=0, speed=speed)
 
 
+@pytest.mark.slow
 def test_a_run_that_is_watched_is_the_same_bit_for_bit():
     experiment, view = opened()
     shares, frames, show = [], [], view.show

@@ -169,6 +169,7 @@ def test_the_replay_opens_in_a_browser_and_names_the_laws(replay, logs):
     assert replay.stat().st_size < 5e6
 
 
+@pytest.mark.slow
 def test_the_replay_moves_by_itself(replay, tmp_path):
     for seconds in (2, 9):
         screenshot(replay, tmp_path / f"{seconds}.png", 320, 240, milliseconds=1000 * seconds)

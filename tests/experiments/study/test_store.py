@@ -42,6 +42,7 @@ def complete(folder: Path, order: list[int], stops: set[int]) -> bytes:
     return (folder / TABLE).read_bytes()
 
 
+@pytest.mark.slow
 @settings(max_examples=15)
 @given(order=st.permutations(list(range(8))), stops=st.sets(st.integers(0, 7)))
 def test_the_table_does_not_depend_on_order_and_interruptions(tmp_path_factory, order, stops):

@@ -40,6 +40,7 @@ def watch(folder: Path, out: Path, *more: str):
     )
 
 
+@pytest.mark.slow
 def test_a_person_in_a_recording_stops_the_robot_and_the_page_shows_where(recording: Path, tmp_path: Path):
     result = watch(recording, tmp_path, "--json", str(tmp_path / "watch.json"))
     assert result.exit_code == 0, result.output

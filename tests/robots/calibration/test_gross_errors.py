@@ -70,6 +70,7 @@ def called_outliers(seed: int) -> int:
     return len(identify(NOMINAL, noisy_table(75, np.random.default_rng(seed))[0]).outliers)
 
 
+@pytest.mark.slow
 def test_good_rows_are_left_in_peace():
     called = sum(
         len(identify(NOMINAL, noisy_table(75, np.random.default_rng(s))[0]).outliers) for s in range(4)
@@ -85,6 +86,7 @@ def test_good_rows_of_150_tables_are_left_in_peace():
     assert sum(called) <= 4
 
 
+@pytest.mark.slow
 def test_what_oscillates_by_a_micrometre_is_no_gross_error():
     """Residuals of rare jumps of ten micrometres among nanometres: nobody wants a name for these rows."""
     rng = np.random.default_rng(4)

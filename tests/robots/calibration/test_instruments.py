@@ -124,6 +124,7 @@ def test_a_ball_bar_beside_a_tracker_makes_the_robot_more_accurate():
     assert both < 0.9 * alone
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("count", [40, 400])
 def test_lines_with_gross_errors_are_named_and_the_rest_of_their_configuration_is_used(count: int):
     true, seen = observed(count=count, noise=3e-5, seed=2)

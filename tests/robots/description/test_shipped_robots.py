@@ -62,6 +62,7 @@ def test_the_lowest_modes_lie_where_such_robots_have_them(name: str, low: float,
     assert frequency[2] > 2.0 * high
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", shipped_robots())
 def test_a_robot_with_errors_is_a_robot_file_too(name: str, tmp_path: Path):
     """Elastic structure and counterbalance come along, although axis 2 leans out of its plane."""

@@ -30,6 +30,7 @@ def stiffening_robot(stiffening: Stiffening) -> RobotModel:
     return robot
 
 
+@pytest.mark.slow
 @given(deflections, st.floats(0.5, 2.0))
 def test_a_row_is_its_springs_side_by_side(x: np.ndarray, factor: float):
     for i, spring in enumerate(SPRINGS):

@@ -169,6 +169,7 @@ def test_the_best_candidates_of_a_screening_are_the_best_allowed_ones():
     assert (grid.configurations(numbers)[:, 0] > 0.0).all()
 
 
+@pytest.mark.slow
 def test_the_way_is_short():
     """With seven places all ways can be compared; 2-opt comes within a tenth, and never repeats a place."""
     rng = np.random.default_rng(0)

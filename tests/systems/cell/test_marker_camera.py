@@ -87,6 +87,7 @@ def test_samples_come_when_those_of_the_pose_camera_come(delay: float):
             np.testing.assert_allclose(mine.X_WE.GetAsMatrix4(), other.X_WE.GetAsMatrix4(), atol=1e-9)
 
 
+@pytest.mark.slow
 def test_the_residual_is_the_spread_of_the_position():
     """Fifteen hundred numbers know a standard deviation to 1.8 %; four times that is allowed."""
     found = each_exposure(ExposureConfig(), MarkerFeaturesConfig(), 500)
@@ -151,6 +152,7 @@ def test_by_images_the_pose_is_as_good_as_its_residual_says():
     assert np.abs(errors(found)[:, 3:]).max() < 10.0 * residual
 
 
+@pytest.mark.slow
 def test_by_images_a_body_is_followed_in_motion_among_reflections():
     """1 m/s upwards; two reflections in every window, some of them round and as large as a marker."""
     markers = MarkerFeaturesConfig(images=ImageConfig(reflections=2.0))
@@ -177,6 +179,7 @@ def test_by_images_a_body_is_found_again_after_a_break():
     assert np.abs(errors(found)[:, 3:]).max() < 1e-4
 
 
+@pytest.mark.slow
 def test_by_images_the_seed_decides_the_noise():
     once, again, other = (
         errors(each_exposure(ExposureConfig(), MarkerFeaturesConfig(), 5, "images", seed=seed))

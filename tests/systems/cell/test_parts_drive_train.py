@@ -131,6 +131,7 @@ def test_left_alone_a_train_only_loses_energy(name: str, start: tuple[float, flo
     assert energies[-1] < 0.999 * energies[0]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", PARTS)
 def test_under_any_torque_a_train_stores_no_more_than_it_was_given(name: str):
     """The work of the motor is exact for a torque that is held while it turns from one angle to another."""
@@ -145,6 +146,7 @@ def test_under_any_torque_a_train_stores_no_more_than_it_was_given(name: str):
     assert given > 0.02  # J
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["cubic", "uneven ratio"])
 def test_what_has_no_loss_conserves_energy(name: str):
     rig = Rig(train(**PARTS[name])).start(1.0, -1.0, 2e-3, accuracy=1e-7)

@@ -77,6 +77,7 @@ def test_the_error_is_what_the_covariance_says_whatever_the_camera_is_believed_t
     assert 3.0 < np.mean(squares) < 9.0  # chi squared of six, of four robots that are wrong in their own way
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", [2, 3, 4])
 def test_seconds_at_rest_do_not_freeze_what_was_linearised_far_off(seed: int):
     kept, frozen = Session(seed), Session(seed, relinearise=np.inf)

@@ -48,6 +48,7 @@ def test_on_a_smooth_path_torques_hardly_change_with_the_tick(robot_name: str, k
     assert change_with_the_tick(robot_name, kind, "polynomial") < 0.005
 
 
+@pytest.mark.slow
 def test_on_a_path_whose_fourth_derivative_jumps_they_do():
     """So that the law above could fail: the jumps are spread over a tick, the higher the shorter it is."""
     assert change_with_the_tick("kr16", "elastic_structure", "sine_squared") > 0.05

@@ -95,6 +95,7 @@ def test_far_from_the_wanted_orientation_the_feedback_still_turns_the_shorter_wa
     assert np.linalg.norm(feedback[:3]) == pytest.approx(7.0 * np.sin(np.deg2rad(angle_deg)))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("law", CORRECTING)
 @pytest.mark.parametrize("delay", [1, 10])
 @pytest.mark.parametrize("part", ["translation", "rotation"])

@@ -31,6 +31,7 @@ def test_weights_and_residuals_are_those_of_the_registration_of_calibration():
     np.testing.assert_allclose(fit.residual, other.residual, atol=1e-10)
 
 
+@pytest.mark.slow
 def test_the_covariance_is_that_of_many_measurements():
     """Points of very different quality; 3000 measurements know a standard deviation to 1.3 %, 4 sigma."""
     n, X = 3000, random_pose(RNG)

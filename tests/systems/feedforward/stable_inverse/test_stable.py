@@ -34,6 +34,7 @@ def planned(point: str) -> Plan:
     return inverse(point=point).plan(times, START + PROFILE.at_times(times - SETTLE)[0][:, None] * axes)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("point", ["tip", "wrist"])
 def test_the_point_is_on_its_path_to_a_hundredth_of_a_micrometre(point: str):
     assert planned(point).history[-1] < 1e-8

@@ -25,6 +25,7 @@ def test_without_losses_the_robot_is_where_it_was_commanded_one_cycle_ago(mode):
     np.testing.assert_allclose(planned[1:], wanted[:-1], atol=2e-10)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("mode", MODES)
 @given(lost=st.lists(st.integers(5, 180), max_size=60))
 @settings(max_examples=15)

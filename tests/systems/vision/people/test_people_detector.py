@@ -33,6 +33,7 @@ def test_light_that_changes_all_over_is_estimated_and_is_nobody(gain):
     np.testing.assert_allclose([pixels.gain for pixels in found.pixels], gain, rtol=0.01)
 
 
+@pytest.mark.slow
 def test_who_stands_still_is_never_absorbed_while_slow_changes_are():
     memory, person = MEMORY, person_at(1.4, 0.6)
     images = painted(person, ELSEWHERE, RNG)

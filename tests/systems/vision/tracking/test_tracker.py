@@ -72,6 +72,7 @@ def assert_holds(times: np.ndarray, poses: np.ndarray, joints: np.ndarray) -> No
         assert error @ np.linalg.solve(0.1**2 * pose.fit.cofactor, error) < 50.0  # chi^2 of 6: 5e-9
 
 
+@pytest.mark.slow
 def test_tracking_holds_with_occlusion_false_and_missing_blobs():
     times, poses, joints = path_and_joints(1)
     part = slice(300, 700)  # about the fastest part of the first edge
