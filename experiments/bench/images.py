@@ -18,8 +18,8 @@ from robots.kinematics.arm_capsules import ArmCapsules
 from robots.pose import pose_error
 from systems.cell.imaging.images import ImageConfig, ImageSource
 from systems.reference.paths import ReferenceConfig, make_path
+from systems.vision.blobs.centroids import CentroidConfig, blobs_in
 from systems.vision.camera_rig import load_cell
-from systems.vision.centroids import CentroidConfig, blobs_in
 from systems.vision.marker_body import load_body
 from systems.vision.tracking.tracker import Tracker, TrackerState
 

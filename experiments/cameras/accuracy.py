@@ -20,8 +20,8 @@ from robots.kinematics.forward import Kinematics
 from robots.measurement_design.constraints import AdmissibleConfigurations
 from systems.cell.imaging.images import ImageConfig, ImageSource
 from systems.reference.paths import CartesianPath
+from systems.vision.blobs.centroids import CentroidConfig, blobs_in
 from systems.vision.camera_model import Cameras
-from systems.vision.centroids import CentroidConfig, blobs_in
 from systems.vision.marker_body import DetectionBody
 from systems.vision.tracking.marker_images import image_shares, marker_diameters, touching
 from systems.vision.tracking.pose_refinement import linearize, shared

@@ -22,8 +22,8 @@ from systems.cell.imaging.image_blobs import ImageBlobs
 from systems.cell.imaging.images import ImageConfig
 from systems.cell.pose_camera import BLOCK, ExposureConfig
 from systems.samples import PoseSample
+from systems.vision.blobs.centroids import CentroidConfig
 from systems.vision.camera_rig import load_cell
-from systems.vision.centroids import CentroidConfig
 from systems.vision.marker_body import load_body
 from systems.vision.tracking.tracker import Tracker, TrackerConfig, TrackerState
 

@@ -4,8 +4,8 @@ import numpy as np
 
 from robots.kinematics.arm_capsules import Capsules
 from systems.cell.imaging.images import ImageConfig, ImageSource
+from systems.vision.blobs.centroids import CentroidConfig, blobs_in, check_centroids
 from systems.vision.camera_model import Cameras
-from systems.vision.centroids import CentroidConfig, blobs_in, check_centroids
 from systems.vision.marker_body import DetectionBody
 
 

@@ -116,7 +116,8 @@ def _refuse_too_little(run: WandRun, seen: np.ndarray, names: list[str]) -> None
     for name, count in zip(names, seen.sum((1, 2)), strict=True):
         if count < MINIMUM_WAND_POINTS:
             raise UndeterminedError(
-                f"camera {name}: saw {count} points of the wand, needs {MINIMUM_WAND_POINTS}"
+                f"camera {name}: saw {count} points of the wand, needs {MINIMUM_WAND_POINTS}: carry it "
+                "through more places before it"
             )
 
 

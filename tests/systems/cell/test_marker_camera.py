@@ -20,8 +20,8 @@ from systems.cell.marker_camera import (
 )
 from systems.cell.pose_camera import BLOCK, ExposureConfig, PoseCamera, PoseCameraConfig
 from systems.samples import PoseSample
+from systems.vision.blobs.centroids import CentroidConfig
 from systems.vision.camera_rig_file import cell_text, with_cameras
-from systems.vision.centroids import CentroidConfig
 from systems.vision.tracking.tracker import TrackerConfig
 from tests.systems.rigs import arrivals, camera_samples, pose
 from tests.systems.vision.rigs import CELL

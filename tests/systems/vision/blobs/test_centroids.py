@@ -1,11 +1,12 @@
 """Centroids: within a tenth of a px of the truth, and nothing that does not look like a marker."""
 
+import cv2
 import numpy as np
 import pytest
 
 from systems.cell.imaging.images import ImageConfig, ImageSource
+from systems.vision.blobs.centroids import CentroidConfig, blobs_in, centroids, check_centroids
 from systems.vision.camera_model import Cameras
-from systems.vision.centroids import CentroidConfig, blobs_in, centroids, check_centroids
 from systems.vision.rendering import Picture
 from systems.vision.tracking.marker_images import marker_diameters, touching
 from tests.systems.vision.rigs import BODY, CAMERAS, CELL, placed, random_pose
@@ -127,3 +128,32 @@ def test_blobs_of_cameras_are_padded_and_shifted_by_their_size():
 def test_refuses_what_cannot_be(change: dict, message: str):
     with pytest.raises(ValueError, match=f"centroids: {message}"):
         check_centroids(CentroidConfig(**change))
+
+
+def test_components_are_those_of_opencv_wherever_they_lie():
+    """Discs and noise anywhere, also across edges: areas, order and middles as OpenCV counts them."""
+    rng, count = np.random.default_rng(4), 0
+    config = CentroidConfig(threshold=0.1, smallest=1, longest=4.0, least_filled=0.1)
+    level = 25
+    for _ in range(200):
+        pixels = (rng.random((50, 60)) < 0.01).astype(np.uint8) * np.uint8(80)
+        for _ in range(rng.integers(0, 5)):
+            middle = tuple(int(x) for x in rng.integers(-3, 63, 2))
+            cv2.circle(pixels, middle, int(rng.integers(2, 8)), int(rng.integers(30, 256)), -1)
+        middles, areas = centroids(Picture(pixels, np.array([7, 11])), config)
+        lit = (pixels > level).astype(np.uint8)
+        _, labels, stats, _ = cv2.connectedComponentsWithStats(lit, connectivity=8)
+        left, top, width, height, area = stats[1:].T
+        whole = (left > 0) & (top > 0) & (left + width < 60) & (top + height < 50)
+        expected = []
+        for label in 1 + np.flatnonzero(whole):
+            v, u = np.nonzero(labels == label)
+            expected.append(np.average([u + 7, v + 11], axis=1, weights=pixels[v, u] - float(level)))
+        # Some are too long or too hollow for a marker; those that are left stand in the same order.
+        where = [int(np.abs(np.array(expected) - found).sum(axis=1).argmin()) for found in middles]
+        assert where == sorted(set(where))
+        for found, size, k in zip(middles, areas, where, strict=True):
+            np.testing.assert_allclose(found, expected[k], atol=1e-9)
+            assert size == area[whole][k]
+        count += len(areas)
+    assert count > 500

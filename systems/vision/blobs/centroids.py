@@ -9,6 +9,8 @@ for nothing at the moment when it drops out.
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cache
+from typing import Any
 
 import cv2
 import numpy as np
@@ -57,7 +59,7 @@ def blobs_in(pictures: Sequence[Picture], cameras: Cameras, config: CentroidConf
     Returns:
         Pixels, shape (n, b, 2), b at least one, NaN where there is none; in no order that means anything.
     """
-    found = [centroids(picture, config) for picture in pictures]
+    found = _markers(pictures, config)
     most = max(1, *(len(area) for _, area in found))
     middles, areas = np.full((len(found), most, 2), np.nan), np.full((len(found), most), np.nan)
     for i, (middle, area) in enumerate(found):
@@ -70,34 +72,61 @@ def centroids(picture: Picture, config: CentroidConfig) -> tuple[np.ndarray, np.
 
     A blob at the edge of the window is left out, for it may go on behind it.
     """
-    pixels, level = picture.pixels, int(config.threshold * FULL_SCALE)
+    return _markers([picture], config)[0]
+
+
+def _markers(pictures: Sequence[Picture], config: CentroidConfig) -> list[tuple[np.ndarray, np.ndarray]]:
+    """`centroids` of several pictures; what numpy has to do is done for all of them at once."""
+    components = [_components(picture, int(config.threshold * FULL_SCALE)) for picture in pictures]
+    weighted, plain, is_whole = (np.concatenate(parts) for parts in zip(*components, strict=True))
+    area = plain[:, 0]
+    is_marker = is_whole & (area >= config.smallest) & (area <= config.largest) & _is_round(plain, config)
+    ends = np.cumsum([len(part) for part, _, _ in components])
+    which = np.searchsorted(ends, np.flatnonzero(is_marker), side="right")
+    middle, area = weighted[is_marker, 1:3] / weighted[is_marker, :1], area[is_marker]
+    return [(middle[which == i] + picture.corner, area[which == i]) for i, picture in enumerate(pictures)]
+
+
+def _components(picture: Picture, level: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Sums as of `moments`, weighted and plain, (k, 6), and which components are off the edges, (k,)."""
+    pixels = picture.pixels
+    nothing = np.empty((0, 6)), np.empty((0, 6)), np.empty(0, bool)
     if not pixels.size:
-        return np.empty((0, 2)), np.empty(0)
+        return nothing
     _, lit = cv2.threshold(pixels, level, 1, cv2.THRESH_BINARY)
-    count, labels, stats, _ = cv2.connectedComponentsWithStats(lit, connectivity=8, ltype=cv2.CV_32S)
+    # Most of a window is dark. OpenCV's own statistics take three times as long as finding the components.
+    left, top, width, height = cv2.boundingRect(lit)
+    if not width:
+        return nothing
+    right, bottom = left + width, top + height
+    # OpenCV looks at blocks of 2 x 2 pixels: with the same blocks components keep their order.
+    left, top = left - left % 2, top - top % 2
+    part = slice(top, bottom), slice(left, right)
+    count, found = cv2.connectedComponents(lit[part], connectivity=8, ltype=cv2.CV_32S)
+    labels = np.asarray(found, np.int32)
     if not 1 < count < _LARGEST_LABEL:
-        return np.empty((0, 2)), np.empty(0)
-    left, top, width, height, area = stats.T
-    inside = (left > 0) & (top > 0)
-    inside &= (left + width < pixels.shape[1]) & (top + height < pixels.shape[0])
-    inside &= (area >= config.smallest) & (area <= config.largest)
-    inside[0] = False  # the background
-    places = cv2.findNonZero(lit)[:, 0]
-    u, v = places.T
-    label = labels[v, u]
-    excess = pixels[v, u].astype(float) - level
-    first = _sums(label, count, excess, u, v)
-    second = _sums(label, count, np.ones(len(u)), u, v)
-    is_marker = inside & _is_round(second, config)
-    middle = first[is_marker, 1:3] / first[is_marker, :1]
-    return middle + picture.corner, area[is_marker].astype(float)
+        return nothing
+    weighted, plain = np.zeros((count, 6)), np.zeros((count, 6))
+    is_whole = np.ones(count, bool)
+    is_whole[0] = False  # the background
+    _moments()(pixels[part], labels, left, top, float(level), weighted, plain)
+    for beyond, edge in (
+        (left == 0, labels[:, 0]),
+        (top == 0, labels[0]),
+        (right == pixels.shape[1], labels[:, -1]),
+        (bottom == pixels.shape[0], labels[-1]),
+    ):
+        if beyond:
+            is_whole[edge] = False
+    return weighted, plain, is_whole
 
 
-def _sums(label: np.ndarray, count: int, weight: np.ndarray, u: np.ndarray, v: np.ndarray) -> np.ndarray:
-    """Sums of w, wu, wv, wuu, wuv, wvv over each component, (count, 6)."""
-    wu, wv = weight * u, weight * v
-    terms = (weight, wu, wv, wu * u, wu * v, wv * v)
-    return np.stack([np.bincount(label, term, count) for term in terms], -1)
+@cache
+def _moments() -> Any:
+    """The compiled sums: numba takes a third of a second to import, and not everybody looks at pictures."""
+    from systems.vision.blobs.moments import moments
+
+    return moments
 
 
 def _is_round(sums: np.ndarray, config: CentroidConfig) -> np.ndarray:

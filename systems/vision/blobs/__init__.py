@@ -1,0 +1,1 @@
+"""Markers in images: bright round regions and their centroids."""
