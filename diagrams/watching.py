@@ -54,14 +54,18 @@ def watched_cell(scenario: Scenario, robot: RobotModel, pictures: Pictures | Non
         figures = [person.figure for person in people]
         rest = detector.arm.at(np.deg2rad(scenario.home_deg))
         pictures = CellPictures(cameras, size, surroundings, rest, figures, COLORS)
-    reaction = ReactionTime(
-        images=overview.period,
-        transport=overview.delay,
-        computation=config.computation,
+    return WatchedCell(detector, pictures, people, reaction_time(scenario), size)
+
+
+def reaction_time(scenario: Scenario) -> ReactionTime:
+    """T_r of the chain of a scenario, from the delays that are named in it."""
+    return ReactionTime(
+        images=scenario.station.overview.period,
+        transport=scenario.station.overview.delay,
+        computation=scenario.servo.people.computation,
         decision=scenario.servo.separation.period,
         command=scenario.reference.preview + 2.0 * scenario.station.period + scenario.station.drive.dead_time,
     )
-    return WatchedCell(detector, pictures, people, reaction, size)
 
 
 def joints_along(scenario: Scenario, robot: RobotModel, path: CartesianPath) -> tuple[np.ndarray, np.ndarray]:
@@ -102,6 +106,30 @@ class Watch:
     monitor: SeparationMonitor
 
 
+def separation_monitor(
+    scenario: Scenario, believed: RobotModel, tick: float | None = None
+) -> SeparationMonitor:
+    """What decides how fast the robot may go.
+
+    Args:
+        scenario: with `station.overview`.
+        believed: the robot as the controller knows it.
+        tick: as of the monitor.
+
+    Raises:
+        ValueError: if times and distances contradict each other.
+    """
+    return SeparationMonitor(
+        believed,
+        watched_arm(believed, scenario.servo.people),
+        scenario.servo.separation,
+        reaction_time(scenario),
+        scenario.reference.slowing,
+        fastest(make_path(scenario.reference)),
+        tick,
+    )
+
+
 def make_watch(
     scenario: Scenario, robot: RobotModel, plant: RobotModel | None = None, pictures: Pictures | None = None
 ) -> Watch:
@@ -124,20 +152,13 @@ def make_watch(
     watcher = PeopleWatcher(
         watched.detector,
         watched.detector.learn(images, places),
-        scenario.servo.people.hull.edge,
         overview.period,
         overview.delay + scenario.servo.people.computation,
         scenario.station.period,
         scenario.servo.people.tracks,
+        scenario.servo.people.lasting,
     )
-    monitor = SeparationMonitor(
-        believed,
-        watched.detector.arm,
-        scenario.servo.separation,
-        watched.reaction,
-        scenario.reference.slowing,
-        fastest(path),
-    )
+    monitor = separation_monitor(scenario, believed)
     return Watch(watched, OverviewCamera(overview, watched.pictures, arm, watched.people), watcher, monitor)
 
 

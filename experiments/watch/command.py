@@ -1,6 +1,7 @@
 """``truetip watch``: people in the cell, and what they do to the speed of the robot."""
 
 from contextlib import ExitStack
+from dataclasses import replace
 from pathlib import Path
 from typing import Annotated
 
@@ -10,12 +11,13 @@ from rich.markup import escape
 from experiments.cli.console import print_files, progress_bar, refusing
 from experiments.cli.json_output import human_console, json_output
 from experiments.cli.option_limits import at_least, positive
-from experiments.cli.options import JsonOption, OnlyPictureOption, RobotOption, ScenarioOption, SetOption
+from experiments.cli.options import JsonOption, PictureOption, RobotOption, ScenarioOption, SetOption
 from experiments.cli.prepare import prepare, simulated_only
 from experiments.cli.staging import PAGE, staged_file
 from experiments.watch.page import AID, run_verdict, study_verdict, write_run_page, write_study_page
-from experiments.watch.run import watch_recorded, watch_simulated
+from experiments.watch.run import seen_by_network, watch_recorded, watch_simulated
 from experiments.watch.study import study_watch
+from systems.vision.people.person_networks import PersonNetwork
 from systems.vision.people.surroundings import load_surroundings
 
 
@@ -37,14 +39,22 @@ def watch_command(
     study: Annotated[
         bool, typer.Option("--study", help="How well people are seen at random places, and false stops.")
     ] = False,
-    places: Annotated[int, typer.Option(metavar="N", help="Places of a study.")] = 30,
+    places: Annotated[int, typer.Option(metavar="N", help="Number of places in a study.")] = 30,
     minutes: Annotated[
-        float, typer.Option(metavar="MIN", help="Of the empty cell in a study; 0 for none.")
+        float, typer.Option(metavar="MIN", help="Minutes of the empty cell in a study; 0 for none.")
     ] = 10.0,
     every: Annotated[
-        float, typer.Option(metavar="S", help="Between two sets of images of the empty cell in a study.")
+        float, typer.Option(metavar="S", help="Time between two sets of images of the empty cell in a study.")
     ] = 2.0,
-    out: OnlyPictureOption = Path("out/watch.html"),
+    network: Annotated[
+        str | None,
+        typer.Option(
+            metavar="FILE",
+            help="A detection network that looks at the pictures of the page too: .onnx of make detector, or "
+            ".cfg of a tiny YOLO v3 with .weights beside it.",
+        ),
+    ] = None,
+    out: PictureOption = Path("out/watch.html"),
     json_file: JsonOption = None,
 ) -> None:
     """Watch for people and slow the robot for them; an aid, not a safety function."""
@@ -57,6 +67,9 @@ def watch_command(
             raise ValueError(f"--minutes must not be negative, got {minutes:g}")
         if study and images:
             raise ValueError("--study draws its own images; leave out --images")
+        if study and network:
+            raise ValueError("--study is of the hull alone; leave out --network")
+        people = PersonNetwork(network) if network else None
         prepared = prepare(scenario, settings or [], robot)
         simulated_only(prepared, "watch", "give recorded images with --images")
         chosen, ground = prepared.scenario, load_surroundings(prepared.scenario.station.overview.surroundings)
@@ -76,6 +89,8 @@ def watch_command(
                     if images
                     else watch_simulated(chosen, prepared.robot, chosen.law, progress)
                 )
+            if people is not None and run.snapshot is not None:
+                run = replace(run, boxes=seen_by_network(people, run))
             verdict = run_verdict(run)
             write_run_page(page, title, run, run.cell.detector.cameras, ground)
             output.write(run.as_dict())

@@ -13,12 +13,13 @@ from experiments.watch.run import WatchRun, parts
 from experiments.watch.study import WatchStudy
 from systems.vision.camera_model import Cameras
 from systems.vision.people.surroundings import Surroundings
+from systems.vision.people.visual_hull import Body
 
 AID = "An aid, not a safety function: it must not replace fences, light curtains or a rated controller."
 _SHOWN = 4  # cameras
 _STOP, _SLOW, _THINGS = "#d55e00", "#8a6d00", "#8a95a5"
 _AT_THE_ROBOT = 0.01  # m: what is nearer is not told apart
-_HULL, _BOX = (60, 60, 230), (0, 200, 255)  # blue, green, red
+_HULL, _BOX, _NETWORK = (60, 60, 230), (0, 200, 255), (80, 220, 80)  # blue, green, red
 
 
 def write_run_page(
@@ -51,7 +52,20 @@ def write_run_page(
     ]
     if run.snapshot is not None:
         note = f"At {run.snapshot.time:.2f} s: dots are the middles of the cubes of the hull."
-        sections.insert(2, Section("Where somebody was nearest", note, _pictures(run, cameras)))
+        if run.boxes is not None:
+            seen = f"{run.confirmed} of {len(run.boxes)} images"
+            note += f" Green boxes are people to the network, which sees this one in {seen}."
+        sections.insert(
+            2,
+            Section(
+                "Where somebody was nearest",
+                note,
+                _pictures(run.snapshot.images, run.snapshot.bodies, cameras, run.boxes),
+            ),
+        )
+    if run.changes:
+        note = "Somebody who stands still looks the same, so that the robot keeps its distance all the same."
+        sections.insert(1, Section("Changes of the cell that stay", note, _changes(run, cameras)))
     write_plot_page(path, title, f"{run_verdict(run)} {AID}", sections)
 
 
@@ -108,8 +122,14 @@ def run_verdict(run: WatchRun) -> str:
     return (
         f"In {numbers['duration_s']:.1f} s {seen}; {count(numbers['stops'], 'stop')}, "
         f"slowed for {numbers['slowed_s']:.1f} s, "
-        f"stopped for {numbers['stopped_s']:.1f} s."
+        f"stopped for {numbers['stopped_s']:.1f} s{_stays(len(run.changes))}."
     )
+
+
+def _stays(changes: int) -> str:
+    if not changes:
+        return ""
+    return f"; {count(changes, 'change')} of the cell that {'stays' if changes == 1 else 'stay'}"
 
 
 def study_verdict(study: WatchStudy) -> str:
@@ -207,15 +227,32 @@ def _terms(run: WatchRun) -> str:
     return html_table(("term", "value"), rows)
 
 
-def _pictures(run: WatchRun, cameras: Cameras) -> str:
-    """Pictures of the cameras that see most of the hull, as HTML."""
-    snapshot = run.snapshot
-    assert snapshot is not None
-    height, width = snapshot.images.shape[1:3]
+def _changes(run: WatchRun, cameras: Cameras) -> str:
+    """A table of what is new and stays, each with pictures, as HTML."""
+    rows, pictures = [], []
+    for number, each in enumerate(run.changes, 1):
+        said = run.described(each)
+        place, size = (", ".join(f"{v:.2f}" for v in said[name]) for name in ("place_m", "size_m"))
+        since = f"{said['since_s']:.1f} s"
+        rows.append([str(number), since, f"{place} m", f"{size} m", f"{1e3 * said['volume_m3']:.0f} l"])
+        pictures.append(_pictures(each.images, [each.standing.body], cameras, None, 2))
+    head = ("number", "since", "place x, y, z", "size along x, y, z", "volume")
+    return html_table(head, rows) + "".join(pictures)
+
+
+def _pictures(
+    images: np.ndarray,
+    bodies: list[Body],
+    cameras: Cameras,
+    boxes: list[np.ndarray] | None,
+    shown: int = _SHOWN,
+) -> str:
+    """Pictures of the cameras that see most of a hull, as HTML."""
+    height, width = images.shape[1:3]
     drawn = []
-    for i, image in enumerate(snapshot.images):
+    for i, image in enumerate(images):
         picture, inside = image.copy(), 0
-        for body in snapshot.bodies:
+        for body in bodies:
             pixels = cameras.subset([i]).project(body.points)[0]
             seen = (
                 np.isfinite(pixels).all(axis=1)
@@ -232,10 +269,13 @@ def _pictures(run: WatchRun, cameras: Cameras) -> str:
             for u, v in np.rint(pixels[seen]).astype(int):
                 cv2.circle(picture, (int(u), int(v)), 1, _HULL, -1)
             cv2.rectangle(picture, (int(low[0]), int(low[1])), (int(high[0]), int(high[1])), _BOX, 2)
+        for box in boxes[i] if boxes else ():
+            left, upper, right, lower = np.rint(box).astype(int).tolist()
+            cv2.rectangle(picture, (left, upper), (right, lower), _NETWORK, 2)
         drawn.append((inside, picture))
     drawn.sort(key=lambda each: -each[0])
     found = []
-    for _, picture in drawn[:_SHOWN]:
+    for _, picture in drawn[:shown]:
         code = b64encode(cv2.imencode(".jpg", picture)[1].tobytes()).decode()
         found.append(f'<img src="data:image/jpeg;base64,{code}" style="width:48%;margin:0.5%" alt="camera">')
     return "".join(found)

@@ -18,6 +18,13 @@ from systems.guard.separation.protective_distance import ReactionTime, protectiv
 from systems.guard.separation.separation_monitor import STATUS
 from systems.reference.paths import make_path
 from systems.vision.camera_rig import load_cell
+from systems.vision.people.lasting_changes import (
+    LastingChange,
+    Standing,
+    lasting_changes,
+    standing_still,
+)
+from systems.vision.people.person_networks import PersonNetwork
 from systems.vision.people.visual_hull import Body
 
 _EVERY = 0.02  # s, between two times of a timeline
@@ -46,6 +53,7 @@ class Snapshot:
     time: float  # s
     images: np.ndarray  # (n, h, w, 3) of uint8
     bodies: list[Body]
+    q: np.ndarray  # joints in them in rad, (6,)
 
 
 @dataclass(frozen=True)
@@ -57,6 +65,8 @@ class WatchRun:
     snapshot: Snapshot | None
     terms: dict[str, float]  # of the protective distance at full speed in m
     notes: list[str]
+    changes: tuple[LastingChange, ...] = ()  # of the cell, that stay
+    boxes: list[np.ndarray] | None = None  # in px, of people in each image of the snapshot by a network
 
     @property
     def stops(self) -> int:
@@ -80,8 +90,45 @@ class WatchRun:
             "stopped_s": round(step * float(np.count_nonzero(line.stopped)), 2),
             "reaction_s": {**parts(self.cell.reaction), "total": round(self.cell.reaction.total, 4)},
             "protective_distance_m": self.terms,
+            "changes": [self.described(each) for each in self.changes],
             "notes": self.notes,
+            **({} if self.boxes is None else {"confirmed_by_cameras": self.confirmed}),
         }
+
+    def described(self, change: LastingChange) -> dict[str, Any]:
+        """Since when, where and how large, in the units of the names."""
+        standing = change.standing
+        return {
+            "since_s": round(standing.since, 3),
+            "known_s": round(change.known, 3),
+            "place_m": np.round(standing.place, 3).tolist(),
+            "size_m": np.round(standing.size(self.edge), 3).tolist(),
+            "volume_m3": round(standing.body.volume, 4),
+        }
+
+    @property
+    def edge(self) -> float:
+        """Of the cubes of the hull in m."""
+        return self.cell.detector.edge
+
+    @property
+    def confirmed(self) -> int:
+        """In how many images of the snapshot a box of the network has most of the hull that is seen there."""
+        assert self.snapshot is not None
+        cameras, found = self.cell.detector.cameras, 0
+        for i, boxes in enumerate(self.boxes or []):
+            for body in self.snapshot.bodies[:1]:
+                pixels = cameras.subset([i]).project(body.points)[0]
+                inside = [((pixels >= box[:2]) & (pixels <= box[2:])).all(axis=1).mean() for box in boxes]
+                found += int(max(inside, default=0.0) > 0.5)
+        return found
+
+
+def seen_by_network(network: PersonNetwork, run: WatchRun) -> list[np.ndarray]:
+    """Boxes of people in each image of the snapshot; what mostly shows the known robot does not count."""
+    assert run.snapshot is not None
+    masks = run.cell.detector.masks(run.snapshot.q)
+    return [network.people(image, mask)[0] for image, mask in zip(run.snapshot.images, masks, strict=True)]
 
 
 def parts(reaction: ReactionTime) -> dict[str, float]:
@@ -120,9 +167,10 @@ def watch_simulated(scenario: Scenario, robot: RobotModel, law: str, progress: P
         data["stop"][some, 0] > 0.5,
         np.array(place),
     )
-    return WatchRun(
-        line, watch.cell, _snapshot(scenario, watch.cell, line, joints), _terms(scenario, watch.cell), []
-    )
+    snapshot = _snapshot(scenario, watch.cell, line, joints)
+    context = watch.watcher.GetMyContextFromRoot(experiment.simulator.get_context())
+    changes = watch.watcher.changes(context)
+    return WatchRun(line, watch.cell, snapshot, _terms(scenario, watch.cell), [], changes)
 
 
 def watch_recorded(
@@ -152,9 +200,15 @@ def watch_recorded(
     terms = _terms(scenario, cell)
     reach = 0.5 * np.sqrt(3.0) * scenario.servo.people.hull.edge
     distances, places, trusted, best = [], [], [], None
+    standing: tuple[Standing, ...] = ()
+    changes: tuple[LastingChange, ...] = ()
+    config = scenario.servo.people
     for number, images in enumerate(sets, empty):
         q = recording.joints[number]
         found, memory = detector.detect(memory, images, q)
+        time = float(recording.times[number])
+        standing = standing_still(standing, time, found.bodies, config.hull.edge)
+        changes = lasting_changes(changes, standing, time, images, config.lasting, config.hull.edge)
         arm = detector.arm.at(q)
         gaps = [float(arm.distances(body.points).min()) - reach for body in found.bodies]
         distances.append(min(gaps, default=np.nan))
@@ -163,7 +217,7 @@ def watch_recorded(
         )
         trusted.append(found.trusted)
         if gaps and (best is None or min(gaps) <= np.nanmin(distances)):
-            best = Snapshot(float(recording.times[number]), images, found.bodies)
+            best = Snapshot(float(recording.times[number]), images, found.bodies, q)
         progress((number + 1 - empty) / (len(recording) - empty))
     distance, needed = np.array(distances), terms["total"]
     nothing = np.full(len(distance), np.nan)
@@ -179,7 +233,7 @@ def watch_recorded(
     )
     notes = [f"camera {name} ended after {number} sets" for name, number in recording.ended.items()]
     notes += [f"{np.count_nonzero(~np.array(trusted))} sets are not trusted"] if not all(trusted) else []
-    return WatchRun(line, cell, best, terms, notes)
+    return WatchRun(line, cell, best, terms, notes, changes)
 
 
 def _number(values: np.ndarray) -> float | None:
@@ -211,4 +265,4 @@ def _snapshot(scenario: Scenario, cell: WatchedCell, line: Timeline, joints: np.
     )
     # Of this arm alone: what is behind it stays unknown.
     memory = cell.detector.learn([empty], [q])
-    return Snapshot(time, images, cell.detector.detect(memory, images, q)[0].bodies)
+    return Snapshot(time, images, cell.detector.detect(memory, images, q)[0].bodies, q)

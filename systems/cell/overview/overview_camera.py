@@ -46,6 +46,8 @@ class OverviewConfig:
     width: int = quantity(640, 64, 8192, "px")  # of a whole image
     period: float = quantity(0.05, 1e-3, 10.0, "s")  # between two sets of images
     delay: float = quantity(0.03, 0.0, 1.0, "s")  # from exposure to arrival
+    # Of a real station: address of the video of a camera, {camera} for its name; drawn for a virtual cell
+    source: str = ""
     losses: list[float] = numbers((), unit="s")  # begin and end of one time after the other without images
     light: LightConfig = field(default_factory=LightConfig)
 

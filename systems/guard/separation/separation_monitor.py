@@ -1,5 +1,6 @@
 """The system that decides how fast the robot may go while people are near. An aid, not a safety function."""
 
+import importlib
 from collections.abc import Callable
 
 import numpy as np
@@ -55,6 +56,7 @@ class SeparationMonitor(LeafSystem):
         reaction: ReactionTime,
         stop_time: float,
         path_speed: float = 0.0,
+        tick: float | None = None,
     ) -> None:
         """Makes the system.
 
@@ -65,6 +67,8 @@ class SeparationMonitor(LeafSystem):
             reaction: T_r of the chain that this system is in.
             stop_time: s in which a path comes to rest that is run at full speed.
             path_speed: the largest of the tool on its path in m/s; the arm is not taken for slower.
+            tick: s, of a control cycle whose systems are all updated at once; it then decides in every so
+                many of them as come nearest to the period of its decisions. None for that period alone.
 
         Raises:
             ValueError: if it would stop before it slows, a fresh image would count as late, or the time to
@@ -84,7 +88,12 @@ class SeparationMonitor(LeafSystem):
             )
         if not stop_time > 0.0:
             raise ValueError(f"separation: the time to rest must be positive, got {stop_time} s")
+        # With numba, which takes time to be imported.
+        self._nearest = importlib.import_module("systems.guard.separation.kernels").nearest
+        self._nearest(np.zeros((1, 3)), np.zeros((1, 3)), np.ones((1, 3)), np.ones(1))
         self._arm, self._config, self._reaction = arm, config, reaction
+        self._tick = tick or config.period
+        self._every = max(1, round(config.period / self._tick))
         self._stop_time, self._path_speed = stop_time, path_speed
         self._acceleration = robot.acceleration
         self._people = self.DeclareAbstractInputPort("person_sample", Value[object](PersonSample()))
@@ -99,7 +108,7 @@ class SeparationMonitor(LeafSystem):
         for name, part in {**parts, "separation": _STATUS}.items():
             size = part.stop - part.start
             self.DeclareVectorOutputPort(name, size, self._shown(part), {self.xd_ticket()})
-        self.DeclarePeriodicDiscreteUpdateEvent(config.period, 0.0, self._decide)
+        self.DeclarePeriodicDiscreteUpdateEvent(self._tick, 0.0, self._decide)
 
     def _shown(self, part: slice) -> Callable[[Context, BasicVector], None]:
         def calc(context: Context, output: BasicVector) -> None:
@@ -120,6 +129,8 @@ class SeparationMonitor(LeafSystem):
         return protective_distance(self._config, self._reaction, speed, stop, fastest)
 
     def _decide(self, context: Context, discrete_state: DiscreteValues) -> None:
+        if round(context.get_time() / self._tick) % self._every:
+            return
         state = context.get_discrete_state(self._state).value().copy()
         sample, joints = self._people.Eval(context), self._joints.Eval(context)
         time, config = context.get_time(), self._config
@@ -130,7 +141,11 @@ class SeparationMonitor(LeafSystem):
         full = self._full_speed(state, np.nan_to_num(self._velocity.Eval(context)), rate)
         arm = self._arm.at(joints.position)
         distance = min(
-            (float(arm.distances(each.points).min()) - each.reach for each in sample.people), default=_FAR
+            (
+                self._nearest(each.points, arm.start, arm.end, arm.radius) - each.reach
+                for each in sample.people
+            ),
+            default=_FAR,
         )
         walking = max((float(np.linalg.norm(each.velocity)) for each in sample.people), default=0.0)
         terms = self.terms(full, joints.position, walking)
@@ -143,7 +158,7 @@ class SeparationMonitor(LeafSystem):
                 state[_STOPPED] = 0.0
         elif time > config.stop_after or distance < _FAR:  # nobody was there before the first images
             state[_STOPPED] = float(distance < needed or age >= config.stop_after)
-        share = min(allowed, state[_SHARE] + config.rise * config.period)
+        share = min(allowed, state[_SHARE] + config.rise * self._every * self._tick)
         state[_SHARE] = 0.0 if state[_STOPPED] else share
         state[_FULL] = full
         zone = _STOP if state[_STOPPED] else (_SLOW if allowed < 1.0 else _FREE)

@@ -30,6 +30,9 @@ class DetectorConfig:
     background: BackgroundConfig = field(default_factory=BackgroundConfig)
     hull: HullConfig = field(default_factory=HullConfig)
     tracks: TrackConfig = field(default_factory=TrackConfig)
+    lasting: float = quantity(
+        5.0, 0.1, 3600.0, "s"
+    )  # at one place, after which a body is a change of the cell
     robot_margin: float = quantity(0.04, 0.0, 0.5, "m")  # about the robot, in which pixels are unknown
     least_trusted: int = quantity(4, 2, 100)  # cameras; with fewer, nobody can be told to be absent
     tool_length: float = quantity(0.35, 0.0, 5.0, "m")  # of what the flange carries; a marker body, assumed
@@ -76,6 +79,11 @@ class PeopleDetector:
         self._config, self.cameras, self._size = config, cameras, size
         self.arm = watched_arm(robot, config)
         self._hull = VisualHull(cameras, size, surroundings, config.hull)
+
+    @property
+    def edge(self) -> float:
+        """Of the cubes of the hull in m."""
+        return self._config.hull.edge
 
     def masks(self, q: np.ndarray) -> np.ndarray:
         """Where the robot is seen at joint positions (6,) in rad, with its margin, (n, height, width)."""

@@ -1,8 +1,5 @@
 """The system that finds people in whole images: background, hull and tracks from sample to sample."""
 
-from dataclasses import dataclass, field
-from typing import Any
-
 import numpy as np
 from pydrake.common.value import Value
 from pydrake.systems.framework import Context, DiscreteValues, LeafSystem, State
@@ -10,25 +7,13 @@ from pydrake.systems.framework import Context, DiscreteValues, LeafSystem, State
 from robots.description.model import NUM_JOINTS
 from systems.samples import ImageSample, JointSample, PersonSample
 from systems.vision.people.background import Memory
+from systems.vision.people.lasting_changes import LastingChange
 from systems.vision.people.people_detector import PeopleDetector
-from systems.vision.people.person_tracks import Track, TrackConfig, followed
+from systems.vision.people.people_follower import Mind, PeopleFollower
+from systems.vision.people.person_tracks import TrackConfig
 
 _KEPT = 64  # joint samples, the newest first, for the one at an exposure
 _WIDTH = 1 + NUM_JOINTS  # time and positions
-
-
-@dataclass(frozen=True)
-class _Mind:
-    """What the watcher remembers."""
-
-    memory: Memory
-    tracks: tuple[Track, ...] = ()
-    next_number: int = 1
-    sample: PersonSample = field(default_factory=PersonSample)
-
-    def __deepcopy__(self, memo: dict[int, Any]) -> "_Mind":
-        """Itself, for nothing in it changes."""
-        return self
 
 
 class PeopleWatcher(LeafSystem):
@@ -46,22 +31,22 @@ class PeopleWatcher(LeafSystem):
         self,
         detector: PeopleDetector,
         memory: Memory,
-        edge: float,
         period: float,
         latency: float,
         joint_period: float,
         tracks: TrackConfig | None = None,
+        lasting: float = np.inf,
     ) -> None:
         """Makes the system.
 
         Args:
             detector: what finds bodies.
             memory: of the empty cell.
-            edge: of the cubes of the detector in m.
             period: between two sets of images in s.
             latency: from exposure to result in s: transport and computation.
             joint_period: between two joint samples in s.
             tracks: how people are followed.
+            lasting: s at one place, after which a body is a change of the cell.
 
         Raises:
             ValueError: if a time is not positive.
@@ -70,12 +55,12 @@ class PeopleWatcher(LeafSystem):
         for name, value in (("period", period), ("latency", latency), ("joint_period", joint_period)):
             if not 0.0 < value < np.inf:
                 raise ValueError(f"people watcher: {name} must be positive, got {value} s")
-        self._detector, self._edge = detector, edge
-        self._tracks, self._joint_period = tracks or TrackConfig(), joint_period
+        self._follower = PeopleFollower(detector, tracks or TrackConfig(), lasting)
+        self._joint_period = joint_period
         self._images = self.DeclareAbstractInputPort("image_sample", Value[object](ImageSample()))
         self._joints = self.DeclareAbstractInputPort("joint_sample", Value(JointSample()))
         self._kept = self.DeclareDiscreteState(np.tile([-np.inf, *np.zeros(NUM_JOINTS)], _KEPT))
-        self._state = self.DeclareAbstractState(Value[object](_Mind(memory)))
+        self._state = self.DeclareAbstractState(Value[object](Mind(memory)))
         self.DeclareAbstractOutputPort(
             "person_sample",
             lambda: Value[object](PersonSample()),
@@ -85,7 +70,11 @@ class PeopleWatcher(LeafSystem):
         self.DeclarePeriodicDiscreteUpdateEvent(joint_period, 0.0, self._keep_joints)
         self.DeclarePeriodicUnrestrictedUpdateEvent(period, latency, self._work)
 
-    def _mind(self, context: Context) -> _Mind:
+    def changes(self, context: Context) -> tuple[LastingChange, ...]:
+        """What is new in the cell and has stayed, as of the newest images."""
+        return self._mind(context).changes
+
+    def _mind(self, context: Context) -> Mind:
         return context.get_abstract_state(int(self._state)).get_value()
 
     def _keep_joints(self, context: Context, discrete_state: DiscreteValues) -> None:
@@ -101,9 +90,5 @@ class PeopleWatcher(LeafSystem):
         is_known = abs(nearest[0] - images.time) <= 1.5 * self._joint_period
         if not (images.time > mind.sample.time and is_known):
             return
-        seen, memory = self._detector.detect(mind.memory, images.images, nearest[1:])
-        tracks, people, number = followed(
-            mind.tracks, mind.next_number, images.time, seen.bodies, self._edge, self._tracks
-        )
-        sample = PersonSample(images.time, seen.trusted, people)
-        state.get_mutable_abstract_state(int(self._state)).set_value(_Mind(memory, tracks, number, sample))
+        after = self._follower.after(mind, images, nearest[1:])
+        state.get_mutable_abstract_state(int(self._state)).set_value(after)

@@ -10,6 +10,7 @@ import pytest
 from experiments.watch.recording import COLUMNS, Recording
 from systems.cell.overview.person import gap
 from tests.experiments.commands import files, refusal, truetip
+from tests.systems.vision.people.networks import small_yolo, write
 from tests.systems.vision.people.rigs import ARMS, CELL, detector, painted, person_at
 
 SMALL = ["--set=station.overview.width=320", "--set=servo.people.hull.edge=0.1"]
@@ -42,16 +43,23 @@ def watch(folder: Path, out: Path, *more: str):
 
 @pytest.mark.slow
 def test_a_person_in_a_recording_stops_the_robot_and_the_page_shows_where(recording: Path, tmp_path: Path):
-    result = watch(recording, tmp_path, "--json", str(tmp_path / "watch.json"))
+    network = write(tmp_path, small_yolo())
+    options = ["--network", str(network), "--set=servo.people.lasting=0.15"]
+    result = watch(recording, tmp_path, "--json", str(tmp_path / "watch.json"), *options)
     assert result.exit_code == 0, result.output
     numbers = json.loads((tmp_path / "watch.json").read_text())
+    (change,) = numbers["changes"]
+    assert change["since_s"] == pytest.approx(0.1 * EMPTY)
+    assert np.linalg.norm(np.array(change["place_m"][:2]) - [1.3, 0.5]) < 0.3
+    assert "Changes of the cell that stay" in (tmp_path / "watch.html").read_text(encoding="utf-8")
+    assert 0 <= numbers["confirmed_by_cameras"] <= len(NAMES)
     true = min(gap(PERSON, detector().arm.at(q)) for q in ARMS)
     assert true - 0.4 < numbers["smallest_distance_m"] < true + 0.1
     assert numbers["stopped_s"] > 0.0
     assert numbers["notes"] == [f"camera {NAMES[1]} ended after {SETS - 1} sets"]
     page = (tmp_path / "watch.html").read_text()
     assert "not a safety function" in page
-    assert page.count("data:image/jpeg") == 4
+    assert page.count("data:image/jpeg") == 6  # two of them of the change
     assert "not a safety function" in " ".join(result.stdout.split())
 
 
@@ -115,7 +123,7 @@ def test_what_is_wrong_with_a_recording_is_said_in_one_line(recording: Path, tmp
         (["--study", "--images", "x"], "--study draws its own images"),
         (["--images", "none"], "--images none: must be a folder with joints.csv"),
         (["--minutes", "-1"], "--minutes must not be negative, got -1"),
-        (["--set", "station.kind=egm"], "station.overview.enabled needs station.kind=simulated, got egm"),
+        (["--set", "station.kind=egm"], "give recorded images with --images"),
         (["--scenario", "nominal"], "takes images of the whole cell; use --scenario watched"),
     ],
 )
@@ -125,3 +133,14 @@ def test_wrong_arguments_are_refused_in_one_line(
     monkeypatch.chdir(tmp_path)
     assert message in refusal(truetip("watch", *SMALL, *arguments))
     assert files(tmp_path) == set()
+
+
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        (["--network", "net.onnx"], "there is no file net.onnx"),
+        (["--network", "net.onnx", "--study"], "--study is of the hull alone"),
+    ],
+)
+def test_a_network_that_is_not_there_or_has_no_use_is_refused(arguments: list[str], said: str):
+    assert said in refusal(truetip("watch", *arguments))

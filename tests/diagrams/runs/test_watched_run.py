@@ -1,0 +1,114 @@
+"""Somebody in the cell of a guided robot: what the monitor in the control cycle does with what it is told."""
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+from diagrams.live_watch import LiveWatch, live_watch
+from diagrams.runs.real_time import RealTimeRecord, RealTimeRun
+from diagrams.scenario.scenario import load_scenario
+from robots.description.model import load_robot
+from systems.reference.paths import make_path
+from systems.samples import Person, PersonSample
+from systems.vision.people.shared_watch import SharedWatch
+from tests.diagrams.lockstep import Lockstep
+
+SCENARIO = load_scenario(
+    "cell-watched",
+    [
+        "reference.path=circle",
+        "reference.acceleration=4",
+        "station.elasticity=rigid",
+        "initial_error_mm=[0,0,0]",
+    ],
+)
+PERIOD, LATE = 0.1, 0.08  # s, between images and from an exposure until people are known
+NEAR = Person(1, np.array([[0.5, 0.0, 0.6]]), 0.04, np.zeros(3))  # within the arm's reach
+
+
+class Told:
+    """In place of the process: people at times of the path, said when images of them would be known."""
+
+    def __init__(self, near: tuple[float, float], silent_from: float, problem_from: float) -> None:
+        self.shared, self._near = SharedWatch(), near
+        self._silent_from, self._problem_from = silent_from, problem_from
+        self.problem, self._said = "", -np.inf
+        note = self.shared.note_joints
+        self.shared.note_joints = lambda time, q: (note(time, q), self._say(time))  # type: ignore[method-assign]
+
+    def _say(self, time: float) -> None:
+        origin = self.shared.origin
+        exposed = time - LATE
+        since = exposed - origin if origin else -1.0
+        if since > self._problem_from:
+            self.problem = "camera 2 has gone"
+        if exposed < self._said + PERIOD or since > self._silent_from:
+            return
+        self._said = exposed
+        people = (NEAR,) if self._near[0] <= since < self._near[1] else ()
+        self.shared.publish(PersonSample(exposed, True, people), 0.0)
+
+    @property
+    def is_ready(self) -> bool:
+        return self.shared.is_ready
+
+    def end(self) -> None:
+        """Nothing runs."""
+
+
+def guided(
+    near: tuple[float, float] = (np.inf, np.inf),
+    silent: float = np.inf,
+    problem: float = np.inf,
+    until: float = 20.0,
+) -> RealTimeRecord:
+    wire = Lockstep(SCENARIO)
+    told: Any = Told(near, silent, problem)
+    watch = live_watch(SCENARIO, load_robot("irb1200"))
+    assert watch is not None
+    run = RealTimeRun(SCENARIO, "open_loop", watch=LiveWatch(watch.monitor, lambda: told))
+    return run.run(wire.link, wire.camera(), now=wire.now, is_asked_to_end=lambda: wire.time > until)
+
+
+@pytest.mark.slow
+def test_the_robot_rests_while_somebody_is_near_then_goes_on_to_the_end_and_every_time_alike():
+    once, again = guided((0.9, 2.5)), guided((0.9, 2.5), until=3.5)
+    assert once.ended == "path"
+    assert once.people is not None
+    assert once.people.stops == 1
+    times, rate = once.people.times, once.people.said["path_time"][:, 1]
+    # Known after the chain's delay; then the path comes to rest within its slowing time.
+    at_rest = (times > 0.9 + LATE + PERIOD + SCENARIO.reference.slowing + 0.1) & (times < 2.5)
+    assert at_rest.any()
+    assert np.abs(rate[at_rest]).max() < 1e-6
+    assert once.log.time[-1] > make_path(SCENARIO.reference).duration + 1.0
+    n = len(again.log.time)
+    assert again.log.time[-1] > 1.5  # while it is slowed
+    np.testing.assert_array_equal(once.log.position_command[:n], again.log.position_command)
+
+
+@pytest.mark.slow
+def test_images_that_no_longer_come_stop_the_robot_and_a_process_that_has_ended_ends_the_run():
+    silent = guided(silent=1.0, until=5.0)
+    assert silent.people is not None
+    after = (
+        silent.people.times > 1.0 + SCENARIO.servo.separation.stop_after + SCENARIO.reference.slowing + 0.3
+    )
+    assert silent.people.said["stop"][after].all()
+    assert np.abs(silent.people.said["path_time"][after, 1]).max() < 1e-6
+    broken = guided(problem=1.0)
+    assert broken.ended == "nobody looks for people any more: camera 2 has gone"
+
+
+def test_a_station_in_real_time_needs_images_from_somewhere():
+    with pytest.raises(ValueError, match=r"needs station\.overview\.source"):
+        load_scenario("cell-watched", ["station.kind=egm", "station.overview.source=''"])
+
+
+def test_the_monitor_is_updated_with_the_cycle_and_decides_at_its_own_period():
+    watch = live_watch(SCENARIO, load_robot("irb1200"))
+    assert watch is not None
+    attribute = watch.monitor.GetUniquePeriodicDiscreteUpdateAttribute()
+    assert attribute is not None
+    assert attribute.period_sec() == pytest.approx(SCENARIO.station.period)
