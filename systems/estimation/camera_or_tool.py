@@ -4,9 +4,10 @@ from types import SimpleNamespace
 
 import numpy as np
 
+from systems.estimation.events import CAMERA_MOVED, TOOL_DISPLACED
 from systems.estimation.memory import Layout
 
-_LONGEST = 1000  # samples, after which it stays a tool: the robot has not turned it far enough to tell
+_LONGEST = 1000  # samples, after which it stays undecided: the robot has not turned it far enough to tell
 _FEWEST = 25  # samples
 _NOISE = 1.5  # times the variance of the camera, what a fit may leave
 _CLEAR = 40.0  # by which chi squared is smaller for one of both: e to the 20 to one
@@ -28,6 +29,7 @@ class CameraOrTool:
         self.layout = Layout(
             samples=(1,),  # still to be looked at; zero when nothing is open
             is_open=(1,),  # whether it may be either, also after nobody looks any more
+            is_event=(1,),  # whether a step was seen; otherwise samples only cease to agree
             A_calm=(2, size, size),  # what was known while samples agreed, the newer first
             xi_calm=(2, size),
             kept=(1,),  # how many of them there are
@@ -58,10 +60,10 @@ class CameraOrTool:
         memory.samples[0], memory.kept[0] = _LONGEST, 0.0
         memory.A_before[:], memory.xi_before[:] = memory.A_calm[1], memory.xi_calm[1]
         memory.A[:], memory.b[:], memory.square[0] = 0.0, 0.0, 0.0
-        memory.is_open[0] = may_be_camera
+        memory.is_open[0], memory.is_event[0] = may_be_camera, 0.0
 
-    def is_camera(self, memory: SimpleNamespace, r: np.ndarray, X_WE: np.ndarray) -> bool:
-        """Whether it is clear now that the camera was moved.
+    def found(self, memory: SimpleNamespace, r: np.ndarray, X_WE: np.ndarray) -> str | None:
+        """What it was, as events have it, if that becomes clear now; else None.
 
         Args:
             memory: of the layout.
@@ -76,19 +78,22 @@ class CameraOrTool:
         memory.square[0] += float(self._weights @ (r * r))
         seen = _LONGEST - float(memory.samples[0])
         if seen < _FEWEST:
-            return False
+            return None
         left = memory.square[0] - (memory.b * self._twists(memory)).sum(axis=1)
         unit = max(1.0, float(left.min()) / (6.0 * seen - 6.0))
         clearer = float(left[0] - left[1]) / unit
         if abs(clearer) <= _CLEAR:
-            return False
+            return None
         memory.samples[0] = memory.is_open[0] = 0.0
-        # A move of the camera leaves no more than noise: what does is something else.
-        return clearer > 0.0 and unit < _NOISE
+        # A step of either leaves no more than noise: what does is something else.
+        if unit >= _NOISE:
+            return None
+        return CAMERA_MOVED if clearer > 0.0 else TOOL_DISPLACED
 
-    def size(self, memory: SimpleNamespace, p: np.ndarray) -> float:
-        """The size in m of what a moved camera displaces the tip at p (m, (3,)) by, as it is seen."""
-        return float(np.linalg.norm((_seen_at(p) @ self._twists(memory)[1])[3:]))
+    def size(self, memory: SimpleNamespace, what: str, p: np.ndarray) -> float:
+        """Size in m of what moves the tip at p (m, (3,)) as it is seen: CAMERA_MOVED or TOOL_DISPLACED."""
+        tool, camera = self._twists(memory)
+        return float(np.linalg.norm((_seen_at(p) @ camera if what == CAMERA_MOVED else tool)[3:]))
 
     @staticmethod
     def _twists(memory: SimpleNamespace) -> np.ndarray:

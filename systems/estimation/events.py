@@ -33,6 +33,7 @@ TOOL_DISPLACED, LOAD_CHANGED = "tool displaced", "load changed"
 DEAD_TIME_CHANGED, CLOCK_DRIFTS = "dead time changed", "clock drifts"
 FOREIGN_FRAME = "camera frame is another"
 CAMERA_MOVED = "camera moved"
+TOOL_OR_CAMERA = "tool or camera displaced"  # until the robot has turned the tool far enough to tell
 PATH_UNSEEN = "path needs more than was shown"
 _UNITS = {LOAD_CHANGED: "kg", DEAD_TIME_CHANGED: "s", CLOCK_DRIFTS: "s/s", FOREIGN_FRAME: "rad"}  # others: m
 
@@ -67,6 +68,7 @@ class EventLog:
         FOREIGN_FRAME,
         PATH_UNSEEN,
         CAMERA_MOVED,
+        TOOL_OR_CAMERA,
     )
 
     def __init__(self) -> None:

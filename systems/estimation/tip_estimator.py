@@ -16,6 +16,8 @@ from systems.estimation.events import (
     CAMERA_MOVED,
     CLOCK_DRIFTS,
     LOAD_CHANGED,
+    TOOL_DISPLACED,
+    TOOL_OR_CAMERA,
     Event,
     Innovations,
 )
@@ -229,6 +231,8 @@ class TipEstimator:
             if verdict.has_jumped and weight > 0.2:
                 event = self._innovations.explain(innovations, H, self.model)
                 self._camera_or_tool.begin(memory.after_step, may_be_camera=event.kind != LOAD_CHANGED)
+                if event.kind == TOOL_DISPLACED and memory.after_step.is_open[0]:
+                    event, memory.after_step.is_event[0] = event._replace(kind=TOOL_OR_CAMERA), 1.0
                 self._widen(memory, event)
             elif verdict.has_drifted and weight > 0.2:
                 self._innovations.forget(innovations)
@@ -240,8 +244,12 @@ class TipEstimator:
                 self._camera_or_tool.keep(memory.after_step, known, memory.xi)
             elif memory.after_step.samples[0]:
                 before = r + H @ (memory.xi - memory.after_step.xi_before)
-                if self._camera_or_tool.is_camera(memory.after_step, before, pair.X_WE):
+                found = self._camera_or_tool.found(memory.after_step, before, pair.X_WE)
+                if found == CAMERA_MOVED:
                     return self._take_back(memory, pair.X_WE)
+                if found == TOOL_DISPLACED and memory.after_step.is_event[0]:
+                    size = self._camera_or_tool.size(memory.after_step, found, pair.X_WE[:3, 3])
+                    event = Event(found, size, size)
         sums = memory.A_open, memory.b_open, memory.sum_y, memory.sum_H
         kernels.information.add_sample(r, H, memory.xi, self.weights, weight, *sums)
         means = [pair.theta, gears, pair.motion, pair.twist, (since_first,)]
@@ -363,7 +371,7 @@ class TipEstimator:
         memory.xi[:] = before.xi_before
         self._keyframes.reset(memory.keyframes, A, before.xi_before)
         self._forget_open(memory)
-        return Event(CAMERA_MOVED, self._camera_or_tool.size(before, X_WE[:3, 3]), 0.0)
+        return Event(CAMERA_MOVED, self._camera_or_tool.size(before, CAMERA_MOVED, X_WE[:3, 3]), 0.0)
 
     @staticmethod
     def _forget_open(memory: SimpleNamespace) -> None:

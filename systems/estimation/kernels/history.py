@@ -58,10 +58,29 @@ def cubic_at(count, times, rows, time, out):
 
 
 @compiled
-def least_change(row, last, least):
-    """Keeps the smallest change from one row to the next, entry by entry, and the row as the last one."""
+def least_change(row, last, least, smaller, count, age, enough, window):
+    """Keeps the smallest change from one row to the next that comes again, entry by entry.
+
+    Args:
+        row: (n,).
+        last: the row before, (n,); not a number before there is one; is renewed.
+        least: the smallest change that came often enough, (n,); is renewed.
+        smaller: the largest of those that were smaller since, (n,); is renewed.
+        count: how many there were, (n,); is renewed.
+        age: how many rows ago the first of them was, (n,); is renewed.
+        enough: so many make it the smallest one.
+        window: within so many rows.
+    """
     for k in range(len(row)):
         change = abs(row[k] - last[k])
-        if 0.0 < change < least[k]:  # never of the first row: nothing is less than not a number
-            least[k] = change
         last[k] = row[k]
+        age[k] += 1.0
+        if age[k] > window:
+            count[k] = 0.0
+        if 0.0 < change < least[k]:  # never of the first row: nothing is less than not a number
+            if count[k] == 0.0:
+                smaller[k] = age[k] = 0.0
+            smaller[k] = max(smaller[k], change)
+            count[k] += 1.0
+            if count[k] >= enough:
+                least[k], count[k] = smaller[k], 0.0

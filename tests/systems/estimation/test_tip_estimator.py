@@ -110,11 +110,12 @@ def test_a_displaced_tool_is_seen_and_learnt(shift):
         return pair._replace(X_WE=X_WE)
 
     session.learn(12 * PERIOD, change=displaced)
-    assert [event.kind for event in session.events] == ["tool displaced"]
+    assert [event.kind for event in session.events] == ["tool or camera displaced"]
     # The first samples are learnt from before it is clear what they are.
     assert 0.6 * shift < session.events[0].size < 1.2 * shift
     session.learn(0.6, change=displaced)
-    assert len(session.events) == 1
+    assert [event.kind for event in session.events[1:]] == ["tool displaced"]
+    assert session.events[1].size == pytest.approx(shift, rel=0.1)
     pair = displaced(session.arm.pair(session.time, noise=0.0))
     left = pose_error(pair.X_WE, session.estimator.predict(session.memory, pair).X_WE[0])
     assert np.linalg.norm(left[3:]) < 40e-6
@@ -133,10 +134,7 @@ def test_a_camera_that_was_moved_is_told_from_a_tool_and_moves_nothing(turn, shi
         return pair._replace(X_WE=moved(pair.X_WE[None], twist[None])[0])
 
     session.learn(2.0, change=displaced)
-    assert [event.kind for event in session.events] == [
-        "tool displaced",
-        "camera moved",
-    ]  # it looks like one at first
+    assert [event.kind for event in session.events] == ["tool or camera displaced", "camera moved"]
     assert session.error(seen=True) < 60e-6  # of the true tip, not of what is seen
     squares = session.squares(np.linspace(20.0, 60.0, 40))
     assert squares.mean() < 12.0  # of six, but the same unknowns are wrong in all of them
@@ -158,7 +156,7 @@ def test_the_tip_may_be_at_both_places_while_nothing_tells_a_tool_from_a_camera(
         X_WE = moved(seen_at[None], (noisy * rng.normal(size=6))[None])[0]
         event = session.estimator.add(session.memory, still._replace(X_WE=X_WE))
         session.events += [event] if event else []
-    assert [event.kind for event in session.events] == ["tool displaced"]  # for all that is known
+    assert [event.kind for event in session.events] == ["tool or camera displaced"]
     found = session.estimator.predict(session.memory, still).X_WE[0]
     covariance = session.estimator.tip_covariance(session.memory, still)
     for X_WE in (seen_at, truth):

@@ -39,6 +39,13 @@ def test_what_readings_are_wrong_by_is_told_from_their_steps():
     assert sigma[5] == 0.0
 
 
+@pytest.mark.parametrize("when", [3, 60, 250])  # at rest, when it begins to move, on its way
+def test_a_single_disturbed_reading_does_not_make_steps_smaller(when: int):
+    readings = rounded(smooth_motion())
+    readings[when] += 0.1 * STEP
+    assert sigma_of(readings)[:5] == pytest.approx(np.full(5, STEP / np.sqrt(12.0)), rel=1e-6)
+
+
 def test_encoders_without_steps_are_taken_as_exact():
     assert sigma_of(smooth_motion()).max() < 0.02 * STEP
 
