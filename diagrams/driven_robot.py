@@ -21,7 +21,7 @@ from diagrams.scenario.scenario import StationConfig
 from robots.description.model import NUM_JOINTS, RobotModel
 from robots.dynamics.plant import PlantRobot, add_robot
 from systems.cell.drive import Drive
-from systems.cell.drive_train import CoulombFriction, ElasticDriveTrain
+from systems.cell.drive_train import CoulombFriction, ElasticDriveTrain, add_stiffening_structure
 from systems.cell.motors import controlled_motors, motor_controllers
 from systems.cell.parts_drive_train import PartsDriveTrain
 
@@ -104,7 +104,8 @@ class DrivenRobot:
         links, gains = self.links, self.drive.gains
         n = self.plant.num_positions()
         M, K, D = self.plant.CalcMassMatrix(context), np.zeros(n), np.zeros(n)
-        K[[joint.position_start() for joint in links.sprung]] = links.sprung_stiffness
+        sprung = [joint.position_start() for joint in links.sprung]
+        K[sprung] = links.tangent_stiffness(self.plant.GetPositions(context)[sprung])
         for joint in (*links.motors, *links.sprung):
             D[joint.velocity_start()] += joint.default_damping()
         driven = np.array([joint.velocity_start() for joint in links.motors])
@@ -155,6 +156,8 @@ def add_driven_robot(
     links = add_robot(plant, robot, config.elasticity, config.payload, config.errors, drive_trains=is_rigid)
     plant.Finalize()
     link_state = plant.get_state_output_port()
+    if links.stiffening_structure is not None:
+        add_stiffening_structure(builder, links)
     if plant.num_multibody_states() > _STATE:
         selector = builder.AddNamedSystem("link_state", _link_state_selector(links))
         builder.Connect(link_state, selector.get_input_port())

@@ -5,7 +5,9 @@ from pydrake.common.value import Value
 from pydrake.systems.framework import AbstractParameterIndex, Context, LeafSystem
 
 from robots.description.model import NUM_JOINTS
-from systems.samples import JointSample, PoseSample
+from systems.samples import JointSample, PersonSample, PoseSample
+
+_NOBODY = PersonSample()  # and not trusted
 
 
 class HardwareStation(LeafSystem):
@@ -16,34 +18,45 @@ class HardwareStation(LeafSystem):
         in  ``velocity_command``  vector 6 in rad/s
         out ``joint_sample``      JointSample
         out ``pose_sample``       PoseSample
+    and, where another process looks for people:
+        out ``person_sample``     PersonSample
 
     It touches no socket. Whoever holds the wire puts in what was received with `receive` and takes out what
     is to be sent with `command`.
     """
 
-    def __init__(self) -> None:
+    def __init__(self, has_people: bool = False) -> None:
+        """``has_people``: whether somebody looks for people."""
         super().__init__()
         self._commands = [
             self.DeclareVectorInputPort(name, NUM_JOINTS) for name in ("position_command", "velocity_command")
         ]
-        nothing = JointSample(), PoseSample()
-        # One parameter for both samples: what depends on either is told once.
+        nothing = JointSample(), PoseSample(), PersonSample()
+        # One parameter for all samples: what depends on any is told once.
         index = AbstractParameterIndex(self.DeclareAbstractParameter(Value[object](nothing)))
         self._received = index
-        for part, (name, empty) in enumerate(zip(("joint_sample", "pose_sample"), nothing, strict=True)):
+        models = Value(nothing[0]), Value(nothing[1]), Value[object](nothing[2])
+        names = ("joint_sample", "pose_sample", "person_sample")[: 3 if has_people else 2]
+        for part, name in enumerate(names):
             self.DeclareAbstractOutputPort(
                 name,
-                lambda empty=empty: Value(empty),
+                lambda model=models[part]: model.Clone(),
                 lambda context, output, part=part: output.set_value(
                     context.get_abstract_parameter(index).get_value()[part]
                 ),
                 {self.abstract_parameter_ticket(index)},
             )
 
-    def receive(self, root_context: Context, joints: JointSample, pose: PoseSample) -> None:
+    def receive(
+        self,
+        root_context: Context,
+        joints: JointSample,
+        pose: PoseSample,
+        people: PersonSample = _NOBODY,
+    ) -> None:
         """Makes these the newest samples."""
         context = self.GetMyMutableContextFromRoot(root_context)
-        context.get_mutable_abstract_parameter(self._received).set_value((joints, pose))
+        context.get_mutable_abstract_parameter(self._received).set_value((joints, pose, people))
 
     def command(self, root_context: Context) -> tuple[np.ndarray, np.ndarray]:
         """The position (6,) in rad and velocity (6,) in rad/s that the servo commands now."""

@@ -3,6 +3,7 @@
 import math
 from array import array
 from collections.abc import Callable
+from typing import Protocol
 
 import numpy as np
 
@@ -17,6 +18,7 @@ from systems.reference.joint_mover import smooth_motion
 from systems.samples import PoseSample
 
 _APPROACH_SHARE = 0.15  # of the largest joint speeds
+_LONGEST_START = 60.0  # s, that what belongs to the station may take to begin
 _SETTLE = 0.3  # s at the start point before the path's time begins
 _ARRIVED = math.radians(0.02)  # how near the measured joints must come
 _PATIENCE, _NEARLY = 3.0, math.radians(0.5)  # s after which it is enough to come so near
@@ -47,6 +49,20 @@ class EndedOnRequest(Exception):  # noqa: N818 - as KeyboardInterrupt, no error
     """Somebody wanted an end before the path began; the robot is at rest."""
 
 
+class Starting(Protocol):
+    """What needs time until it works."""
+
+    @property
+    def is_ready(self) -> bool:
+        """Whether it works."""
+        ...
+
+    @property
+    def problem(self) -> str:
+        """Why it never will; empty as long as it may."""
+        ...
+
+
 class HardwareLink:
     """Receives from controller and camera, and answers the controller."""
 
@@ -59,6 +75,7 @@ class HardwareLink:
         is_speed_only: bool,
         now: Callable[[], float] = steady_time,
         is_asked_to_end: Callable[[], bool] = never,
+        note_joints: Callable[[float, np.ndarray], None] | None = None,
     ) -> None:
         """Takes over connections that are open.
 
@@ -70,15 +87,16 @@ class HardwareLink:
             is_speed_only: whether the controller is sent speeds without positions.
             now: the clock of the client's arrivals, in s.
             is_asked_to_end: whether somebody wants an end, while one waits or approaches.
+            note_joints: is told the arrival of every report in s, and its joint positions (6,) in rad.
         """
         self._client, self._camera, self._now = client, camera, now
-        self._is_asked_to_end = is_asked_to_end
+        self._is_asked_to_end, self._note_joints = is_asked_to_end, note_joints
         self._link, self._speed, self._period = scenario.station.link, robot.speed, scenario.station.period
         self._is_speed_only = is_speed_only
         self.robot_clock = StampClock(ClockConfig())
         self.last: RobotReport | None = None
         self._unlearned: tuple[float, float] | None = None  # stamp and arrival of the last report, in s
-        self.turn_around = array("d")  # s, from a report in to its reply out
+        self.turn_around = array("f")  # s, from a report in to its reply out
         self._sample = PoseSample()
         self._phase = 0.0  # s, of the newest stamp against its tick
         self._time = PassedTime(self._period)
@@ -134,6 +152,27 @@ class HardwareLink:
                 raise StationError(f"no pose from the camera within {link.connect:g} s: {why}")
             self.next_report()
         self._check_cycle()
+
+    def wait_for(self, other: Starting, what: str) -> None:
+        """Hears the controller until something else of the station is ready.
+
+        Args:
+            other: what is to be ready.
+            what: is the matter without it, for messages.
+
+        Raises:
+            EndedOnRequest: if somebody wanted an end.
+            StationError: if it will never be ready, or takes too long.
+        """
+        deadline = self._now() + _LONGEST_START
+        while not other.is_ready:
+            if self._is_asked_to_end():
+                raise EndedOnRequest
+            if other.problem:
+                raise StationError(f"{what}: {other.problem}")
+            if self._now() > deadline:
+                raise StationError(f"{what} within {_LONGEST_START:g} s")
+            self.next_report()
 
     def _check_cycle(self) -> None:
         """Measures the cycle on a hundred messages. Raises StationError if it is not the scenario's."""
@@ -196,6 +235,8 @@ class HardwareLink:
                 warm_up, is_prepared = None, True
         self.host.note(self._now() - began - pause, self._now(), is_message=True)
         self._note_time(report)
+        if self._note_joints is not None:
+            self._note_joints(self._client.arrived, report.position)
         self.last = report
         self._unlearned = (report.time, self._client.arrived)
         return report

@@ -13,6 +13,7 @@ from pydrake.systems.framework import (
 )
 from pydrake.systems.primitives import Adder, ConstantVectorSource
 
+from diagrams.live_watch import LiveWatch
 from diagrams.record.coverage import Prediction
 from diagrams.scenario.controller_model import controller_model
 from diagrams.scenario.scenario import Scenario, ScenarioError
@@ -21,6 +22,7 @@ from diagrams.watching import Watch
 from robots.description.model import NUM_JOINTS, RobotModel
 from systems.controller_model import ControllerModel
 from systems.feedforward import FEEDFORWARDS
+from systems.feedforward.feedforward import Feedforward
 from systems.guard.guard import CommandGuard, GuardConfig
 from systems.reference.reference import Reference
 from systems.servo import LAWS, LawConfig
@@ -40,7 +42,7 @@ class Servo(Diagram):
         out ``velocity_command``  vector 6 in rad/s
         out ``torque_feedforward``  vector 6 in N m, only with a feedforward or a law that knows torques
     and if it watches for people:
-        in  ``image_sample``      ImageSample
+        in  ``image_sample``      ImageSample; ``person_sample`` in its place where another process looks
         out ``person_sample``, ``speed_share``, ``stop``, ``separation``  as of `PeopleWatcher` and
                                   `SeparationMonitor`
     and to look at:
@@ -63,7 +65,7 @@ class Servo(Diagram):
         robot: RobotModel,
         scenario: Scenario,
         law: str | type[System] | System,
-        watch: Watch | None = None,
+        watch: Watch | LiveWatch | None = None,
     ) -> None:
         """Builds the controller of one law.
 
@@ -95,35 +97,12 @@ class Servo(Diagram):
         self.reference = builder.AddNamedSystem(
             "reference", Reference(scenario.reference, self.model.period, slowed_by)
         )
-        check_path = getattr(self.law, "check_path", None)  # of laws that cannot follow every path
-        if check_path is not None:
-            check_path(self.reference.path)
-        prepare = getattr(self.law, "prepare", None)  # of laws that do something before a run
-        if prepare is not None:
-            prepare(self.reference.path, np.deg2rad(scenario.home_deg))
+        self._prepare_law(scenario)
         builder.AddNamedSystem("law", self.law)
         feedforward = scenario.servo.feedforward
         self.has_torque = feedforward.kind != "none" or self.law.HasOutputPort("torque_feedforward")
-        guard = builder.AddNamedSystem(
-            "guard",
-            CommandGuard(
-                self.model.robot,
-                scenario.servo.guard,
-                self.model.period,
-                config.correction_limit,
-                config.correction_limit_deg,
-                uses_camera=self.traits.uses_camera,
-                passes_torque=self.has_torque,
-                is_speed_only=config.drive == "velocity",
-            ),
-        )
-        for name, source in _FROM_REFERENCE.items():
-            if self.law.HasInputPort(name):
-                builder.Connect(self.reference.GetOutputPort(source), self.law.GetInputPort(name))
-        if self.reference.is_slowed:
-            for name, port in (("speed_share", "speed_share_law"), ("look_ahead", "look_ahead")):
-                if self.law.HasOutputPort(name) and self.reference.HasInputPort(port):
-                    builder.Connect(self.law.GetOutputPort(name), self.reference.GetInputPort(port))
+        guard = builder.AddNamedSystem("guard", self._guard(config, scenario.servo.guard))
+        self._connect_reference(builder)
         if self.law.HasInputPort("deviation"):
             builder.Connect(guard.GetOutputPort("deviation"), self.law.GetInputPort("deviation"))
         joints = builder.ExportInput(guard.GetInputPort("joint_sample"), "joint_sample")
@@ -135,14 +114,7 @@ class Servo(Diagram):
             if self.law.HasOutputPort(name):
                 commands[name] = self.law.GetOutputPort(name)
         if feedforward.kind != "none":
-            model = FEEDFORWARDS.find(feedforward.kind)(self.model, feedforward)
-            if self.reference.is_slowed and model.is_computed_beforehand:
-                raise ScenarioError(
-                    f"servo.feedforward.kind={feedforward.kind} is computed before the run and needs the "
-                    "planned speed, but reference.override or the law slows the path"
-                )
-            model.prepare(self.reference.path, np.deg2rad(scenario.home_deg))
-            ahead = builder.AddNamedSystem("feedforward", model)
+            ahead = builder.AddNamedSystem("feedforward", self._feedforward(scenario))
             builder.ConnectInput(joints, ahead.GetInputPort("joint_sample"))
             self._add_feedforward(builder, ahead, commands)
         for name, port in commands.items():
@@ -156,17 +128,69 @@ class Servo(Diagram):
         builder.BuildInto(self)
         self.set_name("servo")
 
+    def _prepare_law(self, scenario: Scenario) -> None:
+        """Lets laws see the path that cannot follow every one, or do something before a run."""
+        check_path = getattr(self.law, "check_path", None)
+        if check_path is not None:
+            check_path(self.reference.path)
+        prepare = getattr(self.law, "prepare", None)
+        if prepare is not None:
+            prepare(self.reference.path, np.deg2rad(scenario.home_deg))
+
+    def _guard(self, law: LawConfig, guard: GuardConfig) -> CommandGuard:
+        """The guard, with the limits of the law."""
+        return CommandGuard(
+            self.model.robot,
+            guard,
+            self.model.period,
+            law.correction_limit,
+            law.correction_limit_deg,
+            uses_camera=self.traits.uses_camera,
+            passes_torque=self.has_torque,
+            is_speed_only=law.drive == "velocity",
+        )
+
+    def _feedforward(self, scenario: Scenario) -> Feedforward:
+        """The inverse model, prepared for the path. Raises ScenarioError if somebody may slow the path."""
+        config = scenario.servo.feedforward
+        model = FEEDFORWARDS.find(config.kind)(self.model, config)
+        if self.reference.is_slowed and model.is_computed_beforehand:
+            raise ScenarioError(
+                f"servo.feedforward.kind={config.kind} is computed before the run and needs the planned "
+                "speed, but reference.override or the law slows the path"
+            )
+        model.prepare(self.reference.path, np.deg2rad(scenario.home_deg))
+        return model
+
+    def _connect_reference(self, builder: DiagramBuilder) -> None:
+        """What the law wants to know of the path, and what it says of its speed."""
+        for name, source in _FROM_REFERENCE.items():
+            if self.law.HasInputPort(name):
+                builder.Connect(self.reference.GetOutputPort(source), self.law.GetInputPort(name))
+        if self.reference.is_slowed:
+            for name, port in (("speed_share", "speed_share_law"), ("look_ahead", "look_ahead")):
+                if self.law.HasOutputPort(name) and self.reference.HasInputPort(port):
+                    builder.Connect(self.law.GetOutputPort(name), self.reference.GetInputPort(port))
+
     def _add_watch(
-        self, builder: DiagramBuilder, watch: Watch, guard: CommandGuard, joints: InputPortIndex
+        self,
+        builder: DiagramBuilder,
+        watch: Watch | LiveWatch,
+        guard: CommandGuard,
+        joints: InputPortIndex,
     ) -> None:
         """People in whole images, and the share of the speed that they allow."""
-        watcher = builder.AddNamedSystem("people_watcher", watch.watcher)
         monitor = builder.AddNamedSystem("separation_monitor", watch.monitor)
-        builder.ExportInput(watcher.GetInputPort("image_sample"), "image_sample")
-        for system in (watcher, monitor):
-            builder.ConnectInput(joints, system.GetInputPort("joint_sample"))
+        builder.ConnectInput(joints, monitor.GetInputPort("joint_sample"))
+        if isinstance(watch, LiveWatch):
+            builder.ExportInput(monitor.GetInputPort("person_sample"), "person_sample")
+        else:
+            watcher = builder.AddNamedSystem("people_watcher", watch.watcher)
+            builder.ExportInput(watcher.GetInputPort("image_sample"), "image_sample")
+            builder.ConnectInput(joints, watcher.GetInputPort("joint_sample"))
+            builder.Connect(watcher.GetOutputPort("person_sample"), monitor.GetInputPort("person_sample"))
+            builder.ExportOutput(watcher.GetOutputPort("person_sample"), "person_sample")
         for source, port in (
-            (watcher.GetOutputPort("person_sample"), monitor.GetInputPort("person_sample")),
             (guard.GetOutputPort("velocity_command"), monitor.GetInputPort("velocity_command")),
             (self.reference.GetOutputPort("path_time"), monitor.GetInputPort("path_time")),
             (monitor.GetOutputPort("speed_share"), self.reference.GetInputPort("speed_share_separation")),
@@ -174,7 +198,6 @@ class Servo(Diagram):
             builder.Connect(source, port)
         for name in ("speed_share", "stop", "separation"):
             builder.ExportOutput(monitor.GetOutputPort(name), name)
-        builder.ExportOutput(watcher.GetOutputPort("person_sample"), "person_sample")
 
     def path_time(self, root_context: Context) -> float:
         """The time on the path in s at the time of a context; the same unless the path is slowed."""

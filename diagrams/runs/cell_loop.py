@@ -17,6 +17,7 @@ from systems.cell.network_faults import FaultyLink
 from systems.link.clock import steady_time
 from systems.link.protocols import VirtualPoseSource
 from systems.link.udp_channel import Address, Buffering, UdpChannel, is_loopback
+from systems.reference.paths import make_path
 
 _LATE = 1e-3  # s after which a message counts as late
 _LOST_TRACK = 0.25  # s behind after which the schedule is moved instead of being caught up with
@@ -84,7 +85,8 @@ class CellLoop:
         config = scenario.station
         self._faults = config.faults
         self.cell = VirtualCell(scenario, robot, with_log)
-        self.controller = config.link.virtual_controller(robot)
+        path, home = make_path(scenario.reference), np.deg2rad(scenario.home_deg)
+        self.controller = config.link.virtual_controller(robot, path, home)
         self.statistics = CellStatistics()
         self._links = {
             name: FaultyLink(config.faults, period, scenario.seed + offset)

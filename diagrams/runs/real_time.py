@@ -4,29 +4,29 @@ import gc
 import math
 import sys
 from collections.abc import Callable
-from dataclasses import dataclass, field
-from typing import Any
 
 import numpy as np
 from pydrake.systems.framework import Context, Diagram, DiagramBuilder, System
 
 from diagrams.hardware import HardwareStation
 from diagrams.hardware_link import EndedOnRequest, HardwareLink, StationError, never
-from diagrams.host_lateness import HostLateness
+from diagrams.live_watch import OF_WATCH, LivePeople, LiveWatch, live_watch, people_at
 from diagrams.record.log import GuardEvent, RunLog
 from diagrams.record.played import measured_along, path_marks, played
-from diagrams.record.run_record import RunRecord, marks, write_event, write_tick
+from diagrams.record.run_record import RunRecord, marks, write_event
 from diagrams.record.spool import Spool, SpooledLog
-from diagrams.record.topics import POSE, pose_message
+from diagrams.runs.real_time_record import RealTimeRecord, fill_gaps, write_run_tick
 from diagrams.runs.simulation import guard_events, start_position
 from diagrams.scenario.scenario import Scenario, ScenarioError
 from diagrams.servo import Servo, calibrated, law_name, learn, learnt
+from diagrams.tool_watch import ToolWatch
 from robots.description.model import NUM_JOINTS, RobotModel, load_robot
 from systems.guard.guard import KINDS
-from systems.link.clock import ClockQuality, steady_time
+from systems.link.clock import steady_time
 from systems.link.protocols import PoseSource, RobotLink, RobotReport
 from systems.reference.paths import CartesianPath
 from systems.samples import JointSample, PoseSample
+from systems.vision.people.watch_process import WatchProcess
 
 __all__ = ["REQUESTED", "RealTimeRecord", "RealTimeRun", "StationError"]
 
@@ -37,29 +37,15 @@ _STOOD = 0.5  # s at rest by the guard, after which a run is over that nothing l
 _SWITCH = 5e-4  # s after which another thread, such as that of a progress bar, gives way
 
 
-@dataclass
-class RealTimeRecord:
-    """What a run on a real station leaves behind beside its log."""
-
-    log: RunLog
-    stamps: np.ndarray  # (n,) s, the controller's clock at each tick of the log; NaN where no message came
-    ended: str  # why: "path", or what broke off
-    counters: dict[str, int]
-    camera: dict[str, Any]
-    turn_around: np.ndarray  # (m,) s, from a message in to its reply out
-    camera_clock: ClockQuality | None
-    robot_clock: ClockQuality
-    host: HostLateness
-    pauses: list[tuple[float, float]] = field(default_factory=list)  # s: path time, how long it stood still
-    events: list[GuardEvent] = field(default_factory=list)  # of the wire, by path time
-    limited_messages: int = 0  # that were not sent as the servo wanted them
-
-
 class RealTimeRun:
     """One law on a real station, from a smooth approach to the end of the dwell."""
 
     def __init__(
-        self, scenario: Scenario, law: str | type[System] | System, robot: RobotModel | None = None
+        self,
+        scenario: Scenario,
+        law: str | type[System] | System,
+        robot: RobotModel | None = None,
+        watch: LiveWatch | None = None,
     ) -> None:
         """Builds the servo and warms it up, before anything is said to a robot.
 
@@ -67,6 +53,7 @@ class RealTimeRun:
             scenario: what to do; its ``station.link`` says where the station is.
             law: a shipped law by name, ``FILE.py:CLASS``, a class, or any system with the ports of a law.
             robot: as the controller knows it; None for the scenario's.
+            watch: what watches for people; None for what the scenario says.
 
         Raises:
             ScenarioError: if the robot cannot follow the path.
@@ -78,16 +65,20 @@ class RealTimeRun:
         if scenario.servo.feedforward.kind != "none":
             raise ScenarioError("servo.feedforward.kind must be none on a real station: it takes no torques")
         builder = DiagramBuilder()
-        self.station = builder.AddNamedSystem("station", HardwareStation())
-        self.servo = builder.AddNamedSystem("servo", Servo(self.robot, scenario, law))
+        self._live = watch or live_watch(scenario, self.robot)
+        self._watch: WatchProcess | None = None  # while it runs
+        self.station = builder.AddNamedSystem("station", HardwareStation(has_people=self._live is not None))
+        self.servo = builder.AddNamedSystem("servo", Servo(self.robot, scenario, law, self._live))
+        self.servo.tick_clock.stop()  # what is timed is how long an answer takes
         self._is_speed_only = self.servo.drive == "velocity"
         for name in ("position_command", "velocity_command"):
             builder.Connect(self.servo.GetOutputPort(name), self.station.GetInputPort(name))
-        for name in ("joint_sample", "pose_sample"):
+        for name in ("joint_sample", "pose_sample", *(("person_sample",) if self._live else ())):
             builder.Connect(self.station.GetOutputPort(name), self.servo.GetInputPort(name))
         ports = ["position_command", "velocity_command", "correction", "guard_status"]
         if self.servo.reference.is_slowed:
             ports.append("path_time")
+        ports += OF_WATCH if self._live else ()
         self._log = SpooledLog({name: self.servo.GetOutputPort(name) for name in ports})
         self.diagram: Diagram = builder.Build()
         self.diagram.set_name("truetip")
@@ -100,6 +91,7 @@ class RealTimeRun:
         self._reports = Spool(2 + 2 * NUM_JOINTS)  # tick, stamp in s, positions in rad, efforts in N m
         self._exposures = Spool(17)  # s of the path, and the pose
         self._last_exposure = -math.inf  # s of the path
+        self._tool = ToolWatch(self.servo.model.robot)
         self._pauses: list[tuple[float, float]] = []
         self._events: list[GuardEvent] = []
         self._stream: RunRecord | None = None
@@ -149,12 +141,22 @@ class RealTimeRun:
         gc.disable()
         sys.setswitchinterval(_SWITCH)
         before = client.counters()
+        watch = self._watch = self._live.start() if self._live else None
         try:
             wire = HardwareLink(
-                client, camera, self.scenario, self.robot, self._is_speed_only, now, is_asked_to_end
+                client,
+                camera,
+                self.scenario,
+                self.robot,
+                self._is_speed_only,
+                now,
+                is_asked_to_end,
+                watch.shared.note_joints if watch else None,
             )
             try:
                 wire.connect(self.begins_with_camera)
+                if watch:
+                    wire.wait_for(watch, "nobody looks for people")
                 wire.approach(self.start)
                 began = now()
                 ended = self._follow(wire, progress or (lambda share: None), now, is_asked_to_end)
@@ -165,6 +167,8 @@ class RealTimeRun:
                 if ended != REQUESTED and wire.host.worst > _WORTH_SAYING:
                     ended = f"{ended}; {wire.host.sentence(began)}"
         finally:
+            if watch:
+                watch.end()
             if record is not None and not len(self._reports):
                 record.close(law=self.law, ended="before its path")
             sys.setswitchinterval(switching)
@@ -184,6 +188,8 @@ class RealTimeRun:
         """Runs the path to its end; returns why it ended."""
         epoch, tick, shown = wire.epoch, -1, 0.0
         wire.start_path()
+        if self._watch:
+            self._watch.shared.begin_path(now())
         while self.servo.path_time(self._context) < self.path.duration + 0.5 * self.period:
             if is_asked_to_end():
                 return REQUESTED
@@ -220,6 +226,8 @@ class RealTimeRun:
             if tick * self.period - shown > 0.5:
                 shown = tick * self.period
                 progress(min(1.0, self.servo.path_time(self._context) / self.path.duration))
+                if self._watch and self._watch.problem:
+                    return f"nobody looks for people any more: {self._watch.problem}"
             if self._stands_for(tick) > _STOOD and not self.scenario.servo.guard.resume:
                 break
         return self._why_it_stands() if self._stands_since is not None else "path"
@@ -247,24 +255,6 @@ class RealTimeRun:
         )
         return f"stopped by the guard at {since:.1f} s: {why}"
 
-    def _write(
-        self,
-        stream: RunRecord,
-        time: float,
-        report: RobotReport,
-        effort: np.ndarray,
-        command: tuple[np.ndarray, np.ndarray],
-        sample: PoseSample,
-    ) -> None:
-        """Logs a tick, after its reply is on its way."""
-        servo = self.servo.GetMyContextFromRoot(self._context)
-        correction = self.servo.GetOutputPort("correction").Eval(servo)
-        X_WE_desired = self.servo.GetOutputPort("X_WE_desired").Eval(servo).GetAsMatrix4()
-        joints = report.position, effort
-        write_tick(stream, time, report.time, joints, command, correction, X_WE_desired)
-        if sample.valid and sample.time > self._last_exposure:
-            stream.write(POSE, time, pose_message(sample.X_WE.GetAsMatrix4(), sample.time))
-
     def _note(self, tick: int, kind: str, detail: str) -> None:
         self._events.append(GuardEvent(tick * self.period, kind, detail))
         if self._stream is not None:
@@ -278,14 +268,20 @@ class RealTimeRun:
         time = tick * self.period
         sample = wire.pose_at(time)
         joints = JointSample(time, report.position, wire.velocity, wire.effort, is_running)
-        self.station.receive(self._context, joints, sample)
+        self.station.receive(self._context, joints, sample, people_at(self._watch, time, wire.arrived))
         if not len(self._reports):
             self._note_ports()  # here, where the log finds samples to begin with
         self._update(self._context)
         sent = wire.send_command(*self.station.command(self._context))
         learn(self.servo, self._context)  # nobody waits for it any more
         if self._stream is not None:
-            self._write(self._stream, time, report, wire.effort, sent, sample)
+            write_run_tick(
+                self._stream, self.servo, self._context, time, report, wire.effort, sent,
+                sample if sample.time > self._last_exposure else PoseSample(),
+            )  # fmt: skip
+        found = self._tool.note(time, report.position, sample)
+        if found is not None:
+            self._note(tick, *found)
         self._stand_before_next()
         self._reports.append(tick, report.time, report.position, wire.effort)
         if sample.valid and sample.time > self._last_exposure:
@@ -300,7 +296,7 @@ class RealTimeRun:
         """Nothing happens between two ticks, so the time of the next one may begin right after the reply."""
         self._next += 1
         self._context.SetTime(self._next * self.period)
-        self._note_ports()  # logs what stands before the tick, as a simulation does
+        self._note_ports()  # what stands before the tick, as a simulation logs it
 
     def _note_ports(self) -> None:
         self._log.note(self.servo.GetMyContextFromRoot(self._context))
@@ -345,8 +341,8 @@ class RealTimeRun:
             row = row_of.get(int(tick))
             if row is not None:
                 stamps[row], positions[row], efforts[row] = stamp, joints[:NUM_JOINTS], joints[NUM_JOINTS:]
-        _fill_gaps(positions)
-        _fill_gaps(efforts)
+        fill_gaps(positions)
+        fill_gaps(efforts)
         exposures = self._exposures.read()
         exposure_times, poses = exposures[:, 0], exposures[:, 1:].reshape(-1, 4, 4)
         counts = np.round(data["guard_status"]).astype(int)
@@ -389,11 +385,5 @@ class RealTimeRun:
             pauses=self._pauses,
             events=self._events,
             limited_messages=wire.limited_messages,
+            people=LivePeople.of(self._watch, times, data) if self._watch else None,
         )
-
-
-def _fill_gaps(rows: np.ndarray) -> None:
-    """Where no message came, the last one stands; in place."""
-    for index in range(1, len(rows)):
-        if math.isnan(rows[index, 0]):
-            rows[index] = rows[index - 1]

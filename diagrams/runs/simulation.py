@@ -9,6 +9,7 @@ from pydrake.systems.analysis import Simulator
 from pydrake.systems.framework import DiagramBuilder, System
 
 from diagrams.integration import Integration
+from diagrams.live_watch import OF_WATCH
 from diagrams.record.coverage import Prediction, coverage
 from diagrams.record.log import GuardEvent, RunLog
 from diagrams.record.packed_log import PackedLog
@@ -24,7 +25,6 @@ from systems.controller_model import ControllerModel
 from systems.guard.guard import KINDS
 from systems.reference.paths import CartesianPath, make_path
 
-_OF_WATCH = ("speed_share", "stop", "separation")
 _CHUNK = 0.2  # s of simulated time between two reports of progress
 _FRAME = 1.0 / 30.0  # s of simulated time between two pictures, where somebody looks on
 _LONGEST_HOLD = 30.0  # s, after which a run is over whose path is held
@@ -110,7 +110,7 @@ class Experiment:
         if self.servo.reference.is_slowed:
             ports["path_time"] = self.servo.GetOutputPort("path_time")
         if self.watch:
-            ports |= {name: self.servo.GetOutputPort(name) for name in _OF_WATCH}
+            ports |= {name: self.servo.GetOutputPort(name) for name in OF_WATCH}
         # In one log: what stands in a diagram costs time at every step of the integrator.
         self._log = PackedLog(builder, ports, scenario.station.period)
         self.diagram = builder.Build()
@@ -207,7 +207,7 @@ class Experiment:
     def watched(self) -> tuple[np.ndarray, dict[str, np.ndarray]]:
         """What the separation monitor said, and the joints: times (n,) in s, and values (n, size) by port."""
         times, data = self._log.read(self.context)
-        return times, {name: data[name] for name in (*_OF_WATCH, "path_time", "truth.motor_state")}
+        return times, {name: data[name] for name in (*OF_WATCH, "path_time", "truth.motor_state")}
 
     def log(self) -> RunLog:
         """The record of what has happened so far."""

@@ -162,10 +162,12 @@ def _contradiction(scenario: Scenario) -> tuple[list[str | int], str] | None:
     for name, value in (("kind", scenario.station.kind), ("interface", scenario.station.interface)):
         if value in LINK_NAMES and value != link:
             return ["station", name], f"station.{name}={value} contradicts station.link, which is {link}"
-    if scenario.station.overview.enabled and scenario.station.kind != "simulated":
-        return ["station", "kind"], (
-            f"station.overview.enabled needs station.kind=simulated, got {scenario.station.kind}: nothing "
-            "brings whole images from a real station yet, and nobody would be seen"
+    overview = scenario.station.overview
+    if overview.enabled and scenario.station.kind != "simulated" and not overview.source:
+        return ["station", "overview"], (
+            f"station.overview.enabled with station.kind={scenario.station.kind} needs station.overview."
+            "source, the address of the videos of the cameras (rtsp://host/{camera}), or nobody would be "
+            "seen; drawn is for a virtual cell"
         )
     try:
         scenario.station.link.check()

@@ -120,6 +120,14 @@ def _link_json(record: RealTimeRecord) -> dict[str, Any]:
             name: None if value is None else 1e3 * float(value)
             for name, value in zip(("median", "99%", "largest"), quantiles, strict=True)
         },
+        "people": None
+        if record.people is None
+        else {
+            "sets": record.people.sets,
+            "ms_per_set": 1e3 * record.people.seconds / max(1, record.people.sets),
+            "stops": record.people.stops,
+            "oldest_images_s": record.people.largest_age,
+        },
         "camera_drift_ppm": drift if np.isfinite(drift) else None,
         "camera_offset_sigma_ms": sigma if np.isfinite(sigma) else None,
     }

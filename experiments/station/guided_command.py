@@ -231,5 +231,5 @@ def print_link(console: Console, link: dict[str, Any]) -> None:
 _WORTH_SAYING = (
     *("duplicates", "late", "undecodable", "foreign", "implausible", "missing"),
     *("breaks", "stops", "withheld", "lost_body", "wrong_sender", "garbage"),
-    *("disconnections", "impossible", "wrong_time"),
+    *("disconnections", "impossible", "wrong_time", "overloaded"),
 )

@@ -75,7 +75,7 @@ class MeasuredTable:
             if off[number - 1] > _SAME or load != payload:
                 raise ValueError(
                     f"{path}, line {line}: measured at another configuration or load than this run has; "
-                    "name another file with --out"
+                    "name another file with --write"
                 )
             self.measured.add(number)
 

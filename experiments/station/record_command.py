@@ -32,10 +32,11 @@ from systems.link.udp_channel import ChannelError
 def record_command(
     design: Annotated[
         str,
-        typer.Argument(metavar="DESIGN.csv", help="Where to measure: a table of truetip design --out."),
+        typer.Argument(metavar="DESIGN.csv", help="Where to measure: a table of truetip design --write."),
     ],
     out: Annotated[
-        Path, typer.Option(metavar="FILE.csv", help="The table; a run that was interrupted goes on in it.")
+        Path,
+        typer.Option("--write", metavar="FILE.csv", help="The table; an interrupted run goes on in it."),
     ] = Path("out/measured.csv"),
     scenario: ScenarioOption = "cell",
     settings: SetOption = None,
@@ -51,7 +52,9 @@ def record_command(
     ] = None,
     mcap: Annotated[
         str | None,
-        typer.Option(metavar="FILE.mcap", help="Also all that is said, for calibrate --recording."),
+        typer.Option(
+            "--write-recording", metavar="FILE.mcap", help="Also all that is said, for calibrate --recording."
+        ),
     ] = None,
     json_file: JsonOption = None,
 ) -> None:

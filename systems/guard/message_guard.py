@@ -19,12 +19,14 @@ class PassedTime:
     those that come early after them, up to `LONGEST_OWED`; in sum the time is never ahead of the own clock. A
     stamp that is not later than the newest one is of a message that was overtaken, or of a clock that was set
     back: it counts from the stamp before it, and what it was given is taken from the next one that is later.
+    After `LONGEST_OWED` of such stamps the clock was set, and goes on from there.
     """
 
     def __init__(self, period: float) -> None:
         """Starts with the time of one message, ``period`` in s."""
         self._period, self._most, self._credit = period, MOST_BRIDGED * period, period
         self._newest: float | None = None
+        self._behind_since: float | None = None  # on the own clock, when the first stamp was not the newest
         self._last = self._aside = self._now = self._advanced = 0.0
 
     def until(self, stamp: float, now: float) -> float:
@@ -50,6 +52,12 @@ class PassedTime:
         passed = min(max(0.0, passed), self._most, self._credit)
         self._aside = 0.0 if is_newest else self._aside + passed
         self._newest, self._last = max(stamp, self._newest), stamp
+        if is_newest:
+            self._behind_since = None
+        elif self._behind_since is None:
+            self._behind_since = now
+        elif now - self._behind_since > LONGEST_OWED:
+            self._newest, self._aside, self._behind_since = stamp, 0.0, None
         if ahead > 0.0:
             self._advanced = now
         self._credit -= passed

@@ -4,12 +4,14 @@ from contextlib import AbstractContextManager
 from dataclasses import dataclass, field
 from typing import ClassVar
 
+import numpy as np
 from pydrake.systems.framework import LeafSystem
 
 from robots.configuration.quantity import quantity
 from robots.description.model import Placement, RobotModel
 from systems.link.protocols import RobotLink, VirtualController, Wire
 from systems.link.qualisys.maker import Qualisys
+from systems.reference.cartesian_path import CartesianPath
 
 
 @dataclass
@@ -58,6 +60,14 @@ class LinkConfig:
         """
         raise NotImplementedError
 
-    def virtual_controller(self, robot: RobotModel) -> VirtualController:
-        """The controller's end of the wire, before a simulated robot."""
+    def virtual_controller(
+        self, robot: RobotModel, path: CartesianPath | None = None, home: np.ndarray | None = None
+    ) -> VirtualController:
+        """The controller's end of the wire, before a simulated robot.
+
+        Args:
+            robot: as the controller knows it.
+            path: that a program of its own runs, if it has one.
+            home: joint positions (6,) in rad near which the path begins.
+        """
         raise NotImplementedError

@@ -61,7 +61,7 @@ class PathAhead:
             return self.path.sample(t)
         s, rate, acceleration = (row[:, None] for row in self.time.at_times(t))
         X_WE, V_WE, A_WE = self.path.sample(s[:, 0])
-        return X_WE, rate * V_WE, rate**2 * A_WE + acceleration * V_WE
+        return X_WE, *_slowed(V_WE, A_WE, rate, acceleration)
 
     def moment(self, t: float, ahead: float = 0.0) -> PathMoment:
         """Where the tool shall be at a time of the station in s; quick at ticks and a preview after them.
@@ -73,7 +73,9 @@ class PathAhead:
         late = 0.0
         if self.time is not None:
             if not self.time.is_planned_speed(t):
-                return _moments(*self.sample(np.array([t])))[0]
+                s, rate, acceleration = self.time.at(t)
+                X_WE, V_WE, A_WE = self.path.sample(s)
+                return PathMoment(X_WE[:3], *_slowed(V_WE, A_WE, rate, acceleration))
             late = t - self.time.at(t)[0]
         for phase in (0.0, self.preview, ahead):
             tick = round((t - phase) / self.period)
@@ -81,7 +83,8 @@ class PathAhead:
                 # Rounded, or the sum would be another number at every tick.
                 phase = phase if self.time is None else round(phase - late, 12)
                 return self._blocks[0](phase, tick // _BLOCK)[tick % _BLOCK]
-        return _moments(*self.path.sample(np.array([t - late])))[0]
+        X_WE, V_WE, A_WE = self.path.sample(t - late)
+        return PathMoment(X_WE[:3], V_WE, A_WE)
 
     def _computed(self, phase: float, block: int) -> list[PathMoment]:
         ticks = np.arange(block * _BLOCK, (block + 1) * _BLOCK)
@@ -206,6 +209,11 @@ def _overrides(config: ReferenceConfig) -> list[tuple[float, float]]:
 
 def _path_time(context: Context) -> PathTime:
     return PathTime.from_state(context.get_discrete_state(0).value())
+
+
+def _slowed(V_WE, A_WE, rate, acceleration) -> tuple[np.ndarray, np.ndarray]:
+    """Velocity and acceleration by the time of the station, of which the path time has these derivatives."""
+    return rate * V_WE, rate**2 * A_WE + acceleration * V_WE
 
 
 def _moments(X_WE: np.ndarray, V_WE: np.ndarray, A_WE: np.ndarray) -> list[PathMoment]:

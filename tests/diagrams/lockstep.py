@@ -23,6 +23,7 @@ from systems.link.abb.session import EgmSession
 from systems.link.clock import ClockQuality
 from systems.link.protocols import RobotLink
 from systems.link.session import TelegramError
+from systems.reference.paths import make_path
 from systems.samples import PoseSample
 
 LOOK = 2e-5  # s that it takes to look for a message
@@ -36,7 +37,8 @@ class Lockstep:
     def __init__(self, scenario: Scenario) -> None:
         robot, config = load_robot(scenario.robot), scenario.station
         self.cell = VirtualCell(scenario, robot)
-        self.controller: Any = config.link.virtual_controller(robot)  # of any maker
+        path, home = make_path(scenario.reference), np.deg2rad(scenario.home_deg)
+        self.controller: Any = config.link.virtual_controller(robot, path, home)  # of any maker
         self.session = self.new_session(scenario)
         self.channel = SimpleNamespace(address=("127.0.0.1", 6510))
         self.time = self.arrived = 0.0

@@ -9,6 +9,7 @@ from pydrake.systems.primitives import ConstantVectorSource
 
 from diagrams.driven_robot import DrivenRobot, add_driven_robot
 from diagrams.scenario.scenario import StationConfig
+from robots.description.drive_parts import Cubic, Exponential, Limited
 from robots.description.model import RobotModel, load_robot
 from robots.drivetrain.stiffening import Stiffening
 from robots.dynamics.plant import add_robot
@@ -21,7 +22,8 @@ Motion = dict[str, np.ndarray]  # of each joint its position and its velocity
 
 
 def robot_of(stiffens: bool) -> RobotModel:
-    """With linear gears, or every gear with one of the characteristics."""
+    """With linear springs, or every gear, bearing and beam with one of the characteristics."""
+    parts = [Cubic(2e5), Exponential(3e6, 500.0), Limited(2e5, 4e6, 1e-3)]
     kinds = [
         Stiffening("cubic_spring", gamma=2e5),
         Stiffening("exponential_spring", gamma=500.0, c_max=1.5e5),
@@ -30,6 +32,11 @@ def robot_of(stiffens: bool) -> RobotModel:
     robot = load_robot("irb1200")
     for i, joint in enumerate(robot.joints if stiffens else []):
         joint.drive_train.stiffening = kinds[i % 3]
+        if joint.tilting:
+            joint.tilting.stiffening_a, joint.tilting.stiffening_b = parts[i % 3], parts[(i + 1) % 3]
+    for link in robot.links if stiffens else []:
+        if link.beam:
+            link.beam.stiffening_x, link.beam.stiffening_y = Cubic(1e5), Exponential(1e7, 300.0)
     return robot
 
 
@@ -74,10 +81,9 @@ def of_a_plant_with_all_in_it(
     speed = np.array([motion[f"motor_{i}"][1] for i in NUMBERS])
     friction = robot.joint_coulomb_friction * np.tanh(speed / robot.coulomb_velocity)
     applied = np.zeros(plant.num_velocities())
-    if parts.stiffening_gears is not None:
-        deflection = np.array([motion[f"deflection_{i}"][0] for i in NUMBERS])
-        rows = [joint.velocity_start() for joint in parts.deflections]
-        applied[rows] = -parts.stiffening_torque(deflection)
+    deflection = np.array([motion[joint.name()][0] for joint in parts.sprung])
+    rows = [joint.velocity_start() for joint in parts.sprung]
+    applied[rows] = -parts.stiffening_torque(deflection)
     plant.get_actuation_input_port().FixValue(context, torque - friction)
     plant.get_applied_generalized_force_input_port().FixValue(context, applied)
     return accelerations(plant, context, names)
@@ -151,6 +157,46 @@ def test_a_default_context_has_the_friction_of_the_motors():
     rates = driven.motors.EvalTimeDerivatives(context).CopyToVector()[6:12]
     torque = evaluate(driven.motor_torque, root)
     np.testing.assert_allclose(torque - inertia * rates, braking, rtol=1e-9)
+
+
+def test_structure_and_gears_that_stiffen_gain_the_energy_that_motors_give():
+    """Without friction and damping, in random states; the rate of the energy by central differences."""
+    robot = robot_of(True)
+    for joint in robot.joints:
+        train = joint.drive_train
+        train.damping = train.viscous_friction = train.coulomb_friction = 0.0
+        if joint.tilting:
+            joint.tilting.damping = [0.0, 0.0]
+    driven, diagram = build(robot, "structure")
+    root = diagram.CreateDefaultContext()
+    plant, gears, bearings = driven.plant, robot.stiffening_gears, driven.links.stiffening_structure
+    assert gears is not None
+    assert bearings is not None
+    turned, bent = (
+        [joint.position_start() for joint in joints]
+        for joints in (driven.links.motors, driven.links.structure)
+    )
+
+    def energy(state: np.ndarray) -> float:
+        root.SetContinuousState(state)
+        context = plant.GetMyContextFromRoot(root)
+        q, (theta, omega) = plant.GetPositions(context), evaluate(driven.motor_state, root).reshape(2, 6)
+        # The plant's own potential energy has the springs of the structure as they are at rest.
+        springs = gears.energy(q[turned] - theta).sum() + bearings.energy(q[bent]).sum()
+        springs -= 0.5 * bearings.c_0 @ q[bent] ** 2
+        moving = plant.EvalKineticEnergy(context) + 0.5 * robot.reflected_inertia @ omega**2
+        return float(moving + plant.EvalPotentialEnergy(context) + springs)
+
+    rng = np.random.default_rng(5)
+    for _ in range(3):
+        # Plant and motors; deflections of milliradians, at which every spring is a tenth stiffer and more.
+        state = 2e-3 * rng.normal(size=root.num_continuous_states())
+        root.SetContinuousState(state)
+        given = float(evaluate(driven.motor_torque, root) @ evaluate(driven.motor_state, root)[6:])
+        rates = diagram.EvalTimeDerivatives(root).CopyToVector()
+        step = 1e-8  # s
+        gained = (energy(state + step * rates) - energy(state - step * rates)) / (2.0 * step)
+        assert gained == pytest.approx(given, abs=0.03)  # W, of some 5 that the stiffening of springs is
 
 
 @pytest.mark.slow

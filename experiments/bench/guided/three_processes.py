@@ -265,7 +265,11 @@ def _relay_main(target: int, port: int) -> None:
     def accept() -> None:
         while True:
             here, _ = listener.accept()
-            there = socket.create_connection(("127.0.0.1", target))
+            try:
+                there = socket.create_connection(("127.0.0.1", target))
+            except OSError:  # nobody is there, or not yet again
+                here.close()
+                continue
             for ends in ((here, there), (there, here)):
                 threading.Thread(target=pump, args=ends, daemon=True).start()
 

@@ -14,6 +14,7 @@ from robots.dynamics.newton_inverse import inverse_kinematics
 from robots.kinematics.analytic_inverse import JointLimitError, UnreachableError
 from robots.kinematics.forward import Kinematics, robust_solve
 from systems.link.abb.messages import Command, EgmError, Pose, decode_command, fill_pose
+from systems.link.abb.path_program import PathProgram
 from systems.link.abb.schema import (
     DATA,
     MCI_RUNNING,
@@ -39,6 +40,9 @@ class EgmRunConfig:
     condition_deg: float = quantity(0.01, 1e-6, 360.0, "deg")
     condition_time: float = quantity(60.0, 1e-3, 3600.0, "s")  # of convergence after which EGM ends
     restart_after: float = 0.5  # s after its end until EGM is run again; negative: never
+    # Whether the program runs the path itself (EGMMoveL) and takes path corrections alone
+    path_correction: bool = False
+    correction_lag: float = quantity(0.05, 0.0, 10.0, "s")  # with which these are taken up (assumed)
 
 
 class RunState(Enum):
@@ -52,8 +56,20 @@ class RunState(Enum):
 class VirtualController:
     """Emulates an ABB controller. Times are on the controller's clock, in s."""
 
-    def __init__(self, robot: RobotModel, config: EgmRunConfig, signals: SignalLayout | None = None) -> None:
+    def __init__(
+        self,
+        robot: RobotModel,
+        config: EgmRunConfig,
+        signals: SignalLayout | None = None,
+        program: PathProgram | None = None,
+    ) -> None:
         """Starts the program at its first cycle.
+
+        Args:
+            robot: as the controller knows it.
+            config: of the program.
+            signals: which test signals it sends.
+            program: a path that it runs itself; None to be guided by commands.
 
         Raises:
             ValueError: if a time or an angle is not positive, or there cannot be such a layout of signals.
@@ -62,7 +78,7 @@ class VirtualController:
             if not getattr(config, name) > 0.0:
                 raise ValueError(f"EGM: {name} must be positive, got {getattr(config, name)}")
         self.state = RunState.RUNNING
-        self.motors_on = True
+        self.motors_on, self.has_collided = True, False
         self.restarts = self.undecodable = self.late = self.ignored = 0
         self._config = config
         self._codec = SignalCodec(signals or SignalLayout())
@@ -74,6 +90,7 @@ class VirtualController:
         self._last_command: int | None = None
         self._reference, self._speed = _STANDING, _STANDING
         self._commanded = False  # whether this run has got a command
+        self._program, self._program_began = program, math.nan
 
     @property
     def is_running(self) -> bool:
@@ -91,6 +108,11 @@ class VirtualController:
             self._ended = time
         self.state = RunState.ENDED if for_good else RunState.PAUSED
         self._reference = self._speed = _STANDING
+
+    def collide(self, time: float) -> None:
+        """The robot hits something: its own supervision stops it and says so."""
+        self.has_collided = True
+        self.stop(time)
 
     def receive(self, data: bytes, time: float, position: np.ndarray) -> bool:
         """Takes a datagram of a client; what it cannot follow is counted and ignored.
@@ -117,6 +139,13 @@ class VirtualController:
             if -100 < ahead <= 0:
                 self.late += 1
                 return False
+        if (command.path_correction is not None) != (self._program is not None):
+            self.ignored += 1
+            return False
+        if self._program is not None and command.path_correction is not None:
+            self._program.correct(command.path_correction)
+            self._last_command, self._heard, self._commanded = seqno, time, True
+            return True
         try:
             reference, speed = self._in_joints(command, position)
         except (UnreachableError, JointLimitError):
@@ -146,12 +175,25 @@ class VirtualController:
             self._began = self._heard = self._unconverged = time
         # The time-out begins with the first command; until then the program waits for the client.
         if self._commanded and time - self._heard > self._config.timeout:
-            self.stop(time)
+            self.stop(time, for_good=self._program is not None)
+            return
+        if self._program is not None:
+            self._run_program(self._program, time, planned)
             return
         if not self._commanded or not self._is_converged(planned):
             self._unconverged = time
         elif time - self._unconverged >= self._config.condition_time:
             self.stop(time)
+
+    def _run_program(self, program: PathProgram, time: float, planned: np.ndarray) -> None:
+        """The path begins with the first correction and ends for good."""
+        if not self._commanded:
+            return
+        if math.isnan(self._program_began):
+            self._program_began = time
+        self._reference, self._speed, is_over = program.at(time - self._program_began, planned)
+        if is_over:
+            self.stop(time, for_good=True)
 
     def report(
         self,
@@ -182,11 +224,14 @@ class VirtualController:
         message.rapidExecState.state = RAPID_RUNNING
         message.torqueRef.joints.extend(torque.tolist())
         message.utilizationRate = 0.0
+        if self.has_collided:
+            message.CollisionInfo.collsionTriggered = True
         return message.SerializeToString()
 
     def signals(self, time: float, position: np.ndarray, velocity: np.ndarray, torque: np.ndarray) -> bytes:
-        """The test signals of this cycle; arguments as of `report`, velocity in rad/s."""
-        return self._codec.encode(ControllerSignals(time, velocity, torque, position))
+        """The test signals of this cycle; arguments as of `report`, velocity in rad/s. Nothing pushes it."""
+        nothing = np.zeros(NUM_JOINTS), np.zeros(2)
+        return self._codec.encode(ControllerSignals(time, velocity, torque, position, *nothing))
 
     def counters(self) -> dict[str, int]:
         """How often the program began anew, and what became of the datagrams, by name."""

@@ -4,14 +4,18 @@ from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass, field
 
+import numpy as np
+
 from robots.description.model import RobotModel
 from systems.link.abb.client import EgmClient
 from systems.link.abb.controller import EgmRunConfig, VirtualController
 from systems.link.abb.motion import EgmMotion, EgmMotionConfig
+from systems.link.abb.path_program import PathProgram
 from systems.link.abb.robot_link import AbbRobotLink
 from systems.link.abb.signal_client import SignalClient
 from systems.link.abb.signals import SignalCodec, SignalLayout
 from systems.link.protocols import Wire
+from systems.reference.cartesian_path import CartesianPath
 
 
 @dataclass
@@ -30,9 +34,20 @@ class EgmSettings:
         """What plans between commands and drives, as the controller does."""
         return EgmMotion(self.motion, period, takes_position=takes_position)
 
-    def virtual_controller(self, robot: RobotModel) -> VirtualController:
-        """The controller's end of the wire, before a simulated robot."""
-        return VirtualController(robot, self.run, self.signals)
+    def virtual_controller(
+        self, robot: RobotModel, path: CartesianPath | None = None, home: np.ndarray | None = None
+    ) -> VirtualController:
+        """The controller's end of the wire, before a simulated robot.
+
+        Args:
+            robot: as the controller knows it.
+            path: that its program runs where `EgmRunConfig.path_correction` says so.
+            home: joint positions (6,) in rad near which the path begins.
+        """
+        program = None
+        if self.run.path_correction and path is not None and home is not None:
+            program = PathProgram(robot, path, home, self.run.correction_lag)
+        return VirtualController(robot, self.run, self.signals, program)
 
     @contextmanager
     def open(self, robot: RobotModel, wire: Wire) -> Iterator[AbbRobotLink]:

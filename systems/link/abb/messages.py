@@ -138,6 +138,16 @@ class RobotReport:
         return bool(self.message.mciConvergenceMet)
 
     @property
+    def has_collided(self) -> bool:
+        """Whether the controller has noticed a collision."""
+        return self.message.HasField("CollisionInfo") and bool(self.message.CollisionInfo.collsionTriggered)
+
+    @property
+    def utilization(self) -> float:
+        """How much of its performance the robot needs, 1 for all of it; 0 if it is not sent."""
+        return 0.01 * self.message.utilizationRate
+
+    @property
     def pose(self) -> Pose | None:
         """The pose of the tool in the controller's work object, None if it is not sent."""
         feedback = self.message.feedBack

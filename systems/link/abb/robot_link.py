@@ -9,6 +9,7 @@ from systems.link.abb.signal_client import SignalClient
 from systems.link.guided import GuidedRobot
 from systems.link.session import Link
 
+_COLLISION = "the controller reports a collision"
 _SIGNAL_AGE = 0.1  # s, beyond which signals and earlier messages say nothing of the present motion
 
 
@@ -28,10 +29,21 @@ class AbbRobotLink(GuidedRobot[RobotReport]):
         """Where reports and test signals come in; 0 for no signals."""
         return self._client.channel.address[1], self._signals.channel.address[1] if self._signals else 0
 
+    @property
+    def trouble(self) -> str:
+        """Why the newest messages are refused, or that the robot has hit something; else empty."""
+        return _COLLISION if self._client.session.egm.has_collided else super().trouble
+
+    def counters(self) -> dict[str, int]:
+        """What has come and gone, by name; `overloaded` reports need more than all of the performance."""
+        return {**super().counters(), "overloaded": self._client.session.egm.overloaded}
+
     def why_not_ready(self) -> str:
         """What keeps the robot from following commands."""
         if self._client.session.link is Link.WAITING:
             return "no message of a controller came in"
+        if self._client.session.egm.has_collided:
+            return _COLLISION
         return "the controller does not run EGM"
 
     def poll(self, timeout: float = 0.0) -> RobotReport | None:
@@ -50,6 +62,10 @@ class AbbRobotLink(GuidedRobot[RobotReport]):
     def send(self, position: np.ndarray, velocity: np.ndarray, is_speed_only: bool = False) -> bool:
         """Answers the newest report with positions (rad) and speeds (rad/s), or speeds alone."""
         return self._client.reply(_mode(is_speed_only), Command(position=position, velocity=velocity))
+
+    def correct(self, shift_P: np.ndarray) -> bool:
+        """Answers the newest report with a path correction (3,) in m, in the frame of the path."""
+        return self._client.reply(Mode.PATH_CORRECTION, Command(path_correction=shift_P))
 
     def stop(self, position: np.ndarray, velocity: np.ndarray, is_speed_only: bool = False) -> bool:
         """Answers the newest message on the way to rest, also one that was refused."""

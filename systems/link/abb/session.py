@@ -11,19 +11,30 @@ _Asked = tuple[Mode, Command]
 
 
 class EgmCodec:
-    """Fits `systems.link.session.Codec`; a command is a mode and what it carries."""
+    """Fits `systems.link.session.Codec`; a command is a mode and what it carries.
+
+    After a collision no report is one of a robot that follows, whatever the controller says later: nothing
+    goes on by itself from where a robot has hit something.
+    """
+
+    def __init__(self) -> None:
+        self.has_collided = False
+        self.overloaded = 0  # reports of a robot that needs more than all of its performance
 
     def decode(self, data: bytes) -> RobotReport:
         """See `decode_report`."""
-        return decode_report(data)
+        report = decode_report(data)
+        self.has_collided |= report.has_collided
+        self.overloaded += report.utilization > 1.0
+        return replace(report, egm_running=False) if self.has_collided else report
 
     def encode(self, command: _Asked, report: RobotReport, number: int, now: float) -> bytes:
         """See `encode_command`; EGM does not say which report a command answers."""
         return encode_command(*command, number, now)
 
     def at(self, report: RobotReport) -> _Asked:
-        """To stay at the position of a report."""
-        at_rest = Command(position=report.position, velocity=np.zeros_like(report.position))
+        """To stay at the position of a report, or to run a path uncorrected."""
+        at_rest = Command(report.position, np.zeros_like(report.position), path_correction=np.zeros(3))
         return Mode.JOINT_SPEED, at_rest
 
     def standing(self, safe: _Asked, asked: _Asked) -> _Asked:
@@ -47,7 +58,8 @@ class EgmSession(LinkSession[RobotReport]):
         period: float = 4e-3,
     ) -> None:
         """Prepares for the first message; arguments and errors as of `LinkSession`."""
-        super().__init__(EgmCodec(), largest_speed, break_after, host, period)
+        self.egm = EgmCodec()
+        super().__init__(self.egm, largest_speed, break_after, host, period)
 
     def reply(self, mode: Mode, command: Command, now: float) -> bytes | None:
         """See `answer`."""

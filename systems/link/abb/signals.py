@@ -25,7 +25,7 @@ class SignalLayout:
     separator: str = ";"  # of numbers in a text
     time_unit: float = 1e-3  # s
     velocity_unit_deg_s: float = 180.0 / math.pi  # 1 if the controller sends degrees per second
-    torque_unit: float = 1.0  # N m
+    torque_unit: float = 1.0  # N m, of the motors' torques and of those estimated from outside
 
 
 @dataclass(frozen=True)
@@ -36,13 +36,17 @@ class ControllerSignals:
     velocity: np.ndarray | None = None  # (6,) rad/s
     torque: np.ndarray | None = None  # (6,) N m
     position: np.ndarray | None = None  # (6,) rad
+    # (6,) N m, of whatever pushes the robot, as the controller estimates it; 4003 of Probst (2024), B.3
+    external_torque: np.ndarray | None = None
+    inputs: np.ndarray | None = None  # (2,), digital inputs 1 and 2, 0 or 1; 102 and 103
 
 
 class SignalError(ValueError):
     """A datagram that does not fit the layout, or an invalid layout."""
 
 
-_SIZES = {"time": 1, "velocity": NUM_JOINTS, "torque": NUM_JOINTS, "position": NUM_JOINTS}
+_OF_JOINTS = ("velocity", "torque", "position", "external_torque")
+_SIZES = {"time": 1, **dict.fromkeys(_OF_JOINTS, NUM_JOINTS), "inputs": 2}
 
 
 class SignalCodec:
@@ -72,6 +76,8 @@ class SignalCodec:
             "velocity": math.radians(layout.velocity_unit_deg_s),
             "torque": layout.torque_unit,
             "position": math.radians(1.0),
+            "external_torque": layout.torque_unit,
+            "inputs": 1.0,
         }
         self._count = sum(_SIZES[name] for name in layout.fields)
         self._dtype = np.dtype(_ORDERS[layout.byte_order] + _NUMBERS.get(layout.number, "f8"))

@@ -4,6 +4,8 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 
+import numpy as np
+
 from robots.configuration.quantity import quantity
 from robots.description.model import RobotModel
 from systems.link.client import LinkClient
@@ -13,6 +15,7 @@ from systems.link.kuka.robot_link import KukaRobotLink, RsiCodec, RsiReport
 from systems.link.protocols import Wire
 from systems.link.session import LinkSession
 from systems.link.udp_channel import UdpChannel
+from systems.reference.cartesian_path import CartesianPath
 
 _CYCLES = (4, 12)  # ms
 
@@ -47,8 +50,10 @@ class RsiSettings:
         self._check_period(period)
         return RsiMotion(self.motion, period, takes_position)
 
-    def virtual_controller(self, robot: RobotModel) -> RsiController:
-        """The controller's end of the wire, before a simulated robot."""
+    def virtual_controller(
+        self, robot: RobotModel, path: CartesianPath | None = None, home: np.ndarray | None = None
+    ) -> RsiController:
+        """The controller's end of the wire, before a simulated robot; its program runs no path."""
         return RsiController(robot, self.run)
 
     @contextmanager

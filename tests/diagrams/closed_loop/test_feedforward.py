@@ -120,7 +120,7 @@ def test_on_the_test_path_an_elastic_structure_is_left_by_hundredths_of_a_millim
 @pytest.mark.slow
 @pytest.mark.parametrize(
     "law",
-    ["numerical_ik", *(pytest.param(law, marks=pytest.mark.slow) for law in ("pbvs", "position_level"))],
+    ["numerical_ik", "pbvs", "position_level"],
 )
 def test_a_law_with_an_exact_model_has_little_left_to_do(law: str):
     """Also PBVS on drives that follow positions: its own start from where the motors are."""

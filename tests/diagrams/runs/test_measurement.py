@@ -54,7 +54,7 @@ def test_encoders_that_err_put_the_links_elsewhere():
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("period", [0.11, 0.7, pytest.param(1.0, marks=pytest.mark.slow)])
+@pytest.mark.parametrize("period", [0.11, 0.7, 1.0])
 def test_a_slow_camera_shows_the_robot_at_rest_and_not_on_its_way(period: float):
     """An exposure from the motion is off by up to 279 mm.
 

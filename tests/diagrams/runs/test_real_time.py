@@ -46,9 +46,9 @@ def largest_and_static(log, e: np.ndarray) -> tuple[float, float]:
     ("law", "settings"),
     [
         ("numerical_ik", []),
-        pytest.param("pbvs", ["reference.override=[{at: 2.2, share: 0.7}]"], marks=pytest.mark.slow),
-        pytest.param("position_level", [], marks=pytest.mark.slow),
-        pytest.param("open_loop", [], marks=pytest.mark.slow),
+        ("pbvs", ["reference.override=[{at: 2.2, share: 0.7}]"]),
+        ("position_level", []),
+        ("open_loop", []),
     ],
 )
 def test_over_the_wire_a_law_is_as_accurate_as_in_simulation(law: str, settings: list[str]):
@@ -102,7 +102,7 @@ def motion(wire: Lockstep) -> tuple[np.ndarray, np.ndarray]:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("fault", ["stall_at=5", pytest.param("stop_at=5", marks=pytest.mark.slow)])
+@pytest.mark.parametrize("fault", ["stall_at=5", "stop_at=5"])
 def test_when_the_controller_goes_the_run_ends_and_the_robot_stops_smoothly(fault: str):
     record, _, wire = guided(quick(f"station.faults.{fault}"))
     assert (
@@ -122,9 +122,9 @@ def test_when_the_controller_goes_the_run_ends_and_the_robot_stops_smoothly(faul
     ("fault", "law"),
     [
         ("stop_at=5", "numerical_ik"),
-        pytest.param("stall_at=5", "pbvs", marks=pytest.mark.slow),
-        pytest.param("stall_at=5", "numerical_ik", marks=pytest.mark.slow),
-        pytest.param("stop_at=5", "pbvs", marks=pytest.mark.slow),
+        ("stall_at=5", "pbvs"),
+        ("stall_at=5", "numerical_ik"),
+        ("stop_at=5", "pbvs"),
     ],
 )
 def test_a_run_may_go_on_where_it_was_interrupted(fault: str, law: str):
@@ -171,3 +171,22 @@ def test_the_guard_of_the_simulation_is_the_guard_of_the_wire():
     assert set(record.log.guard_counts) == set(KINDS)
     limit = 0.02 * load_robot("irb1200").speed * (1.0 + 1e-6)
     assert (np.abs(record.log.velocity_command) <= limit).all()
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("resume", ["false", "true"])
+def test_after_a_collision_a_run_ends_by_name_and_never_goes_on(resume: str):
+    """Also where runs go on after a stop, and the controller runs its program again."""
+    scenario = quick(f"servo.guard.resume={resume}", "station.link.resume_within=1.5")
+    wire = Lockstep(scenario)
+
+    def hit() -> bool:
+        if wire.cell.time > 6.0 and not wire.controller.has_collided:
+            wire.controller.collide(wire.cell.stamp)
+        return False
+
+    run = RealTimeRun(scenario, "open_loop")
+    record = run.run(wire.link, wire.camera(), now=wire.now, is_asked_to_end=hit)
+    assert record.ended in ("the controller reports a collision", "the controller did not come back")
+    assert wire.link.trouble == "the controller reports a collision"
+    assert wire.sent[-1][0] < 6.2

@@ -31,6 +31,7 @@ def test_the_shipped_scenarios_load_by_name_and_say_what_they_are():
     assert shipped_scenarios() == [
         "cell",
         "cell-kuka",
+        "cell-watched",
         "dead-time",
         "everything",
         "everything-realistic",
@@ -232,9 +233,9 @@ def test_numbers_that_contradict_each_other_are_both_named(tmp_path: Path):
 
 
 def test_people_are_not_looked_for_where_no_images_come_from():
-    message = "station.overview.enabled needs station.kind=simulated, got egm"
+    message = "station.overview.enabled with station.kind=egm needs station.overview.source"
     with pytest.raises(ScenarioError, match=message):
-        load_scenario("watched", ["station.kind=egm"])
+        load_scenario("watched", ["station.kind=egm", "station.overview.source=''"])
 
 
 def test_events_are_written_as_they_are_read(tmp_path: Path):

@@ -49,7 +49,7 @@ def test_every_row_is_on_the_disk_at_once_and_the_next_run_knows_it(tmp_path, de
 def test_what_cannot_be_measured_is_refused_in_one_line(tmp_path, design):
     assert "2 or more exposures, got 0.5 s, 0.0 s" in refused("record", str(design), "--mean", "0")
     assert "must be between 0 and 1, got 2.0" in refused("record", str(design), "--speed", "2")
-    assert "must end in .csv or .txt" in refused("record", str(design), "--out", str(tmp_path / "a.mcap"))
+    assert "must end in .csv or .txt" in refused("record", str(design), "--write", str(tmp_path / "a.mcap"))
     assert "nothing.csv: no such file" in refused("record", str(tmp_path / "nothing.csv"))
     design.write_text(HEAD + "\n1,2,3,4,5,six\n")
     assert "design.csv, line 2: not six finite joint positions" in refused("record", str(design))

@@ -43,3 +43,23 @@ def test_a_cell_whose_messages_and_ears_are_in_different_networks_is_refused():
     result = CliRunner().invoke(app, arguments)
     assert result.exit_code == 2
     assert "would send its messages to 192.0.2.7 and hear commands on 127.0.0.1" in result.stderr
+
+
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        (["--mode", "path"], "--mode must be one of joint, path_correction, got 'path'"),
+        (["--mode", "path_correction"], "add --station egm, or --with-cell"),
+        (["--mode", "path_correction", "--station", "rsi"], "is of ABB's EGM, got a station that speaks RSI"),
+        (["--mode", "path_correction", "--with-cell", "--law", "pbvs"], "--law does not go with"),
+        (
+            ["--mode", "path_correction", "--with-cell", "--set", "station.link.has_camera=false"],
+            "path correction needs a camera",
+        ),
+    ],
+)
+def test_path_correction_is_refused_where_it_makes_no_sense(arguments: list[str], said: str, tmp_path):
+    result = CliRunner().invoke(app, ["run", *arguments, "--out", str(tmp_path)])
+    assert result.exit_code == 2, result.output
+    assert said in result.stderr
+    assert len(result.stderr.strip().splitlines()) == 1

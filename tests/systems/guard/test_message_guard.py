@@ -158,6 +158,16 @@ def test_a_clock_that_steps_forward_allows_no_more_than_has_passed_here():
     stream.check()
 
 
+def test_a_clock_that_was_set_back_is_the_clock_from_there_on():
+    """Also when it comes to the time again at which it was set."""
+    passed, set_back = PassedTime(PERIOD), 0.5
+    stamps = 1000.0 + PERIOD * np.arange(400)
+    stamps[100:] -= set_back
+    found = np.array([passed.until(stamp, PERIOD * n) for n, stamp in enumerate(stamps)])
+    np.testing.assert_allclose(np.delete(found, 100), PERIOD, rtol=1e-6)
+    assert found[100] == 0.0
+
+
 def test_after_a_second_without_messages_no_more_than_a_few_periods_are_made_good():
     stream = Stream()
     cruise(stream, 50, 0.1)

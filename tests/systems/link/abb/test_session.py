@@ -9,6 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from systems.link.abb.messages import Command, Mode, decode_command
+from systems.link.abb.schema import EgmRobot
 from systems.link.abb.session import EgmSession
 from systems.link.session import Link
 from tests.systems.link.abb.reports import ELSEWHERE, HERE, PERIOD, SPEED, report
@@ -191,3 +192,32 @@ def fuzz(count: int, seed: int = 0) -> int:
         taken += rig.session.reply(Mode.JOINT, HOLD, rig.now) is not None
         assert rig.session.last.seqno == 1, number
     return taken
+
+
+def test_after_a_collision_nothing_is_answered_whatever_the_controller_says_later():
+    rig = Rig()
+    rig.hear(report(1))
+    assert rig.session.reply(Mode.JOINT, HOLD, rig.now) is not None
+    hit = EgmRobot.FromString(report(2))
+    hit.CollisionInfo.collsionTriggered = True
+    heard = rig.hear(hit.SerializeToString())
+    assert heard is not None
+    assert heard.has_collided
+    assert not heard.is_ready
+    assert rig.session.reply(Mode.JOINT, HOLD, rig.now) is None
+    for number in range(3, 8):
+        later = rig.hear(report(number))
+        assert later is not None
+        assert not later.is_ready
+        assert rig.session.reply(Mode.JOINT, HOLD, rig.now) is None
+
+
+def test_reports_of_a_robot_that_needs_more_than_it_has_are_counted():
+    rig = Rig()
+    for number, rate in enumerate((0.0, 80.0, 100.0, 130.0, 101.0), 1):
+        message = EgmRobot.FromString(report(number))
+        message.utilizationRate = rate
+        heard = rig.hear(message.SerializeToString())
+        assert heard is not None
+        assert heard.utilization == pytest.approx(0.01 * rate)
+    assert rig.session.egm.overloaded == 2

@@ -41,6 +41,15 @@ def test_the_default_is_milliseconds_radians_a_second_and_newton_metres():
     np.testing.assert_allclose(found.torque, range(10, 16))
 
 
+def test_torque_from_outside_and_inputs_are_read_where_a_program_sends_them():
+    """Signals 4003, 102 and 103 of Probst (2024), table B.3."""
+    layout = SignalLayout(fields=["time", "external_torque", "inputs"], number="text", torque_unit=1e-3)
+    found = SignalCodec(layout).decode(b"2000;0;1500;0;0;0;-250;1;0")
+    np.testing.assert_allclose(found.external_torque, [0.0, 1.5, 0.0, 0.0, 0.0, -0.25])
+    np.testing.assert_array_equal(found.inputs, [1, 0])
+    assert found.torque is None
+
+
 def test_a_text_with_degrees_is_taken_to_radians():
     layout = SignalLayout(fields=["velocity"], number="text", separator=",", velocity_unit_deg_s=1.0)
     found = SignalCodec(layout).decode(b"180,0,0,0,0,-90")

@@ -1,0 +1,63 @@
+"""A tool that is knocked out of its place while the robot moves: what the camera sees of it makes a step."""
+
+import numpy as np
+
+from robots.description.model import RobotModel
+from robots.kinematics.compiled import CompiledKinematics
+from robots.metrology.step_detection import StepDetector
+from systems.samples import PoseSample
+
+DISPLACED = "tool_displaced"  # the kind of the event
+_LEAST = 1.5e-4  # m, of a step: smaller ones are those of gears that change their flank
+_GAP = 0.1  # s between samples, in which a robot gets so far that a bend looks like a step
+_KEPT = 128  # joint positions, the newest: half a second at 250 Hz
+
+
+class ToolWatch:
+    """Compares poses of the camera with the joints at their exposures, one after the other.
+
+    A robot that is not calibrated is off by a bend along its way, in the frame of the tool too; a tool that
+    is displaced is off by a step in it. A camera that is knocked makes such a step as well. It begins anew
+    after a gap in the samples.
+    """
+
+    def __init__(self, robot: RobotModel) -> None:
+        """``robot`` is the one that the controller believes in."""
+        self._kinematics = CompiledKinematics(robot)
+        self._joints = np.full((_KEPT, 1 + len(robot.joints)), np.nan)
+        self._count, self._last, self._steps = 0, -np.inf, StepDetector(_LEAST)
+
+    def note(self, time: float, position: np.ndarray, sample: PoseSample) -> tuple[str, str] | None:
+        """The joints (6,) in rad at a time in s, and the newest sample of the camera then.
+
+        Returns:
+            Kind and detail of an event, if one is known now.
+        """
+        row = self._joints[self._count % _KEPT]
+        row[0], row[1:] = time, position
+        self._count += 1
+        if not sample.valid or sample.time <= self._last or self._count < 2:
+            return None
+        if sample.time - self._last > _GAP:
+            self._steps = StepDetector(_LEAST)
+        self._last = sample.time
+        deviation = self._deviation(sample)
+        found = None if deviation is None else self._steps.add(sample.time, deviation)
+        if found is None:
+            return None
+        size, sigma = 1e3 * float(np.linalg.norm(found.size)), 1e3 * found.sigma
+        return DISPLACED, (
+            f"since {found.onset:.3f} s by {size:.2f} mm, standard deviation {sigma:.2f}: check the tool, or "
+            "the camera if it was touched"
+        )
+
+    def _deviation(self, sample: PoseSample) -> np.ndarray | None:
+        """Seen less believed place of the tool in its frame in m, (3,); None if the joints are not known."""
+        kept = np.roll(self._joints, -(self._count % _KEPT), axis=0)[-min(self._count, _KEPT) :]
+        after = int(np.searchsorted(kept[:, 0], sample.time))
+        if not 0 < after < len(kept):
+            return None
+        before, behind = kept[after - 1], kept[after]
+        share = (sample.time - before[0]) / (behind[0] - before[0])
+        X_WE, _ = self._kinematics.rows_and_jacobian(before[1:] + share * (behind[1:] - before[1:]))
+        return X_WE[:, :3].T @ (sample.X_WE.translation() - X_WE[:, 3])

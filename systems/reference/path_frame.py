@@ -1,0 +1,73 @@
+"""A path as a line in space, without its timing: how far a point is along it, and how far beside it.
+
+The frame of the path P is the one that controllers use for path corrections: x along the path, z as near to
+the z axis of the tool as that allows, y = z x x.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from systems.reference.cartesian_path import CartesianPath
+
+_SPACING = 5e-4  # m, between points of the line
+_SAMPLING = 2e-3  # s, at which the path is looked at; it moves far less than the spacing in that
+_LOOK_BACK, _LOOK_AHEAD = 0.01, 0.05  # m, about the last place: a path may cross itself
+_LEAST_ANGLE = 0.1  # of directions, below which z of the tool says nothing
+
+
+class Place(NamedTuple):
+    """Where a point is beside a path."""
+
+    index: int  # of the nearest point of the line, for the next look
+    along: float  # m, from the start
+    R_WP: np.ndarray  # (3, 3), axes of the path's frame in the world
+    p_error_W: np.ndarray  # (3,) m, from the point to the line, at a right angle to it
+
+
+class PathLine:
+    """Points of a path at even distances, with a frame at each."""
+
+    def __init__(self, path: CartesianPath) -> None:
+        """Samples the path.
+
+        Raises:
+            ValueError: if the tool only turns on the spot, so that there is nothing beside the path.
+        """
+        times = np.arange(path.path_start, path.dwell_start + _SAMPLING, _SAMPLING)
+        X_WE = path.sample(np.minimum(times, path.dwell_start))[0]
+        way = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(X_WE[:, :3, 3], axis=0), axis=1))])
+        if way[-1] < 2.0 * _SPACING:
+            raise ValueError("path correction: the path has no length, the tool only turns on the spot")
+        moves = np.concatenate([[True], np.diff(way) > 0.0])
+        self.along = np.linspace(0.0, way[-1], int(np.ceil(way[-1] / _SPACING)) + 1)
+        points = X_WE[moves][:, :3, 3]
+        self.points = np.stack([np.interp(self.along, way[moves], column) for column in points.T], -1)
+        nearest = np.searchsorted(way[moves], self.along).clip(max=len(points) - 1)
+        tangent = np.diff(self.points, axis=0, append=2.0 * self.points[-1:] - self.points[-2:-1])
+        self.R_WP = _frames(tangent, X_WE[moves][nearest, :3, 2], X_WE[moves][nearest, :3, 0])
+
+    @property
+    def length(self) -> float:
+        """Of the path in m."""
+        return float(self.along[-1])
+
+    def place(self, p_WE: np.ndarray, last: int) -> Place:
+        """Where a point (3,) in m is, not far from the point of the line where it was last."""
+        step = self.along[1]
+        first = max(0, last - int(_LOOK_BACK / step))
+        near = self.points[first : last + int(_LOOK_AHEAD / step) + 1]
+        index = first + int(np.argmin(((near - p_WE) ** 2).sum(axis=1)))
+        error = self.points[index] - p_WE
+        tangent = self.R_WP[index, :, 0]
+        return Place(index, float(self.along[index]), self.R_WP[index], error - (tangent @ error) * tangent)
+
+
+def _frames(tangent: np.ndarray, z_tool: np.ndarray, x_tool: np.ndarray) -> np.ndarray:
+    """Right-handed axes (n, 3, 3) from directions (n, 3), those of the tool being unit vectors."""
+    x = tangent / np.linalg.norm(tangent, axis=1, keepdims=True)
+    y = np.cross(z_tool, x)
+    # Where the tool moves along its own axis, its x axis takes the place of z.
+    y = np.where(np.linalg.norm(y, axis=1, keepdims=True) > _LEAST_ANGLE, y, np.cross(x_tool, x))
+    y /= np.linalg.norm(y, axis=1, keepdims=True)
+    return np.stack([x, y, np.cross(x, y)], -1)
