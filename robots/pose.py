@@ -17,7 +17,7 @@ Floats = tuple[float, float, float]
 Rows = Sequence[Sequence[float]]
 
 # Below this cosine of beta the ZYX angles alpha and gamma cannot be told apart.
-_GIMBAL_LOCK = 1e-9
+_GIMBAL_LOCK = 1e-13  # far above rounding, far below what anyone measures
 # Where the sine of the angle is this small (and the angle not), it no longer shows the axis accurately.
 _HALF_TURN_SINE = 1e-2
 

@@ -12,10 +12,10 @@ from scipy.special import chdtri
 
 from robots.calibration.error_model import ErrorModel
 from robots.calibration.identified import Identified
-from robots.calibration.instrument_frame import instrument_frame
+from robots.calibration.instrument_frame import in_frame_of_instrument
 from robots.calibration.loads import Loads
 from robots.calibration.measurements import MeasurementNoise, Measurements
-from robots.calibration.prior import CENTRE_OF_MASS, MASS, parameter_sizes
+from robots.calibration.prior import CENTRE_OF_MASS, MASS, not_to_be_believed, parameter_sizes
 from robots.calibration.reduction import ReducibleModel
 from robots.calibration.solver.levenberg_marquardt import Fit, minimise
 from robots.calibration.solver.noise_model import FLOOR, JOINT, POSITION, ROTATION, NoiseModel, row_shape
@@ -29,11 +29,8 @@ from robots.calibration.solver.variance_components import (
 )
 from robots.calibration.yielding_joints import yielding_sizes
 from robots.description.model import NUM_JOINTS, RobotModel
-from robots.metrology.least_squares import UndeterminedError
-from robots.pose import zyx_from_rotation
 
 _UPRIGHT = 3.0  # deg, as far as the base of a robot may itself be off
-_ELSEWHERE = (0.1, float(np.deg2rad(10.0)))  # m, rad: farther is no error of the base but another frame
 _PERFECT = 1e-9  # m or rad, rms of residuals that are rounding
 _NO_NOISE = 0.01  # share of the assumed sigma below which residuals are no noise
 _PRIOR_FADES = 0.01  # of the rms: then the prior weighs nothing
@@ -41,6 +38,9 @@ _ROUNDS = 30
 _SETTLED = 0.02  # of its own standard deviation: change of a variance that ends the search
 _ROBUST_ROUNDS = 4
 _PLAUSIBLE = 0.03  # m: with half the rows farther off the table belongs to something else
+REASONS = "is it another robot, another direction of a joint, another unit?"
+_SPRING_SIGMAS = 3.0  # of the prior of compliances: a row that is farther off is no matter of springs
+_MOST = 0.5  # share of the rows
 _RISK = 1e-4  # that a clean table of known noise is searched for gross errors
 _REDUNDANCY_OF_A_POSE = 30  # directions that a robot of six axes has
 
@@ -85,40 +85,27 @@ def identify(
             f"calibration of {robot.name}: it is calibrated already; start from the nominal robot, "
             f"{robot.calibration.of or 'the one that was calibrated'}"
         )
-    robot, frame = _in_frame_of_instrument(robot, measurements)
+    robot, frame = in_frame_of_instrument(robot, measurements)
     if config.compliance and frame is not None:
         _refuse_tilted(frame)
     problem, reducible = _problem(robot, measurements, config, frame is not None)
     if len(measurements) * problem.width < problem.width + NUM_JOINTS:
         raise IdentificationError(f"{len(measurements)} measurements are too few to identify anything")
-    return _Search(problem, config).result(robot, frame, reducible)
+    yielding = None
+    is_borne = measurements.payload.max() <= robot.payload.largest_mass
+    if not config.compliance and _tilt(frame) <= _UPRIGHT and is_borne:
+        yielding, _ = _problem(robot, measurements, replace(config, compliance=True), frame is not None)
+    return _Search(problem, config, yielding).result(robot, frame, reducible)
 
 
-def _in_frame_of_instrument(
-    robot: RobotModel, measurements: Measurements
-) -> tuple[RobotModel, np.ndarray | None]:
-    """The robot with its base where the instrument sees it; the frame (4, 4), None if it is the world."""
-    model = ErrorModel(robot)
-    predicted = model.forward(measurements.q, np.zeros(len(model)))[:, :3, 3]
-    try:
-        X = instrument_frame(predicted, measurements.position, *_ELSEWHERE)
-    except UndeterminedError:  # too few points for a frame; what they are good for is said later
-        return robot, None
-    if X is None:
-        return robot, None
-    X_IB = X @ robot.base.pose().GetAsMatrix4()
-    base = replace(
-        robot.base,
-        translation=X_IB[:3, 3],
-        zyx_deg=np.rad2deg(zyx_from_rotation(X_IB[:3, :3])),
-        source=f"in the frame of the instrument; {robot.base.source}",
-    )
-    return replace(robot, base=base), X
+def _tilt(frame: np.ndarray | None) -> float:
+    """By how many degrees the z axis of an instrument is off the vertical; none where it is the world."""
+    return 0.0 if frame is None else float(np.rad2deg(np.arccos(np.clip(frame[2, 2], -1.0, 1.0))))
 
 
 def _refuse_tilted(frame: np.ndarray) -> None:
     """Raises IdentificationError if the instrument's z is not up: gravity acts along it in what follows."""
-    tilt = float(np.rad2deg(np.arccos(np.clip(frame[2, 2], -1.0, 1.0))))
+    tilt = _tilt(frame)
     if tilt > _UPRIGHT:
         raise IdentificationError(
             f"compliances need measurements in an upright frame, and the z axis of the instrument is "
@@ -150,11 +137,24 @@ def _problem(
     return Problem(model, measurements, sizes, free, loads), reducible
 
 
+@dataclass(frozen=True)
+class _RobustRows:
+    """What a search for gross errors leaves."""
+
+    kept: np.ndarray  # (n,) bool
+    least: np.ndarray  # (m,) scaled parameters with the least sum of distances
+    u: np.ndarray  # (m,) those of the rows that are kept
+    theta: np.ndarray  # (3,) variances
+
+
 class _Search:
     """From a problem to its solution: outliers, noise, parameters."""
 
-    def __init__(self, problem: Problem, config: IdentificationConfig) -> None:
+    def __init__(
+        self, problem: Problem, config: IdentificationConfig, yielding: Problem | None = None
+    ) -> None:
         self._problem, self._config = problem, config
+        self._yielding = yielding  # the same with compliances, where they can be told
         self._shape, named = row_shape(problem.measurements)
         given = config.noise
         self._known = named | given.is_known
@@ -230,10 +230,22 @@ class _Search:
                 return everything, *perfect
         if not self._config.search_outliers:
             return everything, fit.u, self._theta
+        rows = self._robust_rows(problem)
+        noise = NoiseModel(self._theta, self._shape)
+        usable = None if rows.kept.all() else self._explained_by_springs(rows)
+        if usable is None:
+            usable = lacks_something(problem, noise, rows.least, rows.u, rows.kept)
+        if usable is None:
+            return rows.kept, rows.u, rows.theta
+        self._lacks_something = True
+        return usable, rows.least, self._theta
+
+    def _robust_rows(self, problem: Problem) -> _RobustRows:
+        """Rows that a problem's parameters explain, in turns with these and with the noise."""
         least, theta = least_distances(problem)
         u = least
         theta = self._theta if self._is_known else np.where(self._known, self._theta, theta)
-        kept = everything
+        kept = np.ones(len(problem), dtype=bool)
         for turn in range(_ROBUST_ROUNDS):
             noise = NoiseModel(theta, self._shape)
             at = problem.linearise(u)
@@ -241,15 +253,32 @@ class _Search:
             if turn and np.array_equal(clean, kept):
                 break
             kept = clean
-            u = self._minimise(u, noise, kept).u
+            fit = minimise(problem, u, noise, kept.astype(float))
+            self._iterations += fit.iterations
+            u = fit.u
             if not self._is_known:
                 at = _selected(problem.linearise(u), kept)
                 theta = variance_components(at, u, noise.select(kept), self._estimated(kept)).theta
-        usable = lacks_something(problem, NoiseModel(self._theta, self._shape), least, u, kept)
-        if usable is None:
-            return kept, u, theta
-        self._lacks_something = True
-        return usable, least, self._theta
+        return _RobustRows(kept, least, u, theta)
+
+    def _explained_by_springs(self, rows: _RobustRows) -> np.ndarray | None:
+        """The rows that joints which yield explain, if these are most of those that stiff ones do not.
+
+        A few rows at the corners of the ranges may be all that shows springs; together they miss by far, as
+        gross errors do, but torques of gravity explain them.
+        """
+        if self._yielding is None:
+            return None
+        problem = self._yielding
+        u = np.zeros(len(problem.columns))
+        u[: len(rows.u)] = rows.u
+        springs = problem.linearise(u).A[:, -3:, len(rows.u) : len(rows.u) + NUM_JOINTS]
+        reach = _SPRING_SIGMAS * np.linalg.norm(springs, axis=(1, 2))
+        missed = np.linalg.norm(self._problem.residuals(rows.u)[:, -3:], axis=1)
+        if np.mean((missed < reach)[~rows.kept]) <= _MOST:
+            return None
+        kept = self._robust_rows(problem).kept
+        return kept if np.mean(kept[~rows.kept]) > _MOST else None
 
     def _is_as_expected(self, fit: Fit, noise: NoiseModel) -> bool:
         """Whether residuals are what known noise makes them: then no row needs to be tested."""
@@ -344,8 +373,13 @@ class _Search:
         if distance > _PLAUSIBLE:
             raise IdentificationError(
                 f"no geometry near that of {self._problem.model.robot.name} explains the measurements: half "
-                f"of the positions stay more than {1e3 * distance:.0f} mm off (is it another robot, another "
-                f"direction of a joint, another unit?)"
+                f"of the positions stay more than {1e3 * distance:.0f} mm off ({REASONS})"
+            )
+        model = self._problem.model
+        off = not_to_be_believed(model.names, self._problem.parameters(fit.u)[: len(model)])
+        if off:
+            raise IdentificationError(
+                f"no geometry near that of {model.robot.name} explains the measurements: {off} ({REASONS})"
             )
 
     def _refuse_what_is_hidden(self, fit: Fit, kept: np.ndarray, reducible: ReducibleModel) -> None:

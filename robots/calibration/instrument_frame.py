@@ -5,13 +5,21 @@ errors would start metres away and end anywhere; the rigid motion that brings th
 what was measured is found in closed form.
 """
 
+from dataclasses import replace
+
 import numpy as np
 
+from robots.calibration.error_model import ErrorModel
+from robots.calibration.measurements import Measurements
+from robots.description.model import RobotModel
+from robots.metrology.least_squares import UndeterminedError
 from robots.metrology.point_registration import register_points
+from robots.pose import zyx_from_rotation
 
 _ROUNDS = 15
 _NEAREST = 0.1  # of the median distance: no point weighs more than one at that distance
 _POINTS = 3  # that a registration takes
+_ELSEWHERE = (0.1, float(np.deg2rad(10.0)))  # m, rad: farther is no error of the base but another frame
 
 
 def instrument_frame(
@@ -51,3 +59,25 @@ def _is_elsewhere(X: np.ndarray, far: float, turned: float) -> bool:
     """Whether a motion (4, 4) is more than an error of the base: farther than m or turned more than rad."""
     cosine = 0.5 * (np.trace(X[:3, :3]) - 1.0)
     return bool(np.linalg.norm(X[:3, 3]) > far or cosine < np.cos(turned))
+
+
+def in_frame_of_instrument(
+    robot: RobotModel, measurements: Measurements
+) -> tuple[RobotModel, np.ndarray | None]:
+    """The robot with its base where the instrument sees it; the frame (4, 4), None if it is the world."""
+    model = ErrorModel(robot)
+    predicted = model.forward(measurements.q, np.zeros(len(model)))[:, :3, 3]
+    try:
+        X = instrument_frame(predicted, measurements.position, *_ELSEWHERE)
+    except UndeterminedError:  # too few points for a frame; what they are good for is said later
+        return robot, None
+    if X is None:
+        return robot, None
+    X_IB = X @ robot.base.pose().GetAsMatrix4()
+    base = replace(
+        robot.base,
+        translation=X_IB[:3, 3],
+        zyx_deg=np.rad2deg(zyx_from_rotation(X_IB[:3, :3])),
+        source=f"in the frame of the instrument; {robot.base.source}",
+    )
+    return replace(robot, base=base), X

@@ -20,6 +20,7 @@ OWN_FRAME = 1.0  # m and rad, of the base in a frame that has nothing to do with
 COMPLIANCES = 3.0  # times what the stiffness in the robot file says
 MASS = 0.05  # of the masses in a robot file and of a payload, relative
 CENTRE_OF_MASS = 10e-3  # m, of each coordinate
+_NOT_TO_BE_BELIEVED = 10.0  # standard deviations: 100 mm or 20 degrees between two joints is another robot
 
 
 def parameter_sizes(names: Sequence[str], is_own_frame: bool = False) -> np.ndarray:
@@ -54,3 +55,30 @@ def compliance_sizes(robot: RobotModel) -> np.ndarray:
 def mass_sizes(mass: float = MASS, centre_of_mass: float = CENTRE_OF_MASS) -> np.ndarray:
     """Standard deviations of the masses, relative, and of the centres of mass in m, (28,)."""
     return np.concatenate([np.full(len(MASS_NAMES), mass), np.full(len(CENTRE_NAMES), centre_of_mass)])
+
+
+def not_to_be_believed(names: Sequence[str], x: np.ndarray) -> str:
+    """Which error of a joint is so large that it is none, in words.
+
+    A search finds a geometry for much, such as one of no size for a table in metres that claims to be in
+    millimetres. Base and tool may stand anywhere.
+
+    Args:
+        names: as `robots.calibration.error_model` has them; others are passed over.
+        x: their values in m and rad, shape (len(names),).
+
+    Returns:
+        For example ``joint3_z would be 350 mm off``; empty if all can be believed.
+    """
+    sizes, worst, largest = parameter_sizes(names), "", _NOT_TO_BE_BELIEVED
+    for name, value, size in zip(names, x.tolist(), sizes.tolist(), strict=True):
+        part, _, kind = name.partition("_")
+        if not (part.startswith("joint") or part == "zero") or abs(value) / size <= largest:
+            continue
+        far = (
+            f"{1e3 * abs(value):.0f} mm"
+            if kind in ("x", "y", "z")
+            else f"{np.rad2deg(abs(value)):.0f} degrees"
+        )
+        worst, largest = f"{name} would be {far} off", abs(value) / size
+    return worst

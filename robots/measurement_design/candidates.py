@@ -51,7 +51,7 @@ class Candidates:
         return int(np.count_nonzero(self._state == _REFUSED))
 
     def best(
-        self, root: np.ndarray, count: int, without: np.ndarray | None = None
+        self, root: np.ndarray, count: int, without: np.ndarray | None = None, fewest: int | None = None
     ) -> tuple[np.ndarray, np.ndarray]:
         """The admissible candidates with the largest tr(W Theta^T Theta), W = root root^T.
 
@@ -59,14 +59,16 @@ class Candidates:
             root: shape (rank, any).
             count: how many are wanted.
             without: numbers of candidates that do not count.
+            fewest: how many suffice where no more are admissible; None for ``count``.
 
         Returns:
             Their numbers and gains, the largest gain first. No admissible candidate of the whole grid has a
             gain above the first one's, except those in ``without``.
 
         Raises:
-            ValueError: if fewer than ``count`` candidates are admissible.
+            ValueError: if fewer candidates are admissible than must be.
         """
+        fewest = count if fewest is None else fewest
         gains = self.grid.screen(root)
         if without is not None:
             gains[without] = -np.inf
@@ -82,7 +84,9 @@ class Candidates:
             if len(found) == count:
                 return found, gains[found]
             if limit == -np.inf:
-                raise ValueError(f"fewer than {count} candidate configurations are admissible")
+                if len(found) >= fewest:
+                    return found, gains[found]
+                raise ValueError(f"fewer than {fewest} candidate configurations are admissible")
             pool *= 8
 
     def _first_allowed(self, numbers: np.ndarray, count: int) -> np.ndarray:

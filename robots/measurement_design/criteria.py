@@ -6,6 +6,7 @@ candidates is better than N times the largest tr(G Theta^T Theta) among them, wh
 """
 
 from abc import ABC, abstractmethod
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -13,10 +14,24 @@ from robots.description.model import RobotModel
 from robots.measurement_design.candidate_grid import CandidateGrid
 
 NAMES = ("b3", "d", "i")
+_SHARE_SEEN = 1e-4  # of an eigenvalue in the gradient: a lesser one bends nothing
 _WORKSPACE_SAMPLES = 500  # random configurations at which the I-criterion predicts the tool
 # Standard deviations of one pose measurement, which weigh radians against metres: table 6.1 of Probst (2024).
 POSITION_SIGMA = 1e-4  # m
 ROTATION_SIGMA = np.deg2rad(0.03)  # rad
+
+
+@dataclass(frozen=True)
+class SecondOrder:
+    """How a criterion changes with what is added to M, to the second order.
+
+    Both ``slopes`` and ``bends`` are linear in what is added: a step with the slope s and the bends b,
+    differences of those of single measurements where these are exchanged, adds s + (lift s^2 - |b|^2) / 2.
+    """
+
+    slopes: np.ndarray  # (n,) of n measurements
+    bends: np.ndarray  # (n, any)
+    lift: float
 
 
 class Criterion(ABC):
@@ -31,6 +46,10 @@ class Criterion(ABC):
     @abstractmethod
     def gradient_root(self, M: np.ndarray) -> np.ndarray:
         """A matrix R (n, r) for which R R^T is the gradient at M (n, n), or nearly."""
+
+    @abstractmethod
+    def second_order(self, M: np.ndarray, information: np.ndarray) -> SecondOrder:
+        """What each of some information matrices (k, n, n) would add to the criterion at M (n, n)."""
 
 
 class SmallestEigenvalue(Criterion):
@@ -51,12 +70,31 @@ class SmallestEigenvalue(Criterion):
 
     def gradient_root(self, M: np.ndarray) -> np.ndarray:
         """The gradient of the soft minimum of the eigenvalues; its trace is one, so it bounds B3 too."""
-        eigenvalues, vectors = np.linalg.eigh(M)
-        scale = max(eigenvalues[0], 1e-9 * eigenvalues[-1])
-        shares = np.exp(-self.sharpness * (eigenvalues - eigenvalues[0]) / scale)
-        shares /= shares.sum()
+        _, vectors, shares, _ = self._shares(M)
         kept = shares > 1e-9
         return vectors[:, kept] * np.sqrt(shares[kept] / shares[kept].sum())
+
+    def second_order(self, M: np.ndarray, information: np.ndarray) -> SecondOrder:
+        """Of the soft minimum -log(sum exp(-s eigenvalue)) / s, by divided differences of its shares."""
+        eigenvalues, vectors, shares, sharpness = self._shares(M)
+        few = int(np.sum(shares > _SHARE_SEEN))
+        # Row by row of the small eigenvalues: those of large ones among each other change nothing.
+        turned = (vectors[:, :few].T @ information) @ vectors
+        apart = eigenvalues - eigenvalues[:few, None]
+        is_same = np.abs(apart) < 1e-9 * eigenvalues[-1]
+        fall = (shares[:few, None] - shares) / np.where(is_same, 1.0, apart)
+        weights = np.where(is_same, sharpness * shares[:few, None], fall)
+        weights[:, few:] *= 2.0  # which stand below the diagonal once more
+        bends = turned * np.sqrt(np.maximum(weights, 0.0))
+        slopes = np.einsum("nkk,k->n", turned[..., :few], shares[:few])
+        return SecondOrder(slopes, bends.reshape(len(bends), -1), sharpness)
+
+    def _shares(self, M: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray, float]:
+        """Eigenvalues, eigenvectors, the shares of these in the gradient, the sharpness in 1 / eigenvalue."""
+        eigenvalues, vectors = np.linalg.eigh(M)
+        sharpness = self.sharpness / max(eigenvalues[0], 1e-9 * eigenvalues[-1])
+        shares = np.exp(-sharpness * (eigenvalues - eigenvalues[0]))
+        return eigenvalues, vectors, shares / shares.sum(), sharpness
 
 
 class Determinant(Criterion):
@@ -73,6 +111,14 @@ class Determinant(Criterion):
         """value(M) M^-1 / n, factorised."""
         eigenvalues, vectors = np.linalg.eigh(M)
         return vectors * np.sqrt(self.value(M) / (len(M) * eigenvalues))
+
+    def second_order(self, M: np.ndarray, information: np.ndarray) -> SecondOrder:
+        """With f = det(M)^(1/n) and M^-1 = L L^T: f tr(L^T A L) / n, bent by |L^T A L|^2 f / n."""
+        root = self.gradient_root(M)
+        turned = root.T @ information @ root
+        f = float(self.value(M))
+        bends = turned.reshape(len(turned), -1) * np.sqrt(len(M) / f)
+        return SecondOrder(np.trace(turned, axis1=1, axis2=2), bends, 1.0 / f)
 
 
 class PoseVariance(Criterion):
@@ -100,6 +146,16 @@ class PoseVariance(Criterion):
     def gradient_root(self, M: np.ndarray) -> np.ndarray:
         """value(M) M^-1 spread^(1/2)."""
         return self.value(M) * np.linalg.solve(M, self._root)
+
+    def second_order(self, M: np.ndarray, information: np.ndarray) -> SecondOrder:
+        """With f = 1 / tr(C^T M^-1 C) and R = f M^-1 C: tr(R^T A R), bent by 2 |R^T A L|^2, M^-1 = L L^T."""
+        root = self.gradient_root(M)
+        L = np.linalg.inv(np.linalg.cholesky(M)).T
+        turned = root.T @ information
+        slopes = np.einsum("nij,ji->n", turned, root)
+        return SecondOrder(
+            slopes, np.sqrt(2.0) * (turned @ L).reshape(len(turned), -1), 2.0 / float(self.value(M))
+        )
 
 
 def criterion(name: str, robot: RobotModel, grid: CandidateGrid) -> Criterion:

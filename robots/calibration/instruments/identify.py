@@ -7,11 +7,12 @@ import numpy as np
 from scipy.special import chdtri
 
 from robots.calibration.error_model import ErrorModel
-from robots.calibration.identification import IdentificationError
+from robots.calibration.identification import REASONS, IdentificationError
 from robots.calibration.instrument_frame import instrument_frame
 from robots.calibration.instruments.noise import JOINT, InstrumentNoise, instrument_noise
 from robots.calibration.instruments.observations import MeasuringCell, Observations
 from robots.calibration.instruments.problem import InstrumentProblem, Setting, Start
+from robots.calibration.prior import not_to_be_believed
 from robots.calibration.solver.levenberg_marquardt import Fit, minimise
 from robots.calibration.solver.noise_model import FLOOR
 from robots.calibration.solver.variance_components import parameter_factor, variance_components
@@ -176,6 +177,11 @@ class _Adjustment:
             raise IdentificationError(
                 f"the adjustment has not converged after {self._iterations} iterations and leaves "
                 f"{rms:.3g} mm"
+            )
+        off = not_to_be_believed(problem.model.names, problem.parameters(fit.u)[: len(problem.model)])
+        if off:
+            raise IdentificationError(
+                f"no geometry near that of {robot.name} explains the lines: {off} ({REASONS})"
             )
         factor = parameter_factor(fit.at, noise, self._estimated, found)
         sizes = problem.sizes[problem.columns]

@@ -5,6 +5,11 @@ H = A^T V^-1 A + I, P = V^-1 - V^-1 A H^-1 A^T V^-1, g_i = e^T V^-1 Q_i V^-1 e, 
 F_ij = tr(P Q_i P Q_j), a step of Fisher's scoring is theta += F^-1 (g - t), Patterson and Thompson (1971).
 Steps are damped until log det V + log det H + e^T V^-1 e + |u|^2, minus twice the logarithm of the restricted
 likelihood, falls: where one kind of noise hides another, bare scoring goes in circles.
+
+Rows with hardly more numbers than parameters cannot tell kinds of noise apart: F is singular then (of rank
+one where one number is left over), and rounding may give it negative eigenvalues. A ten-thousandth of
+tr(V^-1 Q_i V^-1 Q_i), which F_ii would be without parameters, is added to its diagonal: a weak belief in the
+size of a variance that weighs nothing where there is something to be seen.
 """
 
 from dataclasses import dataclass
@@ -21,6 +26,7 @@ _STEPS = 40
 _SETTLED = 0.005  # of its own standard deviation: a last step
 _DAMPING_FROM, _LARGEST_DAMPING = 0.1, 1e6  # of the information
 _ROUNDING = 1e-9  # by which the likelihood may be wrong
+_BELIEVED = 1e-4  # of the information that there would be without parameters
 
 
 @dataclass(frozen=True)
@@ -37,7 +43,7 @@ class _Likelihood:
 
     value: float
     score: np.ndarray  # (c,) g_i - t_i of the estimated components
-    information: np.ndarray  # (c, c) F
+    information: np.ndarray  # (c, c) F, positive definite
 
 
 def variance_components(
@@ -102,6 +108,7 @@ def _likelihood(at: Linearised, y: np.ndarray, noise: Noise, estimated: list[int
         for j in range(i + 1):
             F[i, j] = np.sum(square[i] * square[j]) - 2.0 * np.sum(HB[i] * HB[j]) + np.sum(M[i] * M[j].T)
             F[j, i] = F[i, j]
+        F[i, i] += _BELIEVED * np.sum(square[i] ** 2)
     return _Likelihood(value, np.array(score), F)
 
 

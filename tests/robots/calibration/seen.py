@@ -1,16 +1,24 @@
-"""A robot that two instruments and a ball bar have seen, made of matrix products."""
+"""What instruments have seen: a robot made of matrix products, and one that bends."""
 
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 from scipy.spatial.transform import Rotation
 
 from robots.calibration.instruments.observations import Observations
+from robots.calibration.measurements import MeasurementNoise, Measurements
+from robots.description.calibration import Calibration
+from robots.description.geometric_errors import GeometricErrors
+from robots.description.model import load_robot
+from robots.dynamics.compliant_kinematics import CompliantKinematics
+from robots.kinematics.error_kinematics import ErrorKinematics
 from tests.robots.calibration.matrix_robot import MatrixRobot, homogeneous
 
 PLACES = {"a": np.array([0.0, 0.0, 0.1]), "b": np.array([0.08, 0.0, 0.05]), "c": np.array([0.0, -0.07, 0.12])}
 ANCHOR = np.array([0.6, 0.4, 0.2])
 LOAD = 7.0  # kg
+CORNER_NOISE = MeasurementNoise(0.0, 7e-6, 2.5e-5)
 FACTORS = {"tracker": 1.0, "camera": 5.0, "bar": 0.1}  # of their noise
 
 
@@ -58,3 +66,20 @@ def observed(
         q, row, target, instrument, position, distance, unknown, numbers, tuple(PLACES), instruments,
         payload if loaded else None,
     )  # fmt: skip
+
+
+def corner_table(seed: int) -> Measurements:
+    """Thirty poses of an IRB 1200 at corners of its ranges, where designs like to measure, by a quiet camera.
+
+    Its joints are as soft as its file says and bend under 2.5 kg.
+    """
+    robot, rng = load_robot("irb1200"), np.random.default_rng(seed)
+    lower, upper, tilting = np.maximum(robot.lower, -np.pi), np.minimum(robot.upper, np.pi), [1, 2, 4]
+    q = rng.uniform(lower, upper, (30, 6))
+    q[:, tilting] = np.where(rng.random((30, 3)) < 0.5, 0.9 * lower[tilting], 0.9 * upper[tilting])
+    errors = GeometricErrors(np.arange(1.0, 4.0, 0.5), np.full(3, 10.0)).vector(robot)
+    true = ErrorKinematics(robot).robot_with_errors(errors)
+    soft = replace(true, calibration=Calibration(compliance=(1.0 / robot.joint_stiffness).tolist()))
+    X_WE = CompliantKinematics(soft, 2.5).forward(q)
+    table = Measurements(q, X_WE[:, :3, 3], X_WE[:, :3, :3], np.full(30, 2.5))
+    return table.noisy(CORNER_NOISE, rng)

@@ -182,7 +182,7 @@ def true_machine(rng: np.random.Generator) -> RobotModel:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("machines", [2, pytest.param(6, marks=pytest.mark.slow)])
+@pytest.mark.parametrize("machines", [2, 6])
 def test_intervals_of_compliances_contain_the_masses_that_nobody_has_weighed(machines: int):
     """What is wrong is as large as stated, and would be many times that without the masses."""
     ratios, blind = [], []

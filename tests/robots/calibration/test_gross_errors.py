@@ -15,6 +15,7 @@ from robots.description.model import load_robot
 from robots.dynamics.compliant_kinematics import CompliantKinematics
 from robots.kinematics.forward import Kinematics
 from tests.robots.calibration.matrix_robot import MatrixRobot
+from tests.robots.calibration.seen import corner_table
 
 NOMINAL, DRAWN = load_robot("irb1200"), MatrixRobot("irb1200")
 
@@ -162,3 +163,24 @@ def test_rows_that_show_what_the_model_lacks_are_no_gross_errors():
     rows = np.array([4, 40])
     spoilt_rows = identify(NOMINAL, spoilt(table, rows, 0.05, np.random.default_rng(1)))
     assert spoilt_rows.outliers == (5, 41)
+
+
+@pytest.mark.parametrize("seed", [0, 3])
+def test_the_few_rows_that_show_missing_springs_are_no_gross_errors(seed: int):
+    """Three to five of thirty at the corners of the ranges miss by a millimetre, all together."""
+    found = identify(NOMINAL, corner_table(seed))
+    assert found.outliers == ()
+    assert found.lacks_something
+
+
+@pytest.mark.slow
+def test_gross_errors_are_told_from_missing_springs_in_many_tables():
+    """Of 24 tables one row may be called wrong; of eight with rows of 5 or 20 mm seven are told exactly."""
+    assert sum(len(identify(NOMINAL, corner_table(seed)).outliers) for seed in range(24)) <= 1
+    exact = 0
+    for seed in range(24, 32):
+        rng = np.random.default_rng(seed)
+        rows = rng.choice(30, 2, replace=False)
+        found = identify(NOMINAL, spoilt(corner_table(seed), rows, 0.02 if seed % 2 else 0.005, rng))
+        exact += found.outliers == tuple(sorted(rows + 1))
+    assert exact >= 7

@@ -176,6 +176,14 @@ def test_a_calibrated_robot_is_not_calibrated_again():
         identify(robot, table)
 
 
+def test_a_geometry_that_no_robot_has_is_refused_however_well_it_fits():
+    """Metres that claim to be millimetres put all positions in one place, as a robot of no size does."""
+    drawn, rng = MatrixRobot("irb1200"), np.random.default_rng(0)
+    table = measured(drawn, drawn.configurations(40, rng), position_only=True)
+    with pytest.raises(IdentificationError, match=r"explains the measurements: joint3_z would be 350 mm off"):
+        identify(load_robot("irb1200"), Measurements(table.q, 1e-3 * table.position, None))
+
+
 def test_the_calibrated_robot_knows_its_parameters_and_their_covariance():
     """With these as the beginning of another calibration, no direction is free and none is known too well."""
     drawn, rng, nominal = MatrixRobot("irb1200"), np.random.default_rng(0), load_robot("irb1200")

