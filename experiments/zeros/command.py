@@ -12,8 +12,8 @@ from experiments.cli.json_output import human_console, json_output
 from experiments.cli.options import (
     GridOption,
     JsonOption,
-    OnlyPictureOption,
     PayloadOption,
+    PictureOption,
     StudiedRobotOption,
 )
 from experiments.cli.staging import PAGE, staged_file
@@ -41,7 +41,7 @@ def zeros_command(
             metavar="FILE", help="In place of a robot: a flexible body on a joint, as standard input data."
         ),
     ] = None,
-    out: OnlyPictureOption = Path("out/zeros.html"),
+    out: PictureOption = Path("out/zeros.html"),
     json_file: JsonOption = None,
 ) -> None:
     """Find out whether an elastic robot has a stable exact inverse, and how fast its unstable zeros are."""
@@ -57,7 +57,7 @@ def zeros_command(
         if body is not None or example is not None:
             found = body_zeros(body, payload or 0.0) if body else example_named(str(example))
             numbers, verdict = found.numbers, found.verdict
-            name = body.name if body else f"example {example}"
+            name = body.name if body else f"example {example!s}".replace("_", " ")
             write_plot_page(page, f"Zeros, {name}", verdict, found.sections)
         else:
             model = load_robot(robot)

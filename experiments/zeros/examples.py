@@ -7,7 +7,9 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from experiments.report.plot_page import Section, html_table
+from experiments.zeros import beam_arm as elastic_arm
 from experiments.zeros import low_pass
+from experiments.zeros import two_beams as two_beam_arm
 from experiments.zeros.driven_beam import MODELS, TIMES, DrivenBeam, deviation
 from experiments.zeros.linear_arm import (
     DISTANCE,
@@ -26,6 +28,7 @@ from experiments.zeros.plots import (
     time_figure,
 )
 from experiments.zeros.study import BEAM_MODES, one_json, two_joint_arm_limit, two_joint_arm_zeros
+from robots.dynamics.modal_arm import VARIANTS
 from robots.dynamics.modal_beam import BOUNDARIES, ModalBeam
 from robots.dynamics.transmission_zeros import Zeros
 from systems.feedforward.inverse_observer import InverseObserver
@@ -245,8 +248,103 @@ def prefilter() -> Example:
     return Example(numbers, verdict, sections)
 
 
+def two_beams() -> Example:
+    """Reiner (2010), section 3.5.1, figures 3.6 and 3.7: the output of the inverse at 0.9 of two beams."""
+    runs = {"rigid": two_beam_arm.run(0), "one mode, output at 0.9": two_beam_arm.run(1)}
+    moved = round((two_beam_arm.PATH.start + two_beam_arm.PATH.duration) / two_beam_arm.STEP)
+    largest = {name: 1e3 * float(run.deviation[: moved + 1].max()) for name, run in runs.items()}
+    later = {name: 1e3 * float(run.deviation[-1]) for name, run in runs.items()}
+    rigid, placed = runs.values()
+    zeros = two_beam_arm.output_zeros(1, two_beam_arm.OUTPUT)
+    full = two_beam_arm.output_zeros(3, two_beam_arm.OUTPUT)
+    verdict = (
+        f"Torques of an inverse with one mode a beam, its outputs at {two_beam_arm.OUTPUT:g} of them, leave "
+        f"the end of the second beam within {largest['one mode, output at 0.9']:.1f} mm of its path "
+        f"({largest['rigid']:.1f} mm with a rigid inverse), without any controller; in the "
+        f"{two_beam_arm.TIMES[-1] - two_beam_arm.TIMES[moved]:.1f} s after it the arm drifts, to "
+        f"{later['one mode, output at 0.9']:.0f} mm ({later['rigid']:.0f}). With three modes that inverse "
+        f"would be unstable: a zero at {full.slowest_rhp or np.nan:.0f} 1/s."
+    )
+    heights = {
+        "wanted": placed.path[:, 1],
+        "reached": placed.reached[:, 1],
+        "rigid inverse": rigid.reached[:, 1],
+    }
+    torques = {f"joint {i + 1}": placed.torques[::2, i] for i in range(2)}
+    off = {name: 1e3 * run.deviation for name, run in runs.items()}
+    times = two_beam_arm.TIMES
+    sections = [
+        Section("Height of the end", "As figure 3.7(b).", time_figure(times, heights, "y in m"), 420),
+        Section("Torques", "As figure 3.7(a).", time_figure(times, torques, "torque in N m"), 360),
+        Section("Deviation of the end", "", time_figure(times, off, "deviation in mm"), 360),
+    ]
+    numbers = {**one_json(zeros), "largest_deviation_mm": largest, "at_the_end_mm": later}
+    return Example({**numbers, "with_three_modes": one_json(full)}, verdict, sections)
+
+
+def beam_arm() -> Example:
+    """Reiner (2010), section 3.7, figure 3.20 and the variants of (3.72), on a nonlinear arm in a plane."""
+    off = {
+        name: elastic_arm.deviation(elastic_arm.configuration(name)) for name in elastic_arm.CONFIGURATIONS
+    }
+    largest = {name: 1e3 * float(error.max()) for name, error in off.items()}
+    first, second, third = largest.values()
+    variants: dict[str, float | None] = {}
+    growth = {name: elastic_arm.StructureInverse(terms).fastest_growth() for name, terms in VARIANTS.items()}
+    for name, terms in VARIANTS.items():
+        if growth[name] == 0.0:
+            told = elastic_arm.configuration(elastic_arm.CONFIGURATIONS[0], terms)
+            variants[name] = 1e3 * float(elastic_arm.deviation(told).max())
+        else:
+            variants[name] = None
+    verdict = (
+        f"The load of an arm with two bodies that bend leaves its path by {first:.2f} mm with an inverse of "
+        f"gears and structure, {second:.2f} mm with one of the gears and {third:.2f} mm with a rigid one. "
+        f"Variants {', '.join(name for name, value in variants.items() if value is not None)} of the "
+        f"equations can be inverted; with C_t and C_r the inverse grows by {max(growth.values()):.0f} 1/s."
+    )
+    left_out = (
+        "C_t, C_r, h_e, G_r, O_e, bent inertia",
+        "C_t, C_r, h_e, G_r, O_e",
+        "C_t, C_r, h_e",
+        "C_t, C_r",
+        "nothing",
+    )
+    rows = [
+        [name, what, "unstable" if value is None else f"{value:.3f}", f"{growth[name]:.0f}"]
+        for (name, value), what in zip(variants.items(), left_out, strict=True)
+    ]
+    curves = {name: 1e3 * error[::10] for name, error in off.items()}
+    note = "Reiner (2010), figure 3.20; the same plant and the same controller of the motors in all three."
+    sections = [
+        Section(
+            "Deviation of the load",
+            note,
+            time_figure(elastic_arm.TIMES[::10], curves, "deviation in mm"),
+            420,
+        ),
+        Section(
+            "What an invertible model leaves out",
+            "In a plane the couplings have no terms of first order, so that variant 5 is the whole model.",
+            html_table(("variant", "left out", "largest deviation in mm", "growth in 1/s"), rows),
+        ),
+    ]
+    numbers = {"largest_deviation_mm": largest, "variants_mm": variants, "growth": growth}
+    return Example(numbers, verdict, sections)
+
+
 EXAMPLES: dict[str, Callable[[], Example]] = {
-    each.__name__: each for each in (two_joint_arm, beam, driven_beam, observer, virtual_output, prefilter)
+    each.__name__: each
+    for each in (
+        two_joint_arm,
+        beam,
+        two_beams,
+        driven_beam,
+        beam_arm,
+        observer,
+        virtual_output,
+        prefilter,
+    )
 }
 
 

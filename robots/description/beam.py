@@ -20,6 +20,9 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from robots.description.drive_parts import Cubic, Exponential, Limited
+from robots.drivetrain.stiffness import GearSpring
+
 _GAUSS = 0.5 * (1.0 - 1.0 / math.sqrt(3.0))  # k of eq. (2.23a)
 # Where the beam is cut, in shares of its length.
 _CUTS = {5: (_GAUSS, 0.5, 1.0 - _GAUSS), 3: (1.0 / 3.0,)}
@@ -40,7 +43,15 @@ class Beam:
     stiffness: np.ndarray = field(default_factory=lambda: np.zeros(3))
     retardation_time: float = 0.0  # s, damping over stiffness of every hinge
     degrees_of_freedom: int = 5  # or 3
+    stiffening_x: Cubic | Exponential | Limited | None = None  # of every hinge about x; left out: linear
+    stiffening_y: Cubic | Exponential | Limited | None = None  # about y
+    stiffening_z: Cubic | Exponential | Limited | None = None  # about z
     source: str = ""  # where the numbers come from, or ``assumed``
+
+    @property
+    def stiffening(self) -> tuple[Cubic | Exponential | Limited | None, ...]:
+        """Of hinges about x, y and z."""
+        return self.stiffening_x, self.stiffening_y, self.stiffening_z
 
 
 @dataclass(frozen=True)
@@ -62,8 +73,13 @@ class Hinge:
     segment: int  # index of the segment before it
     position: np.ndarray  # m, in the link's frame, shape (3,)
     axis: np.ndarray  # unit vector in the link's frame, shape (3,)
-    stiffness: float  # N m / rad
+    spring: GearSpring
     damping: float  # N m s / rad
+
+    @property
+    def stiffness(self) -> float:
+        """At rest, in N m / rad."""
+        return float(self.spring.c_0)
 
 
 @dataclass(frozen=True)
@@ -138,7 +154,9 @@ def _hinges(beam: Beam, u: int, along: np.ndarray) -> tuple[Hinge, ...]:
     def hinge(name: str, segment: int, axis: int, value: float) -> Hinge:
         position = (beam.start + _CUTS[beam.degrees_of_freedom][segment] * length) * along
         damping = beam.retardation_time * value
-        return Hinge(name, segment, position, np.eye(3)[axis], float(value), float(damping))
+        stiffening = beam.stiffening[axis] or Cubic()
+        spring = stiffening.spring(float(value))
+        return Hinge(name, segment, position, np.eye(3)[axis], spring, float(damping))
 
     torsion = stiffness[u] / length
     if beam.degrees_of_freedom == 3:

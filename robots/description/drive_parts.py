@@ -194,12 +194,12 @@ class Dahl:
 
 @dataclass
 class Cubic:
-    """A spring that stiffens, Reiner (2010) eq. (2.7); its c_0 is the stiffness of the gear."""
+    """A spring that stiffens, Reiner (2010) eq. (2.7); its c_0 is the stiffness of what it stands for."""
 
     gamma: float = 0.0  # 1 / rad^2
 
     def scaled(self, factor: float) -> "Cubic":
-        """For a gear ``factor`` times as stiff at every deflection."""
+        """For a spring ``factor`` times as stiff at every deflection."""
         return self
 
     def spring(self, c_0: float) -> CubicSpring:
@@ -209,13 +209,13 @@ class Cubic:
 
 @dataclass
 class Exponential:
-    """A spring that stiffens, Reiner (2010) eq. (2.8); its c_0 is the stiffness of the gear."""
+    """A spring that stiffens, Reiner (2010) eq. (2.8); its c_0 is the stiffness of what it stands for."""
 
     c_max: float = 0.0  # N m / rad at infinite load
     gamma: float = 0.0  # 1 / rad
 
     def scaled(self, factor: float) -> "Exponential":
-        """For a gear ``factor`` times as stiff at every deflection."""
+        """For a spring ``factor`` times as stiff at every deflection."""
         return replace(self, c_max=factor * self.c_max)
 
     def spring(self, c_0: float) -> ExponentialSpring:
@@ -225,14 +225,14 @@ class Exponential:
 
 @dataclass
 class Limited:
-    """A spring that stiffens up to a limit, Reiner (2010) eq. (2.9); its c_0 is the stiffness of the gear."""
+    """A spring that stiffens up to a limit, Reiner (2010) eq. (2.9); its c_0 as of `Cubic`."""
 
     gamma: float = 0.0  # 1 / rad^2
     c_max: float = 0.0  # N m / rad, of the secant
     sharpness: float = 0.0  # rad / (N m), of the limit
 
     def scaled(self, factor: float) -> "Limited":
-        """For a gear ``factor`` times as stiff at every deflection."""
+        """For a spring ``factor`` times as stiff at every deflection."""
         return replace(self, c_max=factor * self.c_max, sharpness=self.sharpness / factor)
 
     def spring(self, c_0: float) -> LimitedSpring:

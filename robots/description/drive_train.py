@@ -1,11 +1,11 @@
-"""What a robot file says of the drive train of a joint: motor, gear, friction, and further parts."""
+"""What a robot file says of a joint: drive train of motor, gear, friction and further parts, and bearing."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
-from robots.configuration.quantity import positive
+from robots.configuration.quantity import numbers, positive
 from robots.description.drive_parts import (
     Backlash,
     Cubic,
@@ -99,6 +99,27 @@ class DriveTrain:
             soft=self.backlash.part() if isinstance(self.backlash, ViscoElastic) else None,
             hysteresis=self.hysteresis.part(self.stiffness) if self.hysteresis else None,
         )
+
+
+@dataclass
+class Tilting:
+    """How the bearing of a joint yields across its axis: two springs about two axes square to it.
+
+    Reiner (2010), section 2.4.1. For a joint about z the axes are x and y, about x they are y and z, about y
+    they are z and x.
+    """
+
+    stiffness: list[float] = numbers((), (2,), 0.0, unit="N m / rad", is_open=True)  # of the two springs
+    damping: list[float] = numbers((), (2,), 0.0, unit="N m s / rad")  # of the two springs
+    stiffening_a: Cubic | Exponential | Limited | None = None  # of the first spring; left out: linear
+    stiffening_b: Cubic | Exponential | Limited | None = None  # of the second one
+    source: str = ""  # where the numbers come from, or ``assumed``
+
+    def springs(self) -> tuple[GearSpring, GearSpring]:
+        """The two characteristics. Raises ValueError if one is impossible."""
+        first, second = self.stiffness
+        a, b = self.stiffening_a or Cubic(), self.stiffening_b or Cubic()
+        return a.spring(first), b.spring(second)
 
 
 @dataclass

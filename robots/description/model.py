@@ -25,7 +25,7 @@ from robots.configuration.typed import typed
 from robots.description.beam import Beam, beam_surrogate
 from robots.description.calibration import Calibration
 from robots.description.counterbalance_spring import CounterbalanceSpring
-from robots.description.drive_train import DriveLimits, DriveTrain, drive_trains
+from robots.description.drive_train import DriveLimits, DriveTrain, Tilting, drive_trains
 from robots.description.measuring import MeasuringRange
 from robots.description.placement import Picture, Placement
 from robots.description.urdf_in.reader import is_urdf, read_urdf
@@ -54,19 +54,6 @@ class JointLimits:
     jerk_deg_s3: float = quantity(
         0.0, 0.0, unit="deg/s^3"
     )  # of a command or a planned motion; 0 for no limit
-
-
-@dataclass
-class Tilting:
-    """How the bearing of a joint yields across its axis: two springs about two axes square to it.
-
-    Reiner (2010), section 2.4.1. For a joint about z the axes are x and y, about x they are y and z, about y
-    they are z and x.
-    """
-
-    stiffness: list[float] = numbers((), (2,), 0.0, unit="N m / rad", is_open=True)  # of the two springs
-    damping: list[float] = numbers((), (2,), 0.0, unit="N m s / rad")  # of the two springs
-    source: str = ""  # where the numbers come from, or ``assumed``
 
 
 @dataclass
@@ -361,7 +348,8 @@ def _tilting_problem(where: str, joint: Joint) -> str:
         return ""
     if len(tilting.stiffness) != 2 or len(tilting.damping) != 2:
         return f"{where} needs two stiffnesses and two dampings, got {tilting.stiffness}, {tilting.damping}"
-    return ""
+    problem = _refusal(tilting.springs)
+    return problem and f"{where}: {problem}"
 
 
 def _beam_problem(where: str, link: Link) -> str:

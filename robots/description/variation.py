@@ -49,7 +49,11 @@ def _varied_joint(joint: Joint, gear: float, bearing: np.ndarray, friction: floa
             [float(factor * value) for factor, value in zip(bearing, values, strict=True)]
             for values in (tilting.stiffness, tilting.damping)
         )
-        tilting = Tilting(stiffness, damping, tilting.source)
+        a, b = (
+            each.scaled(float(factor)) if each else None
+            for each, factor in zip((tilting.stiffening_a, tilting.stiffening_b), bearing, strict=True)
+        )
+        tilting = Tilting(stiffness, damping, a, b, tilting.source)
     return replace(joint, drive_train=_varied_drive_train(joint.drive_train, gear, friction), tilting=tilting)
 
 
@@ -66,4 +70,8 @@ def _varied_drive_train(train: DriveTrain, gear: float, friction: float) -> Driv
 
 
 def _varied_beam(beam: Beam, factor: np.ndarray) -> Beam:
-    return replace(beam, stiffness=factor * beam.stiffness)
+    x, y, z = (
+        each.scaled(float(share)) if each else None
+        for each, share in zip(beam.stiffening, factor, strict=True)
+    )
+    return replace(beam, stiffness=factor * beam.stiffness, stiffening_x=x, stiffening_y=y, stiffening_z=z)

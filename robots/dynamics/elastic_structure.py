@@ -24,6 +24,7 @@ from pydrake.multibody.tree import (
 
 from robots.description.beam import beam_surrogate
 from robots.description.model import Joint, Link
+from robots.drivetrain.stiffness import CubicSpring, GearSpring, SpringRow
 
 
 @dataclass
@@ -32,6 +33,15 @@ class SprungJoints:
 
     joints: list[RevoluteJoint] = field(default_factory=list)
     springs: list[RevoluteSpring] = field(default_factory=list)
+    characteristics: list[GearSpring] = field(default_factory=list)
+
+    @property
+    def stiffening(self) -> SpringRow | None:
+        """The characteristics side by side where one of them stiffens under load, None if all are linear."""
+        is_linear = all(
+            isinstance(spring, CubicSpring) and spring.gamma == 0.0 for spring in self.characteristics
+        )
+        return None if is_linear else SpringRow(self.characteristics)
 
     def add(
         self,
@@ -39,7 +49,7 @@ class SprungJoints:
         name: str,
         frames: tuple[Frame, Frame],
         axis: np.ndarray,
-        stiffness: float,
+        spring: GearSpring,
         damping: float,
     ) -> None:
         """Adds a joint.
@@ -47,17 +57,19 @@ class SprungJoints:
         Args:
             frames: on the body before it and on the one behind it; they coincide at zero.
             axis: direction in both frames, shape (3,).
-            stiffness: in N m / rad.
+            spring: of which the plant gets the stiffness at rest.
             damping: in N m s / rad.
         """
         joint = plant.AddJoint(RevoluteJoint(name, *frames, axis, damping))
         self.joints.append(joint)
-        self.springs.append(plant.AddForceElement(RevoluteSpring(joint, 0.0, stiffness)))
+        self.springs.append(plant.AddForceElement(RevoluteSpring(joint, 0.0, float(spring.c_0))))
+        self.characteristics.append(spring)
 
     def extend(self, outer: "SprungJoints") -> None:
         """Appends joints that stand nearer to the tool."""
         self.joints += outer.joints
         self.springs += outer.springs
+        self.characteristics += outer.characteristics
 
 
 def tilting_axes(axis: np.ndarray) -> np.ndarray:
@@ -92,11 +104,11 @@ def add_bearing(
     tilting = joint.tilting
     assert tilting is not None
     between = plant.AddRigidBody(f"bearing_{number}", massless())
-    chain = [inner, between, link]
+    chain, springs = [inner, between, link], tilting.springs()
     for k, axis in enumerate(tilting_axes(joint.axis)):
         frames = chain[k].body_frame(), chain[k + 1].body_frame()
         name = f"tilt_{'ab'[k]}_{number}"
-        structure.add(plant, name, frames, axis, tilting.stiffness[k], tilting.damping[k])
+        structure.add(plant, name, frames, axis, springs[k], tilting.damping[k])
 
 
 def add_rigid_link(
@@ -148,7 +160,7 @@ def add_beam_link(
             plant.AddFrame(FixedOffsetFrame(f"{name}_{side}", on.body_frame(), X))
             for side, on in (("before", body), ("behind", child))
         )
-        hinges.add(plant, name, (before, behind), hinge.axis, hinge.stiffness, hinge.damping)
+        hinges.add(plant, name, (before, behind), hinge.axis, hinge.spring, hinge.damping)
         body = child
     return bodies[0], bodies[-1]
 

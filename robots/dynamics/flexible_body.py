@@ -27,6 +27,7 @@ class FlexibleBody:
         Me: mass matrix of the modes, shape (n, n).
         Ke: stiffness, shape (n, n).
         De: damping, shape (n, n).
+        turns: how far the modes turn the nodes in rad, shape (k, 3, n); None where a file does not say.
     """
 
     mass: float
@@ -39,6 +40,7 @@ class FlexibleBody:
     Me: np.ndarray
     Ke: np.ndarray
     De: np.ndarray
+    turns: np.ndarray | None = None
 
     def frequencies(self) -> np.ndarray:
         """Natural frequencies with the frame held, in rad/s; shape (n,)."""
@@ -118,8 +120,8 @@ def beam_body(
     push[::2], turn[::2], turn[1::2] = 1.0, x, 1.0
     Ct, Cr = np.zeros((2, modes, 3))
     Ct[:, 1], Cr[:, 2] = push @ M @ full, turn @ M @ full
-    moved = np.zeros((elements + 1, 3, modes))
-    moved[:, 1] = full[::2]
+    moved, turned = np.zeros((2, elements + 1, 3, modes))
+    moved[:, 1], turned[:, 2] = full[::2], full[1::2]
     about = mass * length**2 / 3.0
     return FlexibleBody(
         mass,
@@ -132,4 +134,5 @@ def beam_body(
         np.eye(modes),
         np.diag(squares),
         np.diag(2.0 * damping * np.sqrt(squares)),
+        turned,
     )

@@ -85,6 +85,11 @@ class ModalBeam:
         places = np.asarray(xi, dtype=float)
         return np.stack([self.length * places, *(shape(places) for shape, _, _ in self._modes())], axis=-1)
 
+    def end_slope(self) -> np.ndarray:
+        """How far the modes turn the free end in rad, shape (n,)."""
+        nodes, weights = _quadrature()
+        return np.array([slope + weights @ second(nodes) for _, second, slope in self._modes()]) / self.length
+
     def frequencies(self) -> np.ndarray:
         """Natural frequencies with the joint held, in rad/s; shape (n,); meant for ``"clamped"``."""
         squared = np.linalg.eigvals(

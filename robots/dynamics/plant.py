@@ -3,8 +3,8 @@
 Elastic gears are two coaxial revolute joints in series: ``motor_i`` turns a massless rotor against the
 inertia of the motor, ``deflection_i`` sprung and damped turns the link against the rotor. In these
 coordinates the plant is the flexible-joint model without gyroscopic coupling of the rotors: link
-positions are motor + deflection. A gear that stiffens under load has in the plant the spring that it has at
-rest; `PlantRobot.stiffening_torque` is what it has beyond that.
+positions are motor + deflection. What stiffens under load has in the plant the spring that it has at rest;
+`PlantRobot.stiffening_torque` is what it has beyond that.
 
 The same robot without its drive trains is a plant of the links alone, ``joint_i``, turned by the torques of
 the gears; motors and gears are then a system beside it, which costs half as much to simulate.
@@ -66,6 +66,7 @@ class PlantRobot:
         structure_springs: the springs of these joints.
         has_counterbalance: whether a spring pulls at axis 2.
         stiffening_gears: the six characteristics of gears that yield and stiffen, None if all are linear.
+        stiffening_structure: those of the joints of the structure, None if all are linear.
     """
 
     plant: MultibodyPlant
@@ -77,6 +78,7 @@ class PlantRobot:
     structure_springs: list[RevoluteSpring] = field(default_factory=list)
     has_counterbalance: bool = False
     stiffening_gears: SpringRow | None = None
+    stiffening_structure: SpringRow | None = None
 
     @property
     def sprung(self) -> list[RevoluteJoint]:
@@ -91,21 +93,33 @@ class PlantRobot:
     def tangent_stiffness(self, deflection: np.ndarray) -> np.ndarray:
         """The stiffness of all sprung joints in N m / rad at deflections in rad, in the order of `sprung`."""
         stiffness = self.sprung_stiffness
-        if self.stiffening_gears is not None:
-            stiffness[:NUM_JOINTS] = self.stiffening_gears.stiffness(deflection[:NUM_JOINTS])
+        for own, springs in self._stiffening():
+            stiffness[own] = springs.stiffness(deflection[own])
         return stiffness
 
     def static_deflection(self, load: np.ndarray) -> np.ndarray:
         """How far all sprung joints yield, in rad, to loads in N m, in the order of `sprung`."""
         deflection = load / self.sprung_stiffness
-        if self.stiffening_gears is not None:
-            deflection[:NUM_JOINTS] = self.stiffening_gears.deflection(load[:NUM_JOINTS])
+        for own, springs in self._stiffening():
+            deflection[own] = springs.deflection(load[own])
         return deflection
 
     def stiffening_torque(self, deflection: np.ndarray) -> np.ndarray:
-        """What the gears take beyond the linear springs of the plant, in N m at deflections in rad, (6,)."""
-        assert self.stiffening_gears is not None
-        return self.stiffening_gears.torque(deflection) - self.stiffening_gears.c_0 * deflection
+        """What all sprung joints take beyond the linear springs of the plant, in N m.
+
+        Args:
+            deflection: in rad, in the order of `sprung`.
+        """
+        torque = np.zeros(len(deflection))
+        for own, springs in self._stiffening():
+            torque[own] = springs.torque(deflection[own]) - springs.c_0 * deflection[own]
+        return torque
+
+    def _stiffening(self) -> list[tuple[slice, SpringRow]]:
+        """The springs that are not linear, and which of `sprung` they are."""
+        gears = len(self.deflections)
+        parts = (slice(gears), self.stiffening_gears), (slice(gears, None), self.stiffening_structure)
+        return [(own, springs) for own, springs in parts if springs is not None]
 
     def motor_indices(self) -> list[int]:
         """Where motor positions, then motor velocities stand in the plant's state; 12 numbers."""
@@ -261,6 +275,7 @@ def add_robot(
         structure.springs,
         robot.counterbalance is not None,
         None if elasticity == "rigid" or not drive_trains else robot.stiffening_gears,
+        structure.stiffening,
     )
 
 
@@ -278,7 +293,7 @@ def _add_gear(
     """Puts the elastic gear before what it turns; returns the rotor."""
     rotor = plant.AddRigidBody(f"rotor_{number}", massless())
     frames, train = (rotor.body_frame(), driven.body_frame()), joint.drive_train
-    gears.add(plant, f"deflection_{number}", frames, joint.axis, train.stiffness, train.damping)
+    gears.add(plant, f"deflection_{number}", frames, joint.axis, train.spring, train.damping)
     return rotor
 
 

@@ -69,7 +69,14 @@ class _Reader:
             self._of(modal, "me", n, n, n),
             self._of(modal, "ke", n, n, n),
             self._of(modal, "de", n, n, n),
+            self._turns(nodes, n),
         )
+
+    def _turns(self, nodes: list[_Block], n: int) -> np.ndarray | None:
+        """Rotations of the nodes, where all of them have some."""
+        if not all(any(inner.name == "psi" for inner in node.blocks) for node in nodes):
+            return None
+        return np.array([self._of(node, "psi", 3, n, n) for node in nodes])
 
     def _tree(self) -> _Block:
         root = _Block("file", 1)
@@ -164,7 +171,8 @@ def sid_text(body: FlexibleBody) -> str:
     lines += ["end refmod", "frame"]
     for number, (place, shape) in enumerate(zip(body.places, body.shapes, strict=True), 1):
         lines += [f"new node = {number}", "rframe = body ref", *_block("origin", place[:, None], n)]
-        lines += [*_block("phi", shape, n), "end node"]
+        turn = [] if body.turns is None else _block("psi", body.turns[number - 1], n)
+        lines += [*_block("phi", shape, n), *turn, "end node"]
     lines += ["end frame"]
     for name, matrix in (
         ("mdCM", body.first_moment[:, None]),

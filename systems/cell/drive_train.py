@@ -1,4 +1,4 @@
-"""What stands between motors and links: the gears, and the friction of the motors.
+"""What stands between motors and links: gears and the friction of the motors; and a structure that stiffens.
 
 A drive train takes the states of motors and links and gives torques. This one has springs and Coulomb
 friction; another kind (with play, hysteresis, losses, other friction) is another class with the members of
@@ -14,6 +14,7 @@ from pydrake.systems.framework import Context, Diagram, DiagramBuilder, OutputPo
 from pydrake.systems.primitives import Adder, MatrixGain, Multiplexer, SymbolicVectorSystem
 
 from robots.description.model import NUM_JOINTS, RobotModel
+from robots.dynamics.plant import PlantRobot
 
 _STATE = 2 * NUM_JOINTS  # positions, then velocities
 
@@ -122,6 +123,32 @@ class CoulombFriction(Diagram):
         builder.ExportInput(relative_speed.get_input_port(), "motor_state")
         builder.ExportOutput(torque.get_output_port(), "torque")
         builder.BuildInto(self)
+
+
+def add_stiffening_structure(builder: DiagramBuilder, links: PlantRobot) -> None:
+    """Adds what bearings and beams that stiffen take beyond the springs that they have in the plant.
+
+    Args:
+        builder: of a diagram with the plant, whose input of generalized forces is free.
+        links: the robot in it.
+    """
+    springs, plant, joints = links.stiffening_structure, links.plant, links.structure
+    assert springs is not None
+    places, deflections = np.zeros((2, len(joints), plant.num_multibody_states()))
+    for row, joint in enumerate(joints):
+        deflections[row, joint.position_start()] = places[row, joint.velocity_start()] = 1.0
+    bent = builder.AddNamedSystem("structure_deflection", MatrixGain(deflections))
+    x = MakeVectorContinuousVariable(len(joints), "x")
+    twist = np.array([Expression(each) for each in x], dtype=object)
+    # Arithmetic with formulas sets the processor's flag for numbers that are none, of which numpy would warn.
+    with np.errstate(invalid="ignore"):
+        excess = springs.torque(twist) - springs.c_0 * twist
+    stiffening = builder.AddNamedSystem("stiffening_structure", _function_of(x, list(excess)))
+    applied = builder.AddNamedSystem("structure_torque", MatrixGain(-places[:, : plant.num_velocities()].T))
+    builder.Connect(plant.get_state_output_port(), bent.get_input_port())
+    builder.Connect(bent.get_output_port(), stiffening.get_input_port())
+    builder.Connect(stiffening.get_output_port(), applied.get_input_port())
+    builder.Connect(applied.get_output_port(), plant.get_applied_generalized_force_input_port())
 
 
 def _smooth_sign() -> SymbolicVectorSystem:

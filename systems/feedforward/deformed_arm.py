@@ -32,6 +32,7 @@ class DeformedArm:
         self.size = len(parts.structure)
         self.stiffness = np.array([spring.default_stiffness() for spring in parts.structure_springs])
         self.damping = np.array([joint.default_damping() for joint in parts.structure])
+        self.stiffening = parts.stiffening_structure
         # All motion of the gears' far side is given to the motors; the gears stay at zero.
         self._joints = np.array([joint.position_start() for joint in parts.motors])
         self._gears = np.array([joint.velocity_start() for joint in parts.deflections])

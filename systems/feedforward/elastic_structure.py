@@ -53,7 +53,8 @@ class ElasticStructureFeedforward(FlexibleJointFeedforward):
         super().__init__(model, config, memory)
         self._arm, self._size = arm, arm.size
         share = 1.0 + config.stiffness_error
-        self._springs = SprungDeflection(share * self._arm.stiffness, share * self._arm.damping, self.substep)
+        stiffening = None if arm.stiffening is None else arm.stiffening.scaled(share)
+        self._springs = SprungDeflection(share * arm.stiffness, share * arm.damping, self.substep, stiffening)
         self._correction = CORRECTIONS[correction.method](model.robot, self._arm)
         self._limit = np.deg2rad(correction.limit_deg)
 

@@ -81,8 +81,7 @@ class FlexibleArm:
         self._plant.SetPositionsAndVelocities(self._context, np.concatenate([q, v]))
         self._plant.CalcForceElementsContribution(self._context, self._forces)
         torques = self._plant.CalcInverseDynamics(self._context, vdot, self._forces)
-        if self._parts.stiffening_gears is not None:
-            torques[self._gears] += self._parts.stiffening_torque(q[self._gears])
+        torques[self.sprung] += self._parts.stiffening_torque(q[self.sprung])
         return torques
 
     def place(self, q: np.ndarray) -> np.ndarray:

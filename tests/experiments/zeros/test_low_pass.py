@@ -55,7 +55,7 @@ def test_the_prefilters_of_the_inverse_models_are_these(name: str, kind: str, cu
 
 def test_the_command_says_which_of_them_overshoot(tmp_path: Path):
     page = tmp_path / "zeros.html"
-    result = truetip("zeros", f"--out={page}", "--example=prefilter", "--json=-")
+    result = truetip("zeros", f"--report={page}", "--example=prefilter", "--json=-")
     assert result.exit_code == 0, result.output
     assert set(json.loads(result.stdout)["overshoot"]) == set(NAMES)
     assert "figure 3.2" in page.read_text()

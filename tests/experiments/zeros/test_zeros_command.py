@@ -14,7 +14,7 @@ from tests.experiments.commands import files, refusal, truetip
 
 
 def run(folder: Path, *arguments: str):
-    return truetip("zeros", f"--out={folder / 'zeros.html'}", *arguments)
+    return truetip("zeros", f"--report={folder / 'zeros.html'}", *arguments)
 
 
 @pytest.mark.parametrize(("elasticity", "is_stable"), [("structure", False), ("joints", True)])
@@ -53,6 +53,22 @@ def test_the_examples_give_the_published_figures(tmp_path: Path):
     )
 
 
+@pytest.mark.slow
+def test_arms_with_beams_come_from_the_command(tmp_path: Path):
+    """Figure 3.7: near the path with outputs at 0.9; figure 3.20: 1 < 2 << 3; and only C_t, C_r forbid it."""
+    two = json.loads(run(tmp_path, "--example=two_beams", "--json", "-").stdout)
+    assert two["slowest_rhp"] is None
+    placed, rigid = (
+        two["largest_deviation_mm"]["one mode, output at 0.9"],
+        two["largest_deviation_mm"]["rigid"],
+    )
+    assert placed < 0.25 * rigid
+    arm = json.loads(run(tmp_path, "--example=beam_arm", "--json", "-").stdout)
+    first, second, third = arm["largest_deviation_mm"].values()
+    assert first < 0.5 * second < 0.2 * third
+    assert [name for name, value in arm["variants_mm"].items() if value is None] == ["5"]
+
+
 def test_the_page_opens(tmp_path: Path):
     assert run(tmp_path, "--robot=kr16", "--grid=3").exit_code == 0
     opened = open_page(tmp_path / "zeros.html")
@@ -89,7 +105,8 @@ REFUSED = {
     "robot": ("--robot=kr211", "robot 'kr211': no file"),
     "example": (
         "--example=bridge",
-        "must be one of two_joint_arm, beam, driven_beam, observer, virtual_output, prefilter, got 'bridge'",
+        "must be one of two_joint_arm, beam, two_beams, driven_beam, beam_arm, observer, virtual_output, "
+        "prefilter, got 'bridge'",
     ),
     "rigid": ("--elasticity=rigid", "elasticity must be joints or structure"),
     "grid": ("--grid=1", "--grid must be at least 2, got 1"),

@@ -272,6 +272,7 @@ REFUSED: dict[str, tuple] = {
     "spring": (("counterbalance", "stiffness", 0.0), "Counterbalance: stiffness must be positive, got 0.0"),
     "preload": (("counterbalance", "preload", 1e5), "counterbalance: preload must be below stiffness times"),
     "damper": (("counterbalance", "damping", -1.0), "damping must not be negative, got -1"),
+    "loses": ((*BEAM, "retardation_time", -1e-3), "link 2: beam: retardation_time must not be negative"),
 }  # fmt: skip
 
 
