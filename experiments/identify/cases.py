@@ -1,4 +1,4 @@
-"""Which motions are recorded, and by which sensors: the file of ``--cases``, and what stands in for it."""
+"""Which motions are recorded, and by which sensors: the file of ``--motions``, and what stands in for it."""
 
 from dataclasses import dataclass, field
 from pathlib import Path

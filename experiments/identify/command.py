@@ -13,7 +13,7 @@ from rich.table import Table
 from experiments.cli.console import count, print_files, progress_bar, refusing
 from experiments.cli.json_output import human_console, json_output
 from experiments.cli.option_limits import at_least
-from experiments.cli.options import JobsOption, JsonOption, StudiedRobotOption
+from experiments.cli.options import JobsOption, JsonOption, PictureOption, StudiedRobotOption
 from experiments.cli.staging import PAGE, TABLE, YAML, staged_file
 from experiments.feedforward.command import realistic_robot
 from experiments.identify.cases import MotionCases, default_cases, load_cases
@@ -31,7 +31,12 @@ def identify_command(
     robot: StudiedRobotOption = "kr210",
     cases: Annotated[
         Path | None,
-        typer.Option(metavar="FILE", help="Motions and sensors, a YAML file.", show_default="18 motions"),
+        typer.Option(
+            "--motions",
+            metavar="FILE.yaml",
+            help="Motions and sensors.",
+            show_default="nine positions, two angles each",
+        ),
     ] = None,
     recording: Annotated[
         Path | None,
@@ -60,7 +65,7 @@ def identify_command(
     rectangle: Annotated[
         bool, typer.Option(help="Drive a rectangle with the identified inverse model; needs --plant.")
     ] = True,
-    seed: Annotated[int, typer.Option(metavar="N", help="Of the noise of simulated sensors.")] = 0,
+    seed: Annotated[int, typer.Option(metavar="N", help="Seed of the noise of simulated sensors.")] = 0,
     write: Annotated[
         Path | None,
         typer.Option(metavar="FILE.yaml", help="The identified robot, for --robot of every command."),
@@ -71,9 +76,7 @@ def identify_command(
             "--write-recording", metavar="FILE.csv", help="Keep what was simulated, for --recording."
         ),
     ] = None,
-    report: Annotated[Path, typer.Option(metavar="FILE.html", help="The report.")] = Path(
-        "out/identify.html"
-    ),
+    report: PictureOption = Path("out/identify.html"),
     json_file: JsonOption = None,
     jobs: JobsOption = None,
 ) -> None:
@@ -83,7 +86,9 @@ def identify_command(
         at_least("--jobs", 1, jobs)
         at_least("--seed", 0, seed)
         if recording is not None and (cases is not None or write_table is not None):
-            raise ValueError("--recording is what was recorded: it takes no --cases and no --write-recording")
+            raise ValueError(
+                "--recording is what was recorded: no --motions and no --write-recording go with it"
+            )
         if recording is None and slow is not None:
             raise ValueError("--slow says more of what was recorded, and there is no --recording")
         if recording is None and columns is not None:

@@ -20,6 +20,7 @@ from experiments.plan.study import OBJECTIVES, LegResult, Plan, joint_table, pla
 from experiments.report.files import write_text
 from robots.description.model import RobotModel, load_robot
 from robots.kinematics.forward import Kinematics
+from robots.measurement_design.obstacles import read_obstacles
 from robots.planning.limits import DUTY, RESERVE, motion_limits
 from robots.planning.path_dynamics import DYNAMICS
 from robots.programs.planned_moves import MOVES
@@ -57,14 +58,16 @@ def plan_command(
     recuperation: Annotated[
         bool, typer.Option("--recuperation", help="Motors that brake give energy back to the others.")
     ] = False,
-    tool_speed: Annotated[float, typer.Option(metavar="M/S", help="Largest speed of the tool.")] = float(
-        "inf"
-    ),
+    tool_speed: Annotated[
+        float, typer.Option(metavar="M/S", help="Largest speed of the tool.", show_default="no limit")
+    ] = float("inf"),
     tool_acceleration: Annotated[
-        float, typer.Option(metavar="M/S^2", help="Largest acceleration of the tool.")
+        float,
+        typer.Option(metavar="M/S^2", help="Largest acceleration of the tool.", show_default="no limit"),
     ] = float("inf"),
     duty: Annotated[
-        float, typer.Option(metavar="SHARE", help="Of a cycle that is motion, for the heat of the motors.")
+        float,
+        typer.Option(metavar="SHARE", help="Share of a cycle that is motion, for the heat of the motors."),
     ] = DUTY,
     may_ring: Annotated[
         bool,
@@ -74,6 +77,14 @@ def plan_command(
         float,
         typer.Option(metavar="SHARE", help="Of every limit, left for a law that corrects the motion."),
     ] = RESERVE,
+    free: Annotated[
+        bool,
+        typer.Option("--free", help="From rest to rest the joints go the way that is quickest."),
+    ] = False,
+    obstacles: Annotated[
+        str | None,
+        typer.Option(metavar="FILE.yaml", help="Boxes that the arm keeps clear of on a free way."),
+    ] = None,
     write: Annotated[
         str | None, typer.Option(metavar="FILE.csv", help="The motion, for reference.path=!Planned.")
     ] = None,
@@ -93,11 +104,16 @@ def plan_command(
     human = human_console(json_file)
     with json_output(json_file) as output, refusing(ValueError, OSError), ExitStack() as stack:
         check_language(program)
+        if program and free:
+            raise ValueError("--program has no move for a free way; leave out --free or use --write")
+        if obstacles and not free:
+            raise ValueError("--obstacles counts on free ways only; give --free too")
+        boxes = read_obstacles(obstacles) if obstacles else ()
         model = load_robot(robot)
         mass = model.payload.largest_mass if payload is None else payload
         limits = motion_limits(model, tool_speed, tool_acceleration, duty).with_reserve(reserve)
         true = None if plant is None else load_robot(plant)
-        plan = Plan(model, mass, path, objective, dynamics, limits, recuperation, true, may_ring)
+        plan = Plan(model, mass, path, objective, dynamics, limits, recuperation, true, may_ring, free, boxes)
         page = stack.enter_context(staged_file(report, *PAGE))
         table = stack.enter_context(staged_file(write, *TABLE)) if write else None
         code = stack.enter_context(staged_folder(report.parent)) if program else None

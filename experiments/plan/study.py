@@ -8,11 +8,13 @@ from typing import Any
 
 import numpy as np
 
+from experiments.plan.free_leg import free_leg
 from experiments.plan.legs import Leg, legs_of
 from experiments.plan.plant_run import PlantDriver
 from experiments.plan.timings import SineSquared, Timing, quickest
 from experiments.plan.within_limits import ROUNDING, Kept, kept_in_plant, largest_share
 from robots.description.model import RobotModel
+from robots.measurement_design.obstacles import Obstacle
 from robots.planning.jerk_profile import best_jerk_profile
 from robots.planning.joint_path import PathError
 from robots.planning.limit_use import energy, require_standing
@@ -46,6 +48,8 @@ class Plan:
         recuperation: whether braking gives energy back.
         plant: what stands in the station, None for the same robot.
         may_ring: whether a motion may make the arm ring more than the usual timing does.
+        is_free: whether the joints may go another way than the usual motion does.
+        obstacles: that they keep clear of on it.
     """
 
     robot: RobotModel
@@ -57,6 +61,8 @@ class Plan:
     recuperation: bool = False
     plant: RobotModel | None = None
     may_ring: bool = False
+    is_free: bool = False
+    obstacles: tuple[Obstacle, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -123,7 +129,13 @@ def _made_ready(plan: Plan, leg: Leg) -> _Ready:
             quickest(SineSquared, elastic, limits) if leg.is_straight else best_jerk_profile(elastic, limits)
         )
 
-    return _Ready(leg, dynamics, elastic, driver, kept_in_plant(baseline, driver, plan.limits))
+    usual = kept_in_plant(baseline, driver, plan.limits)
+    if plan.is_free:
+        leg = free_leg(plan.robot, plan.payload, leg, plan.limits, plan.dynamics, plan.obstacles)
+        dynamics = PathDynamics(plan.robot, plan.payload, leg.path, plan.dynamics)
+        elastic = PathDynamics(plan.robot, plan.payload, leg.path, "elastic_structure")
+        driver = PlantDriver(plan.robot, plan.payload, elastic, plan.plant)
+    return _Ready(leg, dynamics, elastic, driver, usual)
 
 
 def _planned(plan: Plan, ready: _Ready, allowed: float) -> LegResult:

@@ -10,7 +10,7 @@ G has the Coriolis and centrifugal terms of the moving arm and K what loads, gra
 the springs: without the two, stiffness comes out wrong by up to a half.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from pydrake.multibody.plant import MultibodyPlant
@@ -129,6 +129,42 @@ class ElasticArm:
         return ArmAlongMotion(
             knots, mass, coriolis, stiffness, rest, by_turn, by_speed, by_acceleration, load, readings
         )
+
+    def about(self, case: MotionCase, motion: ArmAlongMotion, moved: np.ndarray) -> ArmAlongMotion:
+        """The same linear equations with what they lack where the arm yields and rings as it is said to.
+
+        Terms of second degree (a sensor that deflections turn, on a hand that they accelerate) are some
+        hundredths of the readings. Near to the motion that is given they are in load and readings then.
+
+        Args:
+            case: whose motors move.
+            motion: linearised about it.
+            moved: deflections, their rates and accelerations at the samples, (n, 3, e).
+        """
+        # What is lacking is small: every other sample shows it.
+        samples = np.arange(len(case.theta))
+        at_base = np.unique(np.append(samples[::2], samples[-1]))
+        knot = np.clip(np.searchsorted(motion.knots, at_base, side="right") - 1, 0, len(motion.knots) - 2)
+        share = (at_base - motion.knots[knot]) / np.diff(motion.knots)[knot]
+        rest = (1.0 - share)[:, None] * motion.rest[knot] + share[:, None] * motion.rest[knot + 1]
+        yielded = moved[at_base]
+        torques = np.empty((len(at_base), motion.load.shape[1]))
+        shown = np.empty((len(at_base), motion.readings.shape[1]))
+        acceleration = case.acceleration
+        for row, k in enumerate(at_base):
+            q, v, vdot = self._joints(case.theta[k], case.rate[k], acceleration[k], moved[k, 0])
+            v[self.sprung], vdot[self.sprung] = moved[k, 1:]
+            torques[row], shown[row] = self.evaluate(q, v, vdot)
+        yielded[:, 0] -= rest
+        terms = (motion.stiffness, motion.coriolis, motion.mass)
+        levers = (motion.by_turn, motion.by_speed, motion.by_acceleration)
+        for parts, left in ((terms, torques), (levers, shown)):
+            for matrix, vector in zip(parts, yielded.swapaxes(0, 1), strict=True):
+                for weight, at in ((1.0 - share, knot), (share, knot + 1)):
+                    left -= weight[:, None] * np.einsum("nij,nj->ni", matrix[at], vector)
+        load = motion.load + interpolated(at_base, torques - motion.load[at_base], samples)
+        readings = motion.readings + interpolated(at_base, shown - motion.readings[at_base], samples)
+        return replace(motion, load=load, readings=readings)
 
     def _at(
         self, theta: np.ndarray, rate: np.ndarray, acceleration: np.ndarray, x_0: np.ndarray

@@ -53,6 +53,15 @@ class ArmProblem:
         missing = np.where(self._known, np.abs(self.residuals(p)), np.nan)
         return np.maximum(_MAD * np.nanmedian(missing, axis=(0, 1)), floor)
 
+    def moved(self, p: np.ndarray) -> list[np.ndarray]:
+        """How the arm moves with unknowns p, see `Response`."""
+        return self._response(p, False).moved
+
+    def cost(self, p: np.ndarray, spread: np.ndarray) -> np.ndarray:
+        """Half of the sum of squares of each case, large residuals as `solve` weighs them, (cases,)."""
+        scaled = np.square(self.residuals(p) / (_ROBUST * spread))
+        return _ROBUST**2 * (np.sqrt(1.0 + scaled) - 1.0).sum(axis=(0, 2))
+
     def _response(self, p: np.ndarray, sensitivity: bool) -> Response:
         if self._last is not None and np.array_equal(self._last[0], p):
             found = self._last[1]
@@ -91,7 +100,7 @@ class ArmProblem:
             f_scale=_ROBUST,
             max_nfev=steps,
             xtol=tolerance,
-            ftol=tolerance,
+            ftol=0.01 * tolerance,  # of a sum that is noise for the most part
             gtol=1e-12,
             x_scale="jac",
         )

@@ -1,26 +1,32 @@
 """How an elastic arm answers to the measured motion of its motors, with the sensitivities of all unknowns.
 
-All cases go forward together, one step of the trapezoidal rule (Newmark with gamma = 1/2, beta = 1/4) at a
-time: Newmark (1959). Gears with play and hysteresis are solved for by Newton's method in the accelerations
-of the six gears; derivatives by the unknowns follow from the same equations: they are those of the steps.
+Each case goes forward by the trapezoidal rule (Newmark with gamma = 1/2, beta = 1/4): Newmark (1959). Gears
+with play and hysteresis are solved for by Newton's method in the accelerations of the six gears; derivatives
+by the unknowns follow from the same equations: they are those of the steps. The loops are in
+`response_kernels`.
 """
 
 from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.interpolate import CubicSpline
+from scipy.signal import lfilter
 
 from robots.description.model import NUM_JOINTS
 from robots.identification.arm_along_motion import ArmAlongMotion
-from robots.identification.elastic_parameters import PLAY, RIPPLE, RIPPLES_PER_TURN, ElasticParameters
-from robots.identification.gear_step import Gears, GearStep
-from robots.identification.motion import MotionCase, SensorPlace
+from robots.identification.elastic_parameters import (
+    PLAY,
+    RIPPLE,
+    RIPPLES_PER_TURN,
+    ArmNumbers,
+    ElasticParameters,
+)
+from robots.identification.motion import BETA, GAMMA, MotionCase, SensorPlace
 
-_GAMMA, _BETA = 0.5, 0.25
-_NEWTON_STEPS = 6
-_SOLVED = 1e-9  # of the largest acceleration of a gear
-_EVERY = 2  # steps between samples of the readings
 _G = slice(0, NUM_JOINTS)  # gears among the sprung joints
+_CLOSE = 2  # samples
+_UNLOADED = 1e-6  # rad, a gear that its load winds up by less may rest anywhere within its play
 
 
 @dataclass(frozen=True)
@@ -29,10 +35,20 @@ class Response:
 
     readings: np.ndarray  # (m, cases, channels)
     sensitivity: np.ndarray | None  # (m, cases, channels, n), by the unknowns
+    moved: list[np.ndarray]  # of each case (samples, 3, e): deflections, their rates and accelerations
+
+
+@dataclass(frozen=True)
+class Grid:
+    """How finely a response is worked out: in samples of the cases."""
+
+    steps: int = 1  # of the integration in a sample; the rule errs by (w h)^2 / 12 in a frequency w
+    filtered: int = 1  # samples from one value of the sensors' low-pass to the next
+    kept: int = 2  # samples from one reading that is compared to the next, a multiple of it
 
 
 class ArmResponse:
-    """A model of all cases at once; cases that end early stand still until the longest ends."""
+    """A model of all cases; one that ends early shows what it showed last until the longest ends."""
 
     def __init__(
         self,
@@ -41,6 +57,8 @@ class ArmResponse:
         sensors: Sequence[SensorPlace],
         parameters: ElasticParameters,
         gear_ratio: np.ndarray,
+        grid: Grid = Grid(),
+        rests: np.ndarray | None = None,
     ) -> None:
         """Takes linearised motions.
 
@@ -50,325 +68,195 @@ class ArmResponse:
             sensors: whose readings are wanted.
             parameters: the unknowns.
             gear_ratio: of the joints, shape (6,).
+            grid: of the integration and of the readings.
+            rests: where gears without load begin within their play, -1 to 1, shape (cases, 6); None for its
+                middle.
         """
-        self._motions, self._parameters = motions, parameters
-        self._h = cases[0].period
+        self._parameters, self._grid = parameters, grid
         self.samples = max(len(case.theta) for case in cases)
-        self.load = _padded([motion.load for motion in motions], self.samples)
-        self.base = _padded([motion.readings for motion in motions], self.samples)
-        theta = _padded([case.theta for case in cases], self.samples)
-        rate = _padded([case.rate for case in cases], self.samples, at_rest=True)
+        self.kept = np.arange(0, self.samples, grid.kept)  # samples of the readings
+        period = cases[0].period
+        self._h = period / grid.steps
+        corner = np.pi * period * grid.filtered * np.repeat([sensor.bandwidth for sensor in sensors], 3)
+        self._low_pass = np.stack([corner / (1.0 + corner), (1.0 - corner) / (1.0 + corner)])
         turns = RIPPLES_PER_TURN * gear_ratio
-        wave = np.stack([np.sin(turns * theta), np.cos(turns * theta)])
-        # (2, samples, cases, 6): what a unit of ripple adds to the turn of a gear, and to its rate
-        self._ripple = wave
-        self._ripple_rate = np.stack([wave[1], -wave[0]]) * turns * rate
-        corner = np.pi * self._h * _EVERY * np.repeat([sensor.bandwidth for sensor in sensors], 3)
-        self._new, self._old = corner / (1.0 + corner), (1.0 - corner) / (1.0 + corner)
-        self.kept = np.arange(0, self.samples, _EVERY)  # samples of the readings
-        self._columns = _Columns(parameters)
+        shares = np.zeros((len(cases), NUM_JOINTS)) if rests is None else rests
+        self._cases = [_Case(m, c, turns, grid, s) for m, c, s in zip(motions, cases, shares, strict=True)]
+        self._base = [_filtered(m.readings, self._low_pass, grid) for m in motions]
+        self._columns = _columns(parameters)
+
+    def unloaded(self, p: np.ndarray) -> np.ndarray:
+        """Which gears carry nothing before a case begins, (cases, 6) bool."""
+        numbers = self._parameters.numbers(p)
+        springs = np.stack([numbers.stiffness, numbers.stiffness * numbers.time])
+        gears = _gears(numbers)
+        return np.array([case.at_rest(springs, gears, numbers.ripple)[1] == 0.0 for case in self._cases])
 
     def __call__(self, p: np.ndarray, sensitivity: bool = True) -> Response:
         """Goes through all cases with unknowns p, shape (n,)."""
-        run = _Run(self._parameters, p, self._motions, self._h, self._columns if sensitivity else None)
-        shown, derived = [], []
-        ripple = self._parameters.numbers(p).ripple[:, None]
-        last = run.start(self.load[0], self._offset(ripple, 0)[0], self._waves(0)[0])
-        for sample in range(self.samples):
-            if sample:
-                offset, offset_rate = self._offset(ripple, sample)
-                last = run.step(sample, self.load[sample], offset, offset_rate, self._waves(sample))
-            if sample % _EVERY == 0:
-                reading, by = run.readings(last)
-                shown.append(reading + self.base[sample])
-                derived.append(by)
-        readings = self._filtered(np.array(shown), self._new, self._old)
-        if not sensitivity:
-            return Response(readings, None)
-        return Response(readings, self._filtered(np.array(derived), self._new[:, None], self._old[:, None]))
+        from robots.identification import response_kernels  # imports numba
 
-    def _offset(self, size: np.ndarray, sample: int) -> tuple[np.ndarray, np.ndarray]:
-        """What the ripple turns the gears by and how fast, (cases, 6) each."""
-        return (size * self._ripple[:, sample]).sum(0), (size * self._ripple_rate[:, sample]).sum(0)
-
-    def _waves(self, sample: int) -> tuple[np.ndarray, np.ndarray]:
-        return self._ripple[:, sample], self._ripple_rate[:, sample]
-
-    @staticmethod
-    def _filtered(values: np.ndarray, new: np.ndarray, old: np.ndarray) -> np.ndarray:
-        """Through the low-pass of the sensors, in place; they have been at rest for long."""
-        before = values[0].copy()
-        for k in range(1, len(values)):
-            now = values[k].copy()
-            values[k] = old * values[k - 1] + new * (now + before)
-            before = now
-        return values
-
-
-@dataclass(frozen=True)
-class _State:
-    """Of all cases at a sample; sensitivities have the unknowns last."""
-
-    x: np.ndarray  # (cases, e) rad
-    v: np.ndarray
-    a: np.ndarray
-    turn: np.ndarray  # (cases, 6) rad, of the gears, less their ripple
-    z: np.ndarray  # (cases, 6) rad, hysteresis
-    place: tuple[np.ndarray, np.ndarray]  # knot and share of the way to the next one, of each case
-    by: tuple[np.ndarray, ...] | None  # of x, v, a, turn, z
+        numbers = self._parameters.numbers(p)
+        springs = np.stack([numbers.stiffness, numbers.stiffness * numbers.time])
+        gears = _gears(numbers)
+        n = len(self._parameters) if sensitivity else 0
+        size = len(self.kept), len(self._cases), self._low_pass.shape[1]
+        readings, derived = np.empty(size), np.zeros((*size, n))
+        grid, moved = self._grid, []
+        steps = self._h, grid.filtered * grid.steps, grid.kept * grid.steps, grid.steps
+        for i, (case, base) in enumerate(zip(self._cases, self._base, strict=True)):
+            start = case.start(springs, gears, numbers.ripple, self._columns, n)
+            m = len(base)
+            shown, by = np.empty((m, size[2])), np.empty((m, size[2], n))
+            moved.append(np.empty((case.samples, 3 * springs.shape[1])))
+            response_kernels.go_through(
+                steps,
+                case.posture(springs),
+                case.course(numbers.ripple),
+                springs,
+                gears,
+                self._columns,
+                start,
+                self._low_pass,
+                moved[-1],
+                shown,
+                by,
+            )
+            readings[:m, i], derived[:m, i] = shown + base, by
+            readings[m:, i] = readings[m - 1, i]
+        moved = [each.reshape(len(each), 3, -1) for each in moved]
+        return Response(readings, derived if sensitivity else None, moved)
 
 
-class _Columns:
-    """Which unknown stands in which column, by kind."""
-
-    def __init__(self, parameters: ElasticParameters) -> None:
-        self.size = len(parameters)
-        self.of = {kind: parameters.of_kind(kind) for kind in dict.fromkeys(parameters.kinds)}
-        self.belongs, self.grouped = parameters.belongs, parameters.grouped
-        self.turning = list(parameters.turning)
-
-    def ripple(self, waves: np.ndarray) -> np.ndarray:
-        """d(ripple of the gears) / d(unknowns), (cases, 6, n); waves (2, cases, 6)."""
-        found = np.zeros((*waves.shape[1:], self.size))
-        if self.turning:
-            for wave, places in zip(waves, self.of["ripple"].reshape(2, -1), strict=True):
-                found[:, self.turning, places] = RIPPLE * wave[:, self.turning]
-        return found
-
-    def torque(self, gears: Gears, step: GearStep, state: _State, new: tuple[np.ndarray, ...]) -> np.ndarray:
-        """d(springs and dampers) / d(unknowns) with the motion as it is, (cases, e, n).
-
-        Args:
-            gears, step: of the six gears.
-            state: at the beginning of the step.
-            new: springs and dampers of all sprung joints in N m, positive against them, (cases, e) each.
-        """
-        spring, damper = (each.copy() for each in new)
-        spring[:, _G] = step.torque
-        damper[:, _G] = step.damped + step.oiled
-        found = np.zeros((*spring.shape, self.size))
-        found[..., self.of["stiffness"]] = spring[..., None] * self.belongs
-        found[..., self.of["time"]] = damper[..., None] * self.grouped
-        if "play" in self.of:
-            self._add_gear_parts(found, gears, step, state)
-        return found
-
-    def _add_gear_parts(self, found: np.ndarray, gears: Gears, step: GearStep, state: _State) -> None:
-        assert state.by is not None
-        rows = range(NUM_JOINTS)
-        side = np.sign(step.elastic)
-        found[:, rows, self.of["play"]] += -0.5 * PLAY * gears.c * step.is_out * side
-        found[:, _G, self.of["lubricant"][0]] += step.oiled
-        found[:, rows, self.of["hysteresis"]] += gears.c * step.hysteresis
-        found[:, _G] += gears.held[:, None] * self.state(gears, step, state)
-
-    def state(self, gears: Gears, step: GearStep, state: _State) -> np.ndarray:
-        """d(hysteresis) / d(unknowns) but for what the deflection at the end does, (cases, 6, n)."""
-        assert state.by is not None
-        by_turn, by_z = state.by[3], state.by[4]
-        found = step.kept[..., None] * by_z - step.state_by_turn[..., None] * by_turn
-        if "width" in self.of:
-            fall = step.kept
-            moved = -gears.width * np.log(np.maximum(fall, 1e-300))
-            direction = np.sign(step.hysteresis - state.z)
-            end = direction * gears.width
-            slope = direction * (1.0 - fall) + (state.z - end) * fall * moved / gears.width**2
-            found[..., self.of["width"][0]] += gears.width * slope
-        return found
-
-
-class _Run:
-    """One pass through all cases."""
+class _Case:
+    """One case on the grid of the integration: what does not depend on the unknowns."""
 
     def __init__(
-        self,
-        parameters: ElasticParameters,
-        p: np.ndarray,
-        motions: Sequence[ArmAlongMotion],
-        h: float,
-        columns: _Columns | None,
+        self, motion: ArmAlongMotion, case: MotionCase, turns: np.ndarray, grid: Grid, rest: np.ndarray
     ) -> None:
-        numbers = parameters.numbers(p)
-        self._h, self._columns = h, columns
-        self._k, self._d = numbers.stiffness, numbers.stiffness * numbers.time
-        self._gears = Gears(numbers)
-        self._knots = [motion.knots for motion in motions]
-        most = max(len(motion.knots) for motion in motions)
-        names = ("coriolis", "stiffness", "by_turn", "by_speed", "by_acceleration", "rest")
-        self._of = {name: _stacked([getattr(m, name) for m in motions], most) for name in names}
-        mass = _stacked([motion.mass for motion in motions], most)
-        whole = (
-            mass
-            + _GAMMA * h * (self._of["coriolis"] + np.diag(self._d))
-            + _BETA * h * h * (self._of["stiffness"] + np.diag(self._k))
-        )
-        self._of["inverse"] = np.linalg.inv(whole)
-        self._all = np.arange(len(motions))
-        self._state: _State
+        self._rest = rest
+        self._motion, self.samples = motion, len(case.theta)
+        self._load = _refined(motion.load, grid.steps)
+        turned = turns * _refined(case.theta, grid.steps)
+        speed = turns * _refined(case.rate, grid.steps)
+        sine, cosine = np.sin(turned), np.cos(turned)
+        # (steps, 2, 2, 6): turn and rate by a unit of sine and cosine
+        self._waves = np.stack([sine, cosine, cosine * speed, -sine * speed], 1).reshape(-1, 2, 2, NUM_JOINTS)
+        self._knots = motion.knots * grid.steps
+        self._close = _close(motion.knots) * grid.steps
+        h = case.period / grid.steps
+        whole = motion.mass + GAMMA * h * motion.coriolis + BETA * h * h * motion.stiffness
+        self._whole, self._h = _between(self._knots, whole, self._close), h
+        self._held = np.concatenate([motion.stiffness, motion.coriolis], axis=2)
+        self._levers = np.concatenate([motion.by_turn, motion.by_speed, motion.by_acceleration], axis=2)
 
-    def _place(self, sample: int) -> tuple[np.ndarray, np.ndarray]:
-        knot, share = np.empty(len(self._knots), dtype=int), np.empty(len(self._knots))
-        for i, knots in enumerate(self._knots):
-            k = min(int(np.searchsorted(knots, sample, side="right")) - 1, len(knots) - 2)
-            knot[i] = k
-            share[i] = min((sample - knots[k]) / (knots[k + 1] - knots[k]), 1.0)
-        return knot, share
+    def posture(self, springs: np.ndarray) -> tuple[np.ndarray, ...]:
+        """What changes with the posture, at knots; see `response_kernels.go_through`."""
+        own = GAMMA * self._h * springs[1] + BETA * self._h**2 * springs[0]
+        inverse = np.linalg.inv(self._whole + np.diag(own))
+        return self._knots, self._held, self._motion.rest[:, None], self._levers, self._close, inverse
 
-    def _at(self, name: str, place: tuple[np.ndarray, np.ndarray]) -> np.ndarray:
-        values, (knot, share) = self._of[name], place
-        weight = share.reshape(-1, *[1] * (values.ndim - 2))
-        return (1.0 - weight) * values[self._all, knot] + weight * values[self._all, knot + 1]
+    def course(self, ripple: np.ndarray) -> tuple[np.ndarray, ...]:
+        """What changes from step to step with ripples of the gears in rad, (2, 6)."""
+        return self._load, (self._waves * ripple).sum(axis=2), self._waves
 
-    def start(self, load: np.ndarray, offset: np.ndarray, waves: np.ndarray) -> _State:
-        """Everything at rest under the first load, (cases, e), with the ripple that gears have there."""
-        place = self._place(0)
-        K, rest = self._at("stiffness", place), self._at("rest", place)
-        x = np.zeros_like(load)
+    def at_rest(
+        self, springs: np.ndarray, gears: np.ndarray, ripple: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Deflections in rad under the first load, (e,), signs of the gears' loads, places in the play."""
+        load, K, rest = self._load[0], self._motion.stiffness[0], self._motion.rest[0]
+        offset = (self._waves[0, 0] * ripple).sum(axis=0)
+        x, sign, side = np.zeros_like(load), np.zeros(NUM_JOINTS), self._rest
         for _ in range(6):
-            carried = -load - np.einsum("cij,cj->ci", K, x - rest)
-            x = carried / self._k
-            x[:, _G] = self._gears.at_rest(carried[:, _G]) + offset
-        turn = x[:, _G] - offset
-        none = np.zeros_like(x)
-        by = None
-        if self._columns is not None:
-            by = self._start_sensitivity(x, turn, K, waves)
-        self._state = _State(x, none, none, turn, np.zeros_like(turn), place, by)
-        return self._state
+            carried = -load - K @ (x - rest)
+            x = carried / springs[0]
+            sign = np.where(np.abs(x[_G]) < _UNLOADED, 0.0, np.sign(x[_G]))
+            side = np.where(sign == 0.0, self._rest, sign)
+            x[_G] = carried[_G] / gears[:, 0] + side * gears[:, 2] + offset
+        return x, sign, side
 
-    def _start_sensitivity(
-        self, x: np.ndarray, turn: np.ndarray, K: np.ndarray, waves: np.ndarray
-    ) -> tuple[np.ndarray, ...]:
-        columns = self._columns
-        assert columns is not None
-        cases, e = x.shape
-        explicit = np.zeros((cases, e, columns.size))
-        carried = self._k * x
-        beyond = turn - np.clip(turn, -self._gears.half_gap, self._gears.half_gap)
-        carried[:, _G] = self._gears.c * beyond
-        explicit[..., columns.of["stiffness"]] = carried[..., None] * columns.belongs
-        if "play" in columns.of:
-            rows = range(NUM_JOINTS)
-            explicit[:, rows, columns.of["play"]] = -0.5 * PLAY * self._gears.c * np.sign(beyond)
-        by_offset = columns.ripple(waves)
-        explicit[:, _G] -= self._gears.c[:, None] * by_offset
-        by_x = -np.linalg.solve(K + np.diag(self._k), explicit)
-        none = np.zeros_like(by_x)
-        return by_x, none, none, by_x[:, _G] - by_offset, np.zeros_like(by_offset)
-
-    def step(
+    def start(
         self,
-        sample: int,
-        load: np.ndarray,
-        offset: np.ndarray,
-        offset_rate: np.ndarray,
-        waves: tuple[np.ndarray, np.ndarray],
-    ) -> _State:
-        """From the last sample to this one."""
-        s, h, place = self._state, self._h, self._place(sample)
-        S, G, K = (self._at(name, place) for name in ("inverse", "coriolis", "stiffness"))
-        x = s.x + h * s.v + (0.5 - _BETA) * h * h * s.a
-        v = s.v + (1.0 - _GAMMA) * h * s.a
-        shifted = (x - self._at("rest", place))[..., None]
-        rhs = -load - v * self._d - x * self._k - (G @ v[..., None] + K @ shifted)[..., 0]
-        free = (S @ rhs[..., None])[..., 0]
-        S_g = S[:, :, _G]
-        a_g, step = self._gear_accelerations(
-            s, (x[:, _G], v[:, _G]), free[:, _G], S_g[:, _G], (offset, offset_rate)
-        )
-        c, d = self._k[_G], self._d[_G]
-        extra = step.torque - c * (x[:, _G] + _BETA * h * h * a_g) - d * (v[:, _G] + _GAMMA * h * a_g)
-        a = free - (S_g @ extra[..., None])[..., 0]
-        new_x, new_v = x + _BETA * h * h * a, v + _GAMMA * h * a
-        by = None
-        if self._columns is not None:
-            by = self._sensitivity(s, step, (S, G, K), (new_x, new_v), waves)
-        turn = new_x[:, _G] - offset
-        self._state = _State(new_x, new_v, a, turn, step.hysteresis, place, by)
-        return self._state
-
-    def _gear_accelerations(
-        self,
-        s: _State,
-        predicted: tuple[np.ndarray, np.ndarray],
-        free: np.ndarray,
-        S: np.ndarray,
-        ripple: tuple[np.ndarray, np.ndarray],
-    ) -> tuple[np.ndarray, GearStep]:
-        """Solves for the accelerations of the gears, (cases, 6), and what these then carry."""
-        h, gears = self._h, self._gears
-        (x, v), (offset, offset_rate) = predicted, ripple
-        c, d = self._k[_G], self._d[_G]
-        a = s.a[:, _G]
-        for _ in range(_NEWTON_STEPS):
-            turn, rate = x + _BETA * h * h * a, v + _GAMMA * h * a
-            step = gears.step(s.turn, s.z, turn - offset, rate - offset_rate)
-            lacking = a - free + (S @ (step.torque - c * turn - d * rate)[..., None])[..., 0]
-            if np.abs(lacking).max() < _SOLVED * max(np.abs(a).max(), 1.0):
-                break
-            slope = (step.by_turn - c) * (_BETA * h * h) + (step.by_rate - d) * (_GAMMA * h)
-            J = np.eye(NUM_JOINTS) + S * slope[:, None, :]
-            a = a - np.linalg.solve(J, lacking[..., None])[..., 0]
-        return a, step
-
-    def _sensitivity(
-        self,
-        s: _State,
-        step: GearStep,
-        matrices: tuple[np.ndarray, np.ndarray, np.ndarray],
-        new: tuple[np.ndarray, np.ndarray],
-        waves: tuple[np.ndarray, np.ndarray],
-    ) -> tuple[np.ndarray, ...]:
-        columns, h, gears = self._columns, self._h, self._gears
-        assert columns is not None
-        assert s.by is not None
-        S, G, K = matrices
-        by_x, by_v, by_a, _, _ = s.by
-        x = by_x + h * by_v + (0.5 - _BETA) * h * h * by_a
-        v = by_v + (1.0 - _GAMMA) * h * by_a
-        springs = new[0] * self._k, new[1] * self._d
-        rhs = -(G @ v) - K @ x - self._k[:, None] * x - self._d[:, None] * v
-        rhs -= columns.torque(gears, step, s, springs)
-        by_offset, by_offset_rate = (columns.ripple(wave) for wave in waves)
-        by_turn, by_rate = step.by_turn[..., None], step.by_rate[..., None]
-        beyond_turn, beyond_rate = by_turn - self._k[_G, None], by_rate - self._d[_G, None]
-        rhs[:, _G] -= beyond_turn * x[:, _G] + beyond_rate * v[:, _G]
-        rhs[:, _G] += by_turn * by_offset + by_rate * by_offset_rate
-        free = S @ rhs
-        slope = (beyond_turn * (_BETA * h * h) + beyond_rate * (_GAMMA * h))[..., 0]
-        S_g = S[:, :, _G]
-        of_gears = np.linalg.solve(np.eye(NUM_JOINTS) + S_g[:, _G] * slope[:, None, :], free[:, _G])
-        a = free - S_g @ (slope[..., None] * of_gears)
-        x, v = x + _BETA * h * h * a, v + _GAMMA * h * a
-        turn = x[:, _G] - by_offset
-        state = step.state_by_turn[..., None] * turn + columns.state(gears, step, s)
-        return x, v, a, turn, state
-
-    def readings(self, state: _State) -> tuple[np.ndarray, np.ndarray | None]:
-        """What yielding adds to the readings, (cases, channels), and its derivatives, (..., n)."""
-        names = ("by_turn", "by_speed", "by_acceleration")
-        matrices = [self._at(name, state.place) for name in names]
-        moved = (state.x - self._at("rest", state.place), state.v, state.a)
-        by_turn, by_speed, by_acceleration = matrices
-        x, v, a = (each[..., None] for each in moved)
-        shown = (by_turn @ x + by_speed @ v + by_acceleration @ a)[..., 0]
-        if state.by is None:
-            return shown, None
-        x, v, a = state.by[:3]
-        return shown, by_turn @ x + by_speed @ v + by_acceleration @ a
+        springs: np.ndarray,
+        gears: np.ndarray,
+        ripple: np.ndarray,
+        columns: tuple[np.ndarray, np.ndarray, int, int],
+        n: int,
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """At rest under the first load: deflections (e,), their derivatives with those of gears' turns."""
+        x, _, side = self.at_rest(springs, gears, ripple)
+        if not n:
+            return x, np.zeros((len(x) + NUM_JOINTS, 0))
+        of_joint, of_gear, lubricant, _ = columns
+        waves = self._waves[0, 0]
+        turn = x[_G] - (waves * ripple).sum(axis=0)
+        carried = springs[0] * x
+        carried[_G] = gears[:, 0] * (turn - side * gears[:, 2])
+        explicit, by_offset = np.zeros((len(x), n)), np.zeros((NUM_JOINTS, n))
+        explicit[np.arange(len(x)), of_joint[0]] = carried
+        rows = np.arange(NUM_JOINTS)
+        if lubricant >= 0:
+            explicit[rows, of_gear[0]] = -0.5 * PLAY * gears[:, 0] * side
+        for wave, column in zip(waves, of_gear[2:], strict=True):
+            turning = column >= 0
+            by_offset[rows[turning], column[turning]] = RIPPLE * wave[turning]
+        explicit[_G] -= gears[:, :1] * by_offset
+        by_x = -np.linalg.solve(self._motion.stiffness[0] + np.diag(springs[0]), explicit)
+        return x, np.concatenate([by_x, by_x[_G] - by_offset])
 
 
-def _padded(parts: Sequence[np.ndarray], samples: int, at_rest: bool = False) -> np.ndarray:
-    """Cases side by side, (samples, cases, ...); what ends early keeps its last value or rests."""
-    found = np.empty((samples, len(parts), *parts[0].shape[1:]))
-    for i, part in enumerate(parts):
-        found[: len(part), i] = part
-        found[len(part) :, i] = 0.0 if at_rest else part[-1]
-    return found
+def _columns(parameters: ElasticParameters) -> tuple[np.ndarray, np.ndarray, int, int]:
+    """Which unknown stands in which column; see `response_kernels.go_through`."""
+    springs, times = parameters.of_kind("stiffness"), parameters.of_kind("time")
+    of_joint = np.stack([springs[parameters.belongs.argmax(1)], times[parameters.grouped.argmax(1)]])
+    of_gear, others = np.full((4, NUM_JOINTS), -1), (-1, -1)
+    if parameters.of_kind("play").size:
+        of_gear[0], of_gear[1] = parameters.of_kind("play"), parameters.of_kind("hysteresis")
+        others = int(parameters.of_kind("lubricant")[0]), int(parameters.of_kind("width")[0])
+    if parameters.turning:
+        of_gear[2:, list(parameters.turning)] = parameters.of_kind("ripple").reshape(2, -1)
+    return of_joint, of_gear, *others
 
 
-def _stacked(parts: Sequence[np.ndarray], most: int) -> np.ndarray:
-    """Knots of cases side by side, (cases, most, ...), the last one repeated."""
-    return np.array(
-        [np.concatenate([part, np.repeat(part[-1:], most - len(part), axis=0)]) for part in parts]
-    )
+def _gears(numbers: ArmNumbers) -> np.ndarray:
+    """Of six gears what `response_kernels.gear_step` takes, (6, 6)."""
+    spring = numbers.stiffness[_G]
+    damper = spring * numbers.time[_G]
+    oil = np.where(numbers.play > 0.0, numbers.lubricant, 0.0) * damper
+    width = np.full(NUM_JOINTS, numbers.width)
+    return np.stack([spring, damper, 0.5 * numbers.play, oil, numbers.hysteresis * spring, width], axis=1)
+
+
+def _close(knots: np.ndarray) -> np.ndarray:
+    """Knots with some more between those of the motion: samples at which the inverse of the mass is known.
+
+    The hand is light and turns beside a heavy arm: between knots that are far apart a straight line from
+    inverse to inverse would make the arm lighter by some hundredths. From mass to mass it does not.
+    """
+    return np.union1d(knots, np.arange(knots[1], knots[-2], _CLOSE))
+
+
+def _between(knots: np.ndarray, values: np.ndarray, at: np.ndarray) -> np.ndarray:
+    """Linearly between matrices (k, ...) that are known at knots (k,)."""
+    knot = np.clip(np.searchsorted(knots, at, side="right") - 1, 0, len(knots) - 2)
+    share = ((at - knots[knot]) / np.diff(knots)[knot])[:, None, None]
+    return (1.0 - share) * values[knot] + share * values[knot + 1]
+
+
+def _refined(values: np.ndarray, steps: int) -> np.ndarray:
+    """At the steps between samples, by a cubic spline, contiguous."""
+    if steps == 1:
+        return np.ascontiguousarray(values)
+    samples = np.arange(len(values))
+    return CubicSpline(samples, values)(np.arange((len(values) - 1) * steps + 1) / steps)
+
+
+def _filtered(readings: np.ndarray, low_pass: np.ndarray, grid: Grid) -> np.ndarray:
+    """Readings (samples, channels) through the low-pass of the sensors, those that are kept."""
+    values = readings[:: grid.filtered]
+    found = np.empty_like(values)
+    for channel, (new, old) in enumerate(low_pass.T):
+        rest = values[0, channel]
+        passed, _ = lfilter([new, new], [1.0, -old], values[:, channel] - rest, zi=np.zeros(1))
+        found[:, channel] = rest + passed
+    return found[:: grid.kept // grid.filtered]

@@ -11,10 +11,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from robots.description.model import NUM_JOINTS
+from robots.description.variation import Factors
 from robots.identification.arm_along_motion import ElasticArm
 
 _ARM = 3  # axes of the arm; those behind them are of the wrist
 GROUPS = ("gears_1_3", "gears_4_6", "bearings_1_3", "bearings_4_6", "beams")
+DIRECTIONS = {"gear": ("",), "bearing": ("a", "b"), "beam": ("x", "y", "z")}  # in which a part yields
 PLAY, RIPPLE = 1e-4, 1e-5  # rad, units
 RIPPLES_PER_TURN = 2.0  # of the motor, of the ripple that harmonic drives and cycloids have first of all
 
@@ -36,9 +38,24 @@ _FAR = 3.0  # of a logarithm from its start
 class Spring:
     """One stiffness of the robot file and the sprung joints that it belongs to."""
 
-    name: str  # stiffness_gear_1, stiffness_bearing_2_a, stiffness_beam_2_y
-    group: int  # of `GROUPS`
+    part: str  # a key of `DIRECTIONS`
+    joint: int  # whose part it is, from zero
+    direction: int  # in which it yields, an index of its directions
     rows: tuple[int, ...]  # of the sprung joints
+
+    @property
+    def name(self) -> str:
+        """For example stiffness_gear_1, stiffness_bearing_2_a, stiffness_beam_2_y."""
+        return "_".join(
+            filter(None, ("stiffness", self.part, str(self.joint + 1), DIRECTIONS[self.part][self.direction]))
+        )
+
+    @property
+    def group(self) -> int:
+        """Of `GROUPS`."""
+        if self.part == "beam":
+            return GROUPS.index("beams")
+        return GROUPS.index(f"{self.part}s_{'1_3' if self.joint < _ARM else '4_6'}")
 
 
 @dataclass(frozen=True)
@@ -103,6 +120,13 @@ class ElasticParameters:
         """How many there are."""
         return len(self.names)
 
+    def factors(self, p: np.ndarray) -> Factors:
+        """How many times the springs of a robot are those that a vector of unknowns, shape (n,), means."""
+        found = {part: np.ones((NUM_JOINTS, len(each))) for part, each in DIRECTIONS.items()}
+        for spring, factor in zip(self.springs, np.exp(p[self.of_kind("stiffness")]), strict=True):
+            found[spring.part][spring.joint, spring.direction] = factor
+        return Factors(found["gear"][:, 0], found["bearing"], found["beam"])
+
     def of_kind(self, kind: str) -> np.ndarray:
         """Indices at which the unknowns of a kind stand, shape (k,)."""
         return np.array([i for i, each in enumerate(self.kinds) if each == kind], dtype=int)
@@ -141,14 +165,15 @@ def _gear_unknowns(turning: Sequence[int]) -> Sequence[tuple[str, Sequence[int |
 
 def _springs(names: Sequence[str]) -> list[Spring]:
     """From names of sprung joints: deflection_1, tilt_a_1, beam_2_y1."""
-    rows: dict[tuple[str, int], list[int]] = {}
+    rows: dict[tuple[str, int, int], list[int]] = {}
     for row, name in enumerate(names):
         kind, *rest = name.split("_")
         if kind == "deflection":
-            key = f"stiffness_gear_{rest[0]}", 0 if int(rest[0]) <= _ARM else 1
+            part, joint, direction = "gear", rest[0], ""
         elif kind == "tilt":
-            key = f"stiffness_bearing_{rest[1]}_{rest[0]}", 2 if int(rest[1]) <= _ARM else 3
+            part, joint, direction = "bearing", rest[1], rest[0]
         else:
-            key = f"stiffness_beam_{rest[0]}_{rest[1].rstrip('12')}", 4
+            part, joint, direction = "beam", rest[0], rest[1].rstrip("12")
+        key = part, int(joint) - 1, DIRECTIONS[part].index(direction)
         rows.setdefault(key, []).append(row)
-    return [Spring(name, group, tuple(of_spring)) for (name, group), of_spring in rows.items()]
+    return [Spring(*key, tuple(of_spring)) for key, of_spring in rows.items()]

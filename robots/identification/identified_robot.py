@@ -7,7 +7,7 @@ import numpy as np
 from robots.description import drive_parts
 from robots.description.beam import Beam
 from robots.description.drive_train import ARC_MINUTE
-from robots.description.model import Joint, Link, RobotModel, Tilting
+from robots.description.model import Joint, Link, RobotModel
 from robots.identification.arm_along_motion import ElasticArm
 from robots.identification.arm_fit import ArmFit
 from robots.identification.elastic_parameters import (
@@ -57,7 +57,7 @@ def found_parameters(robot: RobotModel, fit: ArmFit, plant: RobotModel | None = 
         rows.append(
             FoundParameter(
                 spring.name,
-                "Nm^2" if "beam" in spring.name else "Nm/rad",
+                "Nm^2" if spring.part == "beam" else "Nm/rad",
                 value,
                 value * relative,
                 relative < STIFFNESS_KNOWN,
@@ -126,17 +126,15 @@ class _True:
 
 def spring_value(robot: RobotModel, spring: Spring) -> float:
     """The stiffness of a robot's file that a spring stands for."""
-    kind, number, *which = spring.name.removeprefix("stiffness_").split("_")
-    i = int(number) - 1
-    if kind == "gear":
-        return float(robot.joints[i].drive_train.stiffness)
-    if kind == "bearing":
-        tilting = robot.joints[i].tilting
+    if spring.part == "gear":
+        return float(robot.joints[spring.joint].drive_train.stiffness)
+    if spring.part == "bearing":
+        tilting = robot.joints[spring.joint].tilting
         assert tilting is not None
-        return float(tilting.stiffness["ab".index(which[0])])
-    beam = robot.links[i].beam
+        return float(tilting.stiffness[spring.direction])
+    beam = robot.links[spring.joint].beam
     assert beam is not None
-    return float(beam.stiffness["xyz".index(which[0])])
+    return float(beam.stiffness[spring.direction])
 
 
 def identified_robot(robot: RobotModel, fit: ArmFit) -> RobotModel:
@@ -180,7 +178,8 @@ def _joint(
         source = "; ".join(
             _source(f"about {side}", sigma) for side, (_, sigma) in zip("ab", found, strict=True)
         )
-        tilting = Tilting(springs, [time * value for value in springs], source)
+        damping = [time * value for value in springs]
+        tilting = replace(tilting, stiffness=springs, damping=damping, source=source)
     return replace(joint, drive_train=replace(train, **changes), tilting=tilting)
 
 

@@ -7,6 +7,7 @@ import numpy as np
 from scipy.interpolate import CubicSpline
 
 KINDS = ("gyro", "accelerometer")
+GAMMA, BETA = 0.5, 0.25  # of the steps of Newmark (1959) in which motions are integrated
 
 
 @dataclass(frozen=True)

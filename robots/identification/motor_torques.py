@@ -9,8 +9,8 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.interpolate import CubicSpline
 
-from robots.description.model import NUM_JOINTS, RobotModel
-from robots.description.variation import Factors, varied
+from robots.description.model import RobotModel
+from robots.description.variation import varied
 from robots.identification.arm_along_motion import ElasticArm
 from robots.identification.arm_fit import ArmProblem
 from robots.identification.arm_response import ArmResponse
@@ -90,7 +90,7 @@ def springs_from_torques(
     p = parameters.start.copy()
     for steps in _STEPS:
         p = problem.solve(p, _ALIKE * problem.spread(p, floor), "soft_l1", steps, _TOLERANCE)
-    return varied(robot, _factors(parameters, p))
+    return varied(robot, parameters.factors(p))
 
 
 def _check(robot: RobotModel, recording: TorqueRecording, spread: float) -> None:
@@ -107,13 +107,3 @@ def _check(robot: RobotModel, recording: TorqueRecording, spread: float) -> None
             f"springs from torques: needs at least 100 finite samples, got {len(recording.time)}"
             + " with some that are not finite" * (not all(np.isfinite(part).all() for part in parts))
         )
-
-
-def _factors(parameters: ElasticParameters, p: np.ndarray) -> Factors:
-    gears, bearings, beams = (np.ones((NUM_JOINTS, n)) for n in (1, 2, 3))
-    of = {"gear": (gears, "0"), "bearing": (bearings, "ab"), "beam": (beams, "xyz")}
-    for spring, factor in zip(parameters.springs, np.exp(p), strict=False):  # springs stand first
-        kind, number, *which = spring.name.removeprefix("stiffness_").split("_")
-        values, names = of[kind]
-        values[int(number) - 1, names.index(which[0]) if which else 0] = factor
-    return Factors(gears[:, 0], bearings, beams)

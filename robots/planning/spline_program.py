@@ -52,6 +52,7 @@ def solve(
     bounds: tuple[np.ndarray, np.ndarray],
     iterations: int,
     squares: tuple[np.ndarray, np.ndarray] | None = None,
+    linear: tuple[np.ndarray, np.ndarray, np.ndarray] | None = None,
 ) -> Solution:
     """Minimises the cost within the bounds.
 
@@ -64,6 +65,7 @@ def solve(
         bounds: of x, shape (size,) each.
         iterations: at most.
         squares: A, shape (k, size), and b, shape (k,): the cost has half the sum of squares of A x + b.
+        linear: A, shape (l, size), with lower and upper limits of A x, shape (l,).
     """
     size, count = matrix.shape[1], len(weights)
     n, r, m = program.bounded.size1_in(0), len(program.lower), program.means.size1_out(0)
@@ -74,13 +76,17 @@ def solve(
     g = ca.vertcat(ca.vec(bounded), means)
     f = ca.sum2(program.cost.map(count)(y, w))
     parts = _parts(program, n, r, m)
-    nothing, of_f, of_g = ca.MX.sym("p", 0), ca.MX.sym("lam_f"), ca.MX.sym("lam_g", g.shape[0])
+    nothing, of_f, of_g = (
+        ca.MX.sym("p", 0),
+        ca.MX.sym("lam_f"),
+        ca.MX.sym("lam_g", g.shape[0] + (0 if linear is None else len(linear[0]))),
+    )
     slopes = _blocks(parts["slope"].map(count)(y), n) @ matrix
     of_means = ca.reshape(parts["mean_slope"].map(count)(y), m, n * count)
     spread = ca.repmat(w, n, 1)
     jacobian = ca.vertcat(slopes, (of_means * ca.repmat(ca.vec(spread).T, m, 1)) @ matrix)
     multipliers = ca.reshape(of_g[: r * count], r, count)
-    of_each = ca.repmat(of_g[r * count :], 1, count)
+    of_each = ca.repmat(of_g[r * count : r * count + m], 1, count)
     curvature = parts["curvature"].map(count)(y, w, multipliers, of_each, ca.repmat(of_f, 1, count))
     full = matrix.T @ _blocks(curvature, n) @ matrix
     if squares is not None:
@@ -88,6 +94,9 @@ def solve(
         f = f + 0.5 * ca.sumsqr(A @ x + ca.DM(squares[1]))
         full = full + of_f * (A.T @ A)
     hessian = ca.triu(full)
+    A, *between = linear or (np.zeros((0, size)), np.zeros(0), np.zeros(0))
+    # They have no part in the Hessian, which takes the multipliers of the rows before them.
+    g, jacobian = ca.vertcat(g, ca.DM(A) @ x), ca.vertcat(jacobian, ca.sparsify(ca.DM(A)))
     options = {
         "print_time": False,
         "ipopt.print_level": 0,
@@ -105,8 +114,8 @@ def solve(
         x0=start,
         lbx=bounds[0],
         ubx=bounds[1],
-        lbg=np.append(np.tile(program.lower, count), np.full(m, -np.inf)),
-        ubg=np.append(np.tile(program.upper, count), np.ones(m)),
+        lbg=np.concatenate([np.tile(program.lower, count), np.full(m, -np.inf), between[0]]),
+        ubg=np.concatenate([np.tile(program.upper, count), np.ones(m), between[1]]),
     )
     stats = solver.stats()
     return Solution(np.array(found["x"]).ravel(), int(stats["iter_count"]), str(stats["return_status"]))

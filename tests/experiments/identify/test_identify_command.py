@@ -139,10 +139,10 @@ REFUSED = {
     "robot": (["--robot=kr211"], "robot 'kr211': no file"),
     "plant": (["--robot=irb140"], "has no variant named irb140-realistic: say what moves by --plant"),
     "recording": (["--recording=none.csv"], "column map none.yaml"),
-    "both": (["--recording=none.csv", "--cases=mine.yaml"], "takes no --cases"),
+    "both": (["--recording=none.csv", "--motions=mine.yaml"], "no --motions"),
     "columns": (["--columns=mine.yaml"], "--columns says what a --recording has"),
     "slow": (["--slow=slow.csv"], "--slow says more of what was recorded"),
-    "cases": (["--cases=mine.yaml"], "cases mine.yaml"),
+    "cases": (["--motions=mine.yaml"], "cases mine.yaml"),
     "report": (["--report=identify.txt"], "its name must end in .html"),
     "jobs": (["--jobs=0"], "--jobs must be at least 1, got 0"),
 }  # fmt: skip
@@ -171,7 +171,7 @@ def test_springs_that_are_a_fifth_softer_than_believed_are_found(tmp_path: Path)
     result = run(
         tmp_path,
         f"--plant={softer}",
-        f"--cases={tmp_path / 'cases.yaml'}",
+        f"--motions={tmp_path / 'cases.yaml'}",
         "--no-gear-parts",
         "--no-rectangle",
         "--jobs=2",

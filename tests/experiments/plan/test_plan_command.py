@@ -122,6 +122,7 @@ REFUSED = {
     "tool speed": ("--tool-speed=0", "the speed of the tool must be positive, got 0"),
     "duty": ("--duty=0", "the duty must be above 0 and at most 1, got 0"),
     "reserve": ("--reserve=1", "--reserve must be at least 0 and below 1, got 1"),
+    "obstacles": ("--obstacles=boxes.yaml", "--obstacles counts on free ways only; give --free too"),
     "program": ("--program=vb", "--program must be one of rapid, krl, got 'vb'"),
     "payload": ("--payload=17", "payload of KUKA KR 16-2 must be between 0 and 16"),
 }  # fmt: skip
@@ -130,4 +131,10 @@ REFUSED = {
 @pytest.mark.parametrize(("option", "message"), REFUSED.values(), ids=REFUSED)
 def test_wrong_input_is_refused_in_one_line_and_leaves_nothing(tmp_path: Path, option: str, message: str):
     assert message in refusal(run(tmp_path, option))
+    assert files(tmp_path) == set()
+
+
+def test_a_free_way_has_no_program(tmp_path: Path):
+    message = refusal(run(tmp_path, "--path=joints", "--free", "--program=krl"))
+    assert "--program has no move for a free way; leave out --free or use --write" in message
     assert files(tmp_path) == set()

@@ -7,8 +7,8 @@ import pytest
 
 from robots.description.model import load_robot
 from robots.dynamics.modes import ModalAnalysis
-from robots.identification.arm_along_motion import ElasticArm
-from robots.identification.arm_response import ArmResponse
+from robots.identification.arm_along_motion import ArmAlongMotion, ElasticArm
+from robots.identification.arm_response import ArmResponse, Grid
 from robots.identification.elastic_parameters import ElasticParameters
 from robots.identification.motion import MotionCase, SensorPlace
 
@@ -94,3 +94,63 @@ def test_it_rings_with_the_natural_frequency_of_the_robot(arm: ElasticArm):
     found = np.fft.rfftfreq(2**15, 2.0 * PERIOD)[int(np.argmax(spectrum))]
     modes = ModalAnalysis(load_robot("kr210"), payload=PAYLOAD).at(POSITION)
     assert np.abs(modes.frequency_hz[:3] / found - 1.0).min() < 0.05
+
+
+def test_about_a_motion_that_rings_the_equations_are_those_of_the_arm(arm: ElasticArm):
+    """Load and readings are then right to the second degree: those of the inverse dynamics."""
+    motion, rng = case(0.01, 60), np.random.default_rng(1)
+    along = arm.along(motion, knot_time=0.03)
+    t, e = motion.times[:, None], len(arm.sprung)
+    wave, w = 2e-3 * rng.normal(size=e), 2.0 * np.pi * 15.0
+    moved = np.stack([wave * np.sin(w * t), w * wave * np.cos(w * t), -w * w * wave * np.sin(w * t)], 1)
+    near = arm.about(motion, along, moved)
+    k = int(along.knots[1])  # where nothing is interpolated
+    x, v, a = moved[k]
+    q, qd, qdd = np.zeros((3, arm.size))
+    q[arm.motors], qd[arm.motors], qdd[arm.motors] = motion.theta[k], motion.rate[k], motion.acceleration[k]
+    q[arm.sprung], qd[arm.sprung], qdd[arm.sprung] = x, v, a
+    torques, shown = arm.evaluate(q, qd, qdd)
+
+    def errors(motion: ArmAlongMotion) -> tuple[float, float]:
+        x_0 = motion.rest[1]
+        of_torque = motion.mass[1] @ a + motion.coriolis[1] @ v + motion.stiffness[1] @ (x - x_0)
+        of_shown = motion.by_acceleration[1] @ a + motion.by_speed[1] @ v + motion.by_turn[1] @ (x - x_0)
+        return (
+            float(np.abs(of_torque + motion.load[k] - torques).max()),
+            float(np.abs(of_shown + motion.readings[k] - shown).max()),
+        )
+
+    before, after = errors(along), errors(near)
+    assert after[0] < 1e-3 * before[0]
+    assert after[1] < 1e-3 * before[1]
+
+
+def test_a_gear_without_load_begins_where_it_is_said_to_rest(arm: ElasticArm):
+    """Axis 1 carries nothing before a motion: each half of its play turns the base by as much."""
+    motion = case(0.0, 20)
+    parameters = ElasticParameters(arm, gear_parts=True)
+    along, ratio = arm.along(motion), load_robot("kr210").gear_ratio
+    turned = []
+    for share in (-1.0, 0.0, 1.0):
+        rests = np.zeros((1, 6))
+        rests[0, 0] = share
+        model = ArmResponse([along], [motion], SENSORS, parameters, ratio, rests=rests)
+        assert model.unloaded(parameters.start)[0, 0]
+        assert not model.unloaded(parameters.start)[0, 1]
+        turned.append(model(parameters.start, sensitivity=False).moved[0][0, 0, 0])
+    half = 0.5 * parameters.numbers(parameters.start).play[0]
+    np.testing.assert_allclose(turned, [-half, 0.0, half], atol=1e-6)
+
+
+def test_half_the_step_leaves_a_quarter_of_the_error(arm: ElasticArm):
+    """Linear gears, a fast motion, knots of 20 ms: the rule is of second order, and nothing else errs."""
+    motion = case(0.2, 240, duration=0.15)
+    parameters = ElasticParameters(arm, gear_parts=False)
+    along, ratio = arm.along(motion), load_robot("kr210").gear_ratio
+    once, twice, four = (
+        ArmResponse([along], [motion], SENSORS, parameters, ratio, Grid(steps))(
+            parameters.start, sensitivity=False
+        ).readings[..., :3]
+        for steps in (1, 2, 4)
+    )
+    assert np.linalg.norm(twice - four) < 0.4 * np.linalg.norm(once - twice)

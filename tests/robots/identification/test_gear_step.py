@@ -1,4 +1,6 @@
-"""Gears at the end of a step carry what the parts of the drive trains say of the same motion."""
+"""A gear at the end of a step carries what the parts of the drive trains say of the same motion."""
+
+import math
 
 import numpy as np
 import pytest
@@ -6,17 +8,15 @@ import pytest
 from robots.drivetrain.dahl import DahlHysteresis
 from robots.drivetrain.stiffness import CubicSpring
 from robots.drivetrain.train import DriveTrains, JointTrain
-from robots.identification.elastic_parameters import ArmNumbers
-from robots.identification.gear_step import Gears
+from robots.identification.response_kernels import gear_step
 
 STIFFNESS, TIME, LUBRICANT, SHARE, WIDTH = 1e6, 1e-3, 0.3, 0.1, 5e-4
 
 
-def gears(play: float) -> Gears:
-    six = np.ones(6)
-    return Gears(
-        ArmNumbers(STIFFNESS * six, TIME * six, play * six, LUBRICANT, SHARE * six, WIDTH, np.zeros((2, 6)))
-    )
+def gear(play: float) -> np.ndarray:
+    damper = TIME * STIFFNESS
+    oil = LUBRICANT * damper if play else 0.0
+    return np.array([STIFFNESS, damper, 0.5 * play, oil, SHARE * STIFFNESS, WIDTH])
 
 
 def trains(play: float) -> DriveTrains:
@@ -33,36 +33,40 @@ def trains(play: float) -> DriveTrains:
 
 
 @pytest.mark.parametrize("play", [0.0, 1.5e-4])
-def test_they_agree_with_the_drive_trains_of_the_plant(play: float):
-    rng = np.random.default_rng(0)
+def test_it_agrees_with_the_drive_trains_of_the_plant(play: float):
+    rng, none = np.random.default_rng(0), np.zeros(6)
     hysteresis = DahlHysteresis((SHARE * STIFFNESS,), (WIDTH,))
-    for _ in range(50):
-        before, turn = 3e-4 * rng.uniform(-1.0, 1.0, (2, 1, 6))
-        z, rate = 4e-4 * rng.uniform(-1.0, 1.0, (1, 6)), rng.uniform(-0.1, 0.1, (1, 6))
-        step = gears(play).step(before, z, turn, rate)
-        moved = hysteresis.moved(z[0, :, None], (turn - before)[0])
-        np.testing.assert_allclose(step.hysteresis[0], moved[:, 0], atol=1e-15)
-        found = trains(play).torques(
-            moved.ravel(), (np.zeros(6), np.zeros(6)), (turn[0], rate[0]), np.zeros(6)
-        )
-        np.testing.assert_allclose(-found.link, step.torque[0], rtol=1e-9, atol=1e-6)
+    for _ in range(100):
+        before, turn = 3e-4 * rng.uniform(-1.0, 1.0, 2)
+        z, rate = 4e-4 * rng.uniform(-1.0, 1.0), rng.uniform(-0.1, 0.1)
+        torque, state, *_ = gear_step(gear(play), before, z, turn, rate)
+        moved = hysteresis.moved(np.full((6, 1), z), np.full(6, turn - before))
+        assert state == pytest.approx(moved[0, 0], abs=1e-15)
+        found = trains(play).torques(moved.ravel(), (none, none), (np.full(6, turn), np.full(6, rate)), none)
+        assert torque == pytest.approx(-found.link[0], rel=1e-9, abs=1e-6)
 
 
 @pytest.mark.parametrize("play", [0.0, 1.5e-4])
-def test_derivatives_are_differences(play: float):
-    model, h = gears(play), 1e-10
-    before, turn = np.full((1, 6), 1e-4), np.array([[-3e-4, -1e-4, 2e-5, 1.2e-4, 2e-4, 3e-4]])
-    z, rate = np.full((1, 6), 5e-5), np.full((1, 6), 0.02)
-    step = model.step(before, z, turn, rate)
-    ahead, behind = (model.step(before, z, turn + sign * h, rate) for sign in (1.0, -1.0))
-    np.testing.assert_allclose((ahead.torque - behind.torque) / (2.0 * h), step.by_turn, rtol=1e-3)
-    faster, slower = (model.step(before, z, turn, rate + sign * h) for sign in (1.0, -1.0))
-    np.testing.assert_allclose((faster.torque - slower.torque) / (2.0 * h), step.by_rate, rtol=1e-3)
+@pytest.mark.parametrize("turn", [-3e-4, -1e-4, 2e-5, 1.2e-4, 2e-4, 3e-4])
+def test_derivatives_are_differences(play: float, turn: float):
+    before, z, rate, h = 1e-4, 5e-5, 0.02, 1e-10
+    _, _, by_turn, by_rate, kept, state_by_turn, *_ = gear_step(gear(play), before, z, turn, rate)
+
+    def difference(of: int, turn_by: float = 0.0, rate_by: float = 0.0, z_by: float = 0.0) -> float:
+        ahead, behind = (
+            gear_step(gear(play), before, z + s * z_by, turn + s * turn_by, rate + s * rate_by)[of]
+            for s in (1.0, -1.0)
+        )
+        return (ahead - behind) / (2.0 * h)
+
+    assert difference(0, turn_by=h) == pytest.approx(by_turn, rel=1e-3)
+    assert difference(0, rate_by=h) == pytest.approx(by_rate, rel=1e-3)
+    assert difference(1, turn_by=h) == pytest.approx(state_by_turn, rel=1e-3)
+    assert difference(1, z_by=h) == pytest.approx(kept, rel=1e-3)
 
 
-def test_a_load_is_carried_beyond_the_play():
-    load = 500.0 * np.array([[1.0, -1.0, 2.0, -2.0, 3.0, -3.0]])
-    model = gears(1e-4)
-    turn = model.at_rest(load)
-    step = model.step(turn, np.zeros((1, 6)), turn, np.zeros((1, 6)))
-    np.testing.assert_allclose(step.torque, load)
+def test_a_step_of_a_straight_gear_knows_no_play():
+    torque, _, _, _, _, _, out, elastic, damped, oiled = gear_step(gear(0.0), 0.0, 0.0, 2e-4, 0.01)
+    assert (out, oiled) == (1.0, 0.0)
+    assert elastic == pytest.approx(STIFFNESS * 2e-4 + damped)
+    assert torque == pytest.approx(elastic + SHARE * STIFFNESS * WIDTH * (1.0 - math.exp(-0.4)))

@@ -1,0 +1,90 @@
+"""A leg whose way does not matter: the quickest one that keeps clear of floor, obstacles and the arm."""
+
+from dataclasses import replace
+from itertools import pairwise
+
+import numpy as np
+
+from experiments.plan.legs import Leg
+from robots.description.model import RobotModel
+from robots.measurement_design.clear_ways import ClearWays
+from robots.measurement_design.constraints import AdmissibleConfig, AdmissibleConfigurations
+from robots.measurement_design.obstacles import Obstacle
+from robots.planning.free_motion import free_way
+from robots.planning.joint_path import Curve, PathError, straight_joint_path
+from robots.planning.limits import MotionLimits
+from robots.planning.optimum import optimum
+from robots.planning.path_dynamics import PathDynamics
+from robots.planning.rigid_start import rigid_start
+
+_BENT = (1.0, 0.5, 0.0)  # shares of the free way's bend that are tried
+_PIECES = 60  # in which a way is checked
+_COEFFICIENTS = 36  # of the spline that tells how quick a way is
+
+
+def free_leg(
+    robot: RobotModel,
+    payload: float,
+    leg: Leg,
+    limits: MotionLimits,
+    dynamics: str = "elastic_structure",
+    obstacles: tuple[Obstacle, ...] = (),
+) -> Leg:
+    """The leg between the same joint positions on the way on which it is quickest.
+
+    The free way of a rigid arm, half of its bend, the straight way of the joints and the leg as it is are
+    tried, as far as they are clear.
+
+    Args:
+        robot: that moves.
+        payload: kg.
+        leg: that the way may replace.
+        limits: of the motion.
+        dynamics: of `robots.planning.path_dynamics.DYNAMICS`, that decide.
+        obstacles: boxes that the arm keeps clear of.
+
+    Raises:
+        PathError: if all ways are blocked, with the place, or the limits admit no motion.
+    """
+    start, goal = leg.path.at(np.array([0.0, 1.0]))
+    straight, bent = straight_joint_path(start, goal), free_way(robot, payload, start, goal, limits).path
+    legs = [replace(leg, path=blended(straight, bent, share), is_straight=False) for share in _BENT]
+    config = AdmissibleConfig(obstacles=obstacles)
+    ways = ClearWays(robot, AdmissibleConfigurations(robot, config), config.clearance)
+    blocked = [_blocked(ways, each.path) for each in (*legs, leg)]
+    clear = [each for each, place in zip((*legs, leg), blocked, strict=True) if place is None]
+    if not clear:
+        raise PathError(
+            f"the arm touches itself, the floor or an obstacle at {100.0 * max(filter(None, blocked)):.0f} % "
+            "of the way; a target in between may lead it round"
+        )
+    return min(clear, key=lambda each: _duration(robot, payload, each.path, limits, dynamics))
+
+
+def blended(straight: Curve, bent: Curve, share: float) -> Curve:
+    """A path with so much of the bend of another one."""
+    coefficients = share * bent.coefficients
+    coefficients[: len(straight.coefficients)] += (1.0 - share) * straight.coefficients
+    return Curve(coefficients)
+
+
+def _duration(robot: RobotModel, payload: float, path: Curve, limits: MotionLimits, dynamics: str) -> float:
+    """In s, of the quickest motion; infinite where none is found."""
+    try:
+        found = optimum(
+            PathDynamics(robot, payload, path, dynamics),
+            limits,
+            rigid_start(robot, payload, path, limits, _COEFFICIENTS),
+        )
+    except PathError:
+        return np.inf
+    return found.motion.duration if found.is_solved else np.inf
+
+
+def _blocked(ways: ClearWays, path: Curve) -> float | None:
+    """Where a path is blocked, above 0 to 1; None if it is clear."""
+    s = np.linspace(0.0, 1.0, _PIECES + 1)
+    for number, (before, after) in enumerate(pairwise(path.at(s)), 1):
+        if not ways.is_clear(before, after):
+            return float(s[number])
+    return None
