@@ -19,7 +19,7 @@ export PYRIGHT_PYTHON_IGNORE_WARNINGS := 1
 
 PIP := $(BIN)/python -m pip --quiet --disable-pip-version-check
 
-.PHONY: demo test docs lint lint-rules lint-format lint-types lint-floors bench clean
+.PHONY: demo test docs detector lint lint-rules lint-format lint-types lint-floors bench clean
 
 demo: .venv/installed
 	$(BIN)/truetip compare --out $(OUT)
@@ -34,6 +34,10 @@ test: .venv/installed-dev
 docs: .venv/installed-dev
 	NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --quiet --strict
 	@echo "The manual: site/index.html"
+
+# A network that finds people in single images, for `truetip watch --network`; its licence is printed.
+detector: .venv/installed-dev
+	$(BIN)/python -m experiments.watch.fetch_detector
 
 # make --keep-going lint shows the findings of all four.
 lint: lint-rules lint-format lint-types lint-floors

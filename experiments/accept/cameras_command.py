@@ -12,7 +12,7 @@ from rich.markup import escape
 from experiments.cli.console import print_files, refusing
 from experiments.cli.json_output import human_console, json_output
 from experiments.cli.option_limits import at_least, positive
-from experiments.cli.options import JsonOption, OnlyPictureOption
+from experiments.cli.options import JsonOption, PictureOption
 from experiments.cli.staging import PAGE, staged_file
 from experiments.report.plot_page import Section, html_table, write_plot_page
 from robots.text_table import TextTableError, finite_number, parse_fields, read_text
@@ -20,6 +20,17 @@ from systems.vision.camera_rig import load_cell
 from systems.vision.triangulation import triangulate
 
 COLUMNS = ("line", "nominal_mm", "measured_mm")
+# Of what `judged` says, for people.
+_NAMES = {
+    "lines": "lines",
+    "lengths": "lengths",
+    "largest_length_error_mm": "largest error of a length, mm",
+    "at_line": "on line",
+    "at_length_mm": "at the length, mm",
+    "probing_error_mm": "probing error, mm",
+    "limit_mm": "permitted error of a length, mm",
+    "passed": "passed",
+}
 LINES, LEAST_LENGTHS = 7, 5
 _PROBED = 25  # times that one ball is measured for the probing error
 # Directions of the lines in a box: its space diagonals, and three parallel to its edges.
@@ -40,27 +51,29 @@ def accept_cameras_command(
     ] = "probst",
     calibration: Annotated[
         str | None,
-        typer.Option(metavar="FILE.yaml", help="What is believed of them.", show_default="the truth"),
+        typer.Option(metavar="FILE.yaml", help="What is believed of the cameras.", show_default="the truth"),
     ] = None,
     limit: Annotated[float, typer.Option(metavar="MM", help="Largest permissible error of a length.")] = 0.2,
-    box_mm: Annotated[float, typer.Option("--box", metavar="MM", help="Edge of the volume.")] = 1000.0,
+    cube_mm: Annotated[
+        float, typer.Option("--cube", metavar="MM", help="Edge of the cube that is tested.")
+    ] = 1000.0,
     pixel_sigma: Annotated[
         float, typer.Option("--pixel-sigma", metavar="PX", help="Noise of an image coordinate.")
     ] = 0.1,
     count: Annotated[int, typer.Option(metavar="N", help="Lengths on each line.")] = LEAST_LENGTHS,
-    seed: Annotated[int, typer.Option(metavar="N", help="Of the noise.")] = 0,
-    out: OnlyPictureOption = Path("out/accept-cameras.html"),
+    seed: Annotated[int, typer.Option(metavar="N", help="Seed of the noise.")] = 0,
+    out: PictureOption = Path("out/accept-cameras.html"),
     json_file: JsonOption = None,
 ) -> None:
     """Test the lengths that the cameras measure, simulated or recorded, against a stated maximum."""
     human = human_console(json_file)
     with json_output(json_file) as output, refusing(ValueError, OSError), ExitStack() as stack:
         at_least("--count", LEAST_LENGTHS, count)
-        for name, value in (("--limit", limit), ("--box", box_mm), ("--pixel-sigma", pixel_sigma)):
+        for name, value in (("--limit", limit), ("--cube", cube_mm), ("--pixel-sigma", pixel_sigma)):
             positive(name, value)
         probing = None
         if lengths is None:
-            table, probing = simulated(cell, calibration or cell, 1e-3 * box_mm, pixel_sigma, count, seed)
+            table, probing = simulated(cell, calibration or cell, 1e-3 * cube_mm, pixel_sigma, count, seed)
         else:
             table = read_lengths(lengths)
         numbers = judged(table, probing, limit)
@@ -74,10 +87,10 @@ def accept_cameras_command(
         for sign in (-1.0, 1.0):
             figure.add_hline(y=sign * limit, line={"dash": "dot", "width": 1})
         figure.update_layout(xaxis={"title": "length in mm"}, yaxis={"title": "measured less nominal in mm"})
-        rows = [[name, str(value)] for name, value in numbers.items()]
+        rows = [[_NAMES[name], _said(value)] for name, value in numbers.items()]
         sections = [
             Section("Errors of the lengths", "Dotted: what is permitted.", figure),
-            Section("Numbers", "", html_table(("name", "value"), rows)),
+            Section("Numbers", "", html_table(("what", "value"), rows)),
         ]
         write_plot_page(page, "Acceptance of the cameras", _verdict(numbers), sections)
         output.write(numbers)
@@ -107,7 +120,7 @@ def simulated(
         pixels[~inside] = np.nan
         found = triangulate(known, pixels, pixel_sigma).p_W
         if np.isnan(found).any():
-            raise ValueError(f"--box {1e3 * edge:g}: a ball is not seen by two cameras; make it smaller")
+            raise ValueError(f"--cube {1e3 * edge:g}: a ball is not seen by two cameras; make it smaller")
         return found
 
     for number, direction in enumerate(_DIRECTIONS, 1):
@@ -169,6 +182,12 @@ def judged(table: np.ndarray, probing: float | None, limit: float) -> dict[str, 
         "limit_mm": limit,
         "passed": bool(np.abs(error).max() <= limit),
     }
+
+
+def _said(value: float | bool | None) -> str:
+    if value is None:
+        return "not measured"
+    return ("no", "yes")[value] if isinstance(value, bool) else f"{value:g}"
 
 
 def _verdict(numbers: dict[str, Any]) -> str:

@@ -24,7 +24,14 @@ from experiments.accept.robot_page import Row, table_rows, verdict, write_accept
 from experiments.cli.console import print_files, progress_bar, refusing
 from experiments.cli.json_output import human_console, json_output
 from experiments.cli.option_limits import at_least, positive
-from experiments.cli.options import JsonOption, OnlyPictureOption, RobotOption, ScenarioOption, SetOption
+from experiments.cli.options import (
+    JsonOption,
+    LawOption,
+    PictureOption,
+    RobotOption,
+    ScenarioOption,
+    SetOption,
+)
 from experiments.cli.prepare import Prepared, prepare, simulated_only
 from experiments.cli.staging import PAGE, staged_file
 from experiments.comparison.compare import RunJob, run_job
@@ -36,20 +43,20 @@ def accept_robot_command(
     scenario: ScenarioOption = "misaligned",
     settings: SetOption = None,
     robot: RobotOption = None,
-    law: Annotated[
-        str | None, typer.Option(metavar="NAME", help="Which law.", show_default="the scenario's")
-    ] = None,
+    law: LawOption = None,
     cycles: Annotated[int, typer.Option(metavar="N", help="Cycles of poses and of the square.")] = 30,
-    cube: Annotated[float, typer.Option(metavar="MM", help="Edge of the cube.")] = 250.0,
+    cube: Annotated[float, typer.Option(metavar="MM", help="Edge of the cube that is tested.")] = 250.0,
     loads: Annotated[
         str | None, typer.Option(metavar="KG,KG", help="Masses at the flange.", show_default="the scenario's")
     ] = None,
     speeds: Annotated[
         str, typer.Option(metavar="PERCENT,...", help="Shares of the speed of the moves.")
     ] = "100",
-    dwell: Annotated[float, typer.Option(metavar="S", help="At rest at every pose.")] = 1.0,
-    band: Annotated[float, typer.Option(metavar="MM", help="Within which a pose counts as stable.")] = 0.1,
-    out: OnlyPictureOption = Path("out/accept-robot.html"),
+    dwell: Annotated[float, typer.Option(metavar="S", help="Time at rest at every pose.")] = 1.0,
+    band: Annotated[
+        float, typer.Option(metavar="MM", help="Distance within which a pose counts as stable.")
+    ] = 0.1,
+    out: PictureOption = Path("out/accept-robot.html"),
     json_file: JsonOption = None,
 ) -> None:
     """Run the test cycle of ISO 9283 and print its table of poses, distances, path, corners and velocity."""

@@ -15,7 +15,7 @@ from diagrams.record.topics import JOINTS, POSE
 from experiments.cli.console import print_files, refusing
 from experiments.cli.json_output import human_console, json_output
 from experiments.cli.option_limits import positive
-from experiments.cli.options import JsonOption, OnlyPictureOption
+from experiments.cli.options import JsonOption, PictureOption
 from experiments.cli.staging import PAGE, staged_file
 from experiments.report.plot_page import Section, html_table, write_plot_page
 from robots.description.model import load_robot
@@ -46,9 +46,9 @@ def accept_tracker_command(
         str,
         typer.Option("--robot", metavar="NAME|FILE", help="Whose joints tell which instrument is wrong."),
     ] = "irb1200",
-    unit: Annotated[str, typer.Option(metavar="mm|m", help="Of the coordinates.")] = "mm",
+    unit: Annotated[str, typer.Option(metavar="mm|m", help="Unit of the coordinates.")] = "mm",
     window: Annotated[float, typer.Option(metavar="S", help="By which the clocks may differ at most.")] = 2.0,
-    out: OnlyPictureOption = Path("out/accept-tracker.html"),
+    out: PictureOption = Path("out/accept-tracker.html"),
     json_file: JsonOption = None,
 ) -> None:
     """Compare the camera of a run with a second instrument, such as a laser tracker."""

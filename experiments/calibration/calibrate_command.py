@@ -79,8 +79,9 @@ def calibrate_command(
         str,
         typer.Option(
             metavar="FILE|source|estimate",
-            help="What is known of the noise: a YAML file with joint_deg, position_mm and rotation_deg, or "
-            "source for Probst's table 6.1; estimate for nothing. A simulation adds it to every row.",
+            help="What is known of the noise: a YAML file with joint_deg, position_mm and, for poses, "
+            "rotation_deg, or source for Probst's table 6.1; estimate for nothing. A simulation adds it to "
+            "every row.",
         ),
     ] = ESTIMATE,
     position_only: Annotated[
@@ -125,6 +126,7 @@ def calibrate_command(
     cell: Annotated[
         str | None,
         typer.Option(
+            "--instruments",
             metavar="FILE.yaml",
             help="What is known of targets and instruments, for a table with a column target or instrument.",
         ),
@@ -159,7 +161,7 @@ def calibrate_command(
                 measurements,
                 cell,
                 validation,
-                noise_option(noise),
+                noise_option(noise, has_rotation=False),
                 tuple(wanted.fixed),
                 wanted.joint_errors,
                 wanted.compliance,
@@ -170,7 +172,7 @@ def calibrate_command(
             )
             return
         if cell is not None:
-            raise ValueError("--cell is for a table with a column target, instrument or distance")
+            raise ValueError("--instruments is for a table with a column target, instrument or distance")
         if not wanted.is_given:  # of tables nothing but the kinematics is asked
             measure = "measure there (truetip design --program) and give the table with --measurements"
             simulated_only(prepared, "calibrate", measure)
@@ -232,7 +234,7 @@ class _Wanted:
                     )
         if self.count is not None:
             at_least("--count", 5, self.count)
-        noise_option(self.noise)
+        noise_option(self.noise, has_rotation=False)  # what was measured is not known yet
         names_of(self.joint_errors)
 
     def check_instruments(self) -> None:
@@ -265,6 +267,7 @@ def _read(prepared: Prepared, wanted: _Wanted) -> _Measured:
 def _simulated(prepared: Prepared, wanted: _Wanted) -> _Measured:
     """Design and measurements of a simulated calibration."""
     scenario, robot, count = prepared.scenario, prepared.robot, wanted.count or _COUNT
+    noise = noise_option(wanted.noise, not wanted.position_only)
     started = time.perf_counter()
     with progress_bar(f"choosing {count} configurations") as progress:
         design = design_measurements(
@@ -282,9 +285,7 @@ def _simulated(prepared: Prepared, wanted: _Wanted) -> _Measured:
     if wanted.compliance:  # how far joints yield shows between two loads
         payloads.append(0.0 if payloads[0] > 0.0 else robot.payload.largest_mass)
     with progress_bar(f"measuring {len(payloads) * count + len(fresh)} poses") as progress:
-        sets = measure_sets(
-            scenario, design.configurations, fresh, payloads, noise_option(wanted.noise), progress=progress
-        )
+        sets = measure_sets(scenario, design.configurations, fresh, payloads, noise, progress=progress)
     return _Measured(sets, design=design, design_seconds=seconds)
 
 
@@ -293,9 +294,8 @@ def _study(prepared: Prepared, wanted: _Wanted, measured: _Measured) -> Calibrat
     robot, sets = prepared.robot, measured.sets
     table = sets.calibration.without_rotation() if wanted.position_only else sets.calibration
     position_only = table.rotation is None
-    config = identification_config(
-        wanted.compliance, wanted.fixed, noise_option(wanted.noise), wanted.joint_errors
-    )
+    noise = noise_option(wanted.noise, not position_only)
+    config = identification_config(wanted.compliance, wanted.fixed, noise, wanted.joint_errors)
     identified = identify(robot, table, config)
     calibrated = identified.calibrated_robot(prepared.scenario.robot)
     rigid = None

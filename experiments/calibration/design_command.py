@@ -80,14 +80,15 @@ def design_command(
     ] = False,
     seed: Annotated[int, typer.Option(metavar="N", help="Seed of the search.")] = 0,
     out: Annotated[
-        str | None, typer.Option(metavar="FILE.csv", help="The configurations, in the order of the visits.")
+        str | None,
+        typer.Option("--write", metavar="FILE.csv", help="The configurations, in the order of the visits."),
     ] = None,
     program: Annotated[
         str | None,
         typer.Option(
             metavar="rapid|krl",
             help="Also write the run as a robot program, with moves, settling and trigger, and the table "
-            "that it will fill; beside --out.",
+            "that it will fill; beside --write.",
         ),
     ] = None,
     settle: Annotated[
@@ -241,7 +242,8 @@ def write_design_page(path: Path, robot: RobotModel, design: MeasurementDesign) 
         ),
         Section(
             "Positions of the joints",
-            f"The criterion {design.criterion.upper()}: {_MEASURES[design.criterion]}.",
+            f"The criterion {design.criterion.upper()}: {_MEASURES[design.criterion]}. "
+            "Bars are the ranges of the joints.",
             joints_figure(design.configurations, robot.lower, robot.upper),
             380,
         ),

@@ -13,7 +13,7 @@ from experiments.cameras.budget import Budget, budget
 from experiments.cli.console import print_files, progress_bar, refusing
 from experiments.cli.json_output import human_console, json_output
 from experiments.cli.option_limits import at_least
-from experiments.cli.options import JsonOption, OnlyPictureOption, ScenarioOption, SetOption
+from experiments.cli.options import JsonOption, PictureOption, ScenarioOption, SetOption
 from experiments.cli.prepare import prepare
 from experiments.cli.staging import PAGE, staged_file
 from experiments.report.figure_style import COLORS
@@ -39,25 +39,37 @@ def budget_command(
         typer.Option(metavar="FILE.mcap", help="Poses of a recorded run in place of the scenario's path."),
     ] = None,
     pixel: Annotated[
-        float, typer.Option("--pixel-sigma", metavar="PX", help="Of a marker in an image.")
+        float, typer.Option("--pixel-sigma", metavar="PX", help="Noise of an image coordinate of a marker.")
     ] = _GIVEN.pixel,
     camera_mm: Annotated[
-        float, typer.Option("--camera-mm", metavar="MM", help="Of the place of each camera.")
+        float,
+        typer.Option("--camera-mm", metavar="MM", help="Standard deviation of the place of each camera."),
     ] = 1e3 * _GIVEN.camera_position,
     camera_urad: Annotated[
-        float, typer.Option("--camera-urad", metavar="URAD", help="Of the direction of each camera.")
+        float,
+        typer.Option(
+            "--camera-urad", metavar="URAD", help="Standard deviation of the direction of each camera."
+        ),
     ] = 1e6 * _GIVEN.camera_rotation,
     tool_mm: Annotated[
-        float, typer.Option("--tool-mm", metavar="MM", help="Of the tool in the frame of the markers.")
+        float,
+        typer.Option(
+            "--tool-mm", metavar="MM", help="Standard deviation of the tool in the frame of the markers."
+        ),
     ] = 1e3 * _GIVEN.tool_position,
     time_ms: Annotated[
-        float, typer.Option("--time-ms", metavar="MS", help="Of time stamps between camera and robot.")
+        float,
+        typer.Option(
+            "--time-ms", metavar="MS", help="Standard deviation of time stamps between camera and robot."
+        ),
     ] = 1e3 * _GIVEN.time_stamp,
     temperature: Annotated[
         float, typer.Option(metavar="K", help="By which the cell is warmer or colder at most.")
     ] = _GIVEN.temperature,
-    draws: Annotated[int, typer.Option(metavar="N", help="Of the Monte Carlo at each of five poses.")] = 400,
-    out: OnlyPictureOption = Path("out/budget.html"),
+    draws: Annotated[
+        int, typer.Option(metavar="N", help="Draws of the Monte Carlo at each of five poses.")
+    ] = 400,
+    out: PictureOption = Path("out/budget.html"),
     json_file: JsonOption = None,
 ) -> None:
     """Say how uncertain measured poses are along a path, and which cause has which share."""

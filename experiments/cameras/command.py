@@ -29,7 +29,7 @@ from experiments.cli.option_limits import at_least, positive
 from experiments.cli.options import (
     JobsOption,
     JsonOption,
-    OnlyPictureOption,
+    PictureOption,
     ScenarioOption,
     SchedulerOption,
     SetOption,
@@ -85,7 +85,7 @@ def calibrate_cameras_command(
     write: Annotated[
         str | None, typer.Option(metavar="FILE.yaml", help="The cell with the calibrated cameras.")
     ] = None,
-    out: OnlyPictureOption = Path("out/cameras.html"),
+    out: PictureOption = Path("out/cameras.html"),
     json_file: JsonOption = None,
 ) -> None:
     """Calibrate poses and lenses of the cameras with a wand and an L-frame."""
@@ -140,7 +140,7 @@ def study_cameras_command(
     ] = False,
     jobs: JobsOption = None,
     scheduler: SchedulerOption = None,
-    out: OnlyPictureOption = Path("out/study.html"),
+    out: PictureOption = Path("out/study.html"),
     json_file: JsonOption = None,
 ) -> None:
     """Study how cameras, light and markers limit the pose accuracy, and the effect on the laws."""

@@ -2,19 +2,21 @@
 
 import re
 from collections.abc import Mapping
+from pathlib import Path
 from typing import Any
 
 import typer
 from typer.core import TyperGroup
 from typer.exceptions import TyperException
 
-from experiments.cli.command_table import CommandTable
+from experiments.cli.command_table import CommandTable, PlainCommand
 from experiments.cli.console import BAD_INPUT, fail
 from robots.configuration.suggestion import did_you_mean
 
 _NO_OPTION = re.compile(r"No such option: (\S+)")
 _IN_OTHER_WORDS = re.compile(r"Invalid value for '([^']*)': Input should be a valid (\w+).*")
 _KINDS = {"integer": "a whole number", "number": "a number", "boolean": "true or false"}
+_EXTRA = re.compile(r"Got unexpected extra argument\S* \(([^)]*)\)")
 _NO_COMMAND = re.compile(r"No such command '([^']*)'")
 
 
@@ -38,6 +40,14 @@ class _Commands(TyperGroup):
             fail(_line(error, f"{ctx.command_path} {ctx.invoked_subcommand or ''}"), BAD_INPUT)
 
 
+class _App(typer.Typer):
+    """An app whose commands show the plain help."""
+
+    def command(self, name: str | None = None, *, cls: Any = PlainCommand, **more: Any) -> Any:
+        """As that of typer, with another class of command unless one is named."""
+        return super().command(name, cls=cls, **more)
+
+
 def command_app(
     help_text: str,
     no_args_is_help: bool = True,
@@ -59,7 +69,7 @@ def command_app(
             if table is not None:
                 self.commands: Any = CommandTable(table)
 
-    return typer.Typer(
+    return _App(
         cls=Commands,
         help=help_text,
         no_args_is_help=no_args_is_help,
@@ -74,6 +84,14 @@ def _plainly(found: re.Match[str]) -> str:
     return f"{found.group(1)} must be {_KINDS.get(found.group(2), found.group(2))}"
 
 
+def _takers(file: str, options: list[Any]) -> list[str]:
+    """Names of the options that take a file of this kind."""
+    suffix = Path(file).suffix
+    if not suffix or " " in file:  # a word, or several of them
+        return []
+    return [each.opts[0] for each in options if f"FILE{suffix}" in (each.metavar or "").split("|")]
+
+
 def _line(error: Any, otherwise: str = "truetip") -> str:
     """What was wrong, in which command, what was probably meant, and where to look."""
     context = getattr(error, "ctx", None)
@@ -83,6 +101,10 @@ def _line(error: Any, otherwise: str = "truetip") -> str:
     if option := _NO_OPTION.search(message):
         known = [name for each in command.params for name in each.opts] if command else []
         message = f"no option {option.group(1)}{did_you_mean(option.group(1), known)}"
+    elif extra := _EXTRA.search(message):
+        message = f"nothing is done with '{extra.group(1)}'"
+        takers = _takers(extra.group(1), command.params if command else [])
+        message += f": did you mean {takers[0]} {extra.group(1)}?" if takers else ""
     elif name := _NO_COMMAND.search(message):
         message = f"no command {name.group(1)}{did_you_mean(name.group(1), getattr(command, 'commands', {}))}"
     else:

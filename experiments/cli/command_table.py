@@ -1,13 +1,78 @@
-"""Commands that are imported when they are asked for: half of them would cost each of them a second."""
+"""Commands that are imported when they are asked for: half of them would cost each of them a second.
+
+Their help speaks of files and values, not of the types of Python.
+"""
 
 from collections.abc import Iterator, Mapping
+from contextvars import ContextVar
 from functools import cache
 from importlib import import_module
 from typing import Any
 
 import typer
+from typer.core import TyperCommand
 from typer.main import get_command_from_info, get_group
 from typer.models import CommandInfo
+
+from experiments.cli.former_options import renamed
+
+FILES_HELP = "Columns and keys of files: reference/files.html in the manual, which make docs writes to site/."
+
+_running: ContextVar[Any] = ContextVar("running", default=None)  # the context of the command that runs
+
+
+def option_with(value: str) -> str:
+    """The option of the running command that was given this value; empty where there is none."""
+    context = _running.get()
+    options = [each for each in context.command.params if each.param_type_name == "option"] if context else []
+    return next((each.opts[0] for each in options if str(context.params.get(each.name)) == value), "")
+
+
+class PlainCommand(TyperCommand):
+    """A command whose help names its arguments as they are typed and says where files are described."""
+
+    def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
+        """Takes options by their former names, too."""
+        return super().parse_args(ctx, renamed(ctx.command_path.partition(" ")[2], args))
+
+    def invoke(self, ctx: Any) -> Any:
+        """Runs it, and lets messages know what was typed."""
+        token = _running.set(ctx)
+        try:
+            return super().invoke(ctx)
+        finally:
+            _running.reset(token)
+
+    def collect_usage_pieces(self, ctx: Any) -> list[str]:
+        """What stands behind the command's name."""
+        return ["[OPTIONS]", *(_shown(each) for each in self._arguments())]
+
+    def format_options(self, ctx: Any, formatter: Any) -> None:
+        """Arguments, then options, a line each."""
+        arguments = [(_shown(each), each.help or "") for each in self._arguments()]
+        if any(text for _, text in arguments):
+            with formatter.section("Arguments"):
+                formatter.write_dl(arguments)
+        options = [
+            each.get_help_record(ctx) for each in self.get_params(ctx) if each not in self._arguments()
+        ]
+        with formatter.section("Options"):
+            formatter.write_dl([line for line in options if line])
+
+    def format_epilog(self, ctx: Any, formatter: Any) -> None:
+        """Where the files are described, for a command that reads or writes some."""
+        if any("FILE" in (each.metavar or "") or "DIR" in (each.metavar or "") for each in self.params):
+            formatter.write_paragraph()
+            formatter.write_text(FILES_HELP)
+
+    def _arguments(self) -> list[Any]:
+        return [each for each in self.params if each.param_type_name == "argument"]
+
+
+def _shown(argument: Any) -> str:
+    """The name of an argument; one that may be left out in brackets."""
+    name = str(argument.metavar or argument.name.upper())
+    return name if argument.required else f"[{name}]"
 
 
 class CommandTable(Mapping[str, Any]):
@@ -42,5 +107,7 @@ def _command(name: str, place: str) -> Any:
         command.name = name
         return command
     return get_command_from_info(
-        CommandInfo(name=name, callback=made_of), pretty_exceptions_short=True, rich_markup_mode=None
+        CommandInfo(name=name, callback=made_of, cls=PlainCommand),
+        pretty_exceptions_short=True,
+        rich_markup_mode=None,
     )

@@ -13,10 +13,12 @@ from rich.markup import escape
 from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeRemainingColumn
 from rich.table import Table
 
+from experiments.cli.command_table import option_with
 from experiments.cli.ending import exit_code
 from experiments.cli.workers import SimulationError
 
 BAD_INPUT, BROKEN_OFF = 2, 1  # exit codes
+_OBSERVED, _LONG = 2.0, 20.0  # s: of progress before a time is said; what is worth a line
 
 
 @contextmanager
@@ -33,9 +35,10 @@ def refusing(*refusals: type[Exception]) -> Iterator[None]:
 
 
 def _plain(error: Exception) -> str:
-    """The message of an error; of one of the system the file first, and no number."""
+    """The message of an error; of one of the system the option and the file first, and no number."""
     if isinstance(error, OSError) and error.filename is not None and error.strerror:
-        return f"{error.filename}: {error.strerror.lower()}"
+        option = option_with(str(error.filename))
+        return f"{option} {error.filename}: {error.strerror.lower()}".lstrip()
     return str(error)
 
 
@@ -47,12 +50,54 @@ def fail(message: str, code: int) -> None:
 
 @contextmanager
 def progress_bar(label: str) -> Iterator[Callable[[float], None]]:
-    """A progress bar on stderr, where that is a terminal; gives the function that tells it the share done."""
+    """A progress bar on stderr, where that is a terminal; gives the function that tells it the share done.
+
+    After two seconds a line says how long it takes in all, if that is long.
+    """
     console = Console(stderr=True)
     columns = (TextColumn("{task.description}"), BarColumn(), TaskProgressColumn(), TimeRemainingColumn())
     with Progress(*columns, console=console, transient=True, disable=not console.is_terminal) as bar:
         task = bar.add_task(label, total=1.0)
-        yield lambda share: bar.update(task, completed=share)
+        expected = Expected()
+
+        def told(share: float) -> None:
+            bar.update(task, completed=share)
+            seconds = expected.seconds(share, time.monotonic())
+            if console.is_terminal and seconds is not None and seconds > _LONG:
+                bar.console.print(f"{label}: about {duration(seconds)} on this machine", highlight=False)
+
+        yield told
+
+
+class Expected:
+    """How long something takes, said once, from the speed of its first seconds.
+
+    The time before the first share is not counted: it goes to imports and compilers.
+    """
+
+    def __init__(self) -> None:
+        """Nothing is known yet."""
+        self._first: tuple[float, float] | None = None  # share and time in s
+        self._said = False
+
+    def seconds(self, share: float, now: float) -> float | None:
+        """The whole time in s, after `_OBSERVED` seconds of progress; None before and later."""
+        if self._said or not 0.0 < share < 1.0:
+            return None
+        if self._first is None:
+            self._first = (share, now)
+        at, since = self._first
+        if now - since < _OBSERVED or share <= at:
+            return None
+        self._said = True
+        return (now - since) / (share - at)
+
+
+def duration(seconds: float) -> str:
+    """A time as one says it: 40 s, 3 min, 2.5 h."""
+    if seconds < 100.0:
+        return f"{round(seconds, -1):.0f} s"
+    return f"{seconds / 60.0:.0f} min" if seconds < 5400.0 else f"{seconds / 3600.0:.1f} h"
 
 
 def print_note(console: Console, note: str) -> None:

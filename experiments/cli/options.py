@@ -115,10 +115,8 @@ SchedulerOption = Annotated[
     ),
 ]
 OutOption = Annotated[Path, typer.Option("--out", metavar="DIR", help="Folder of the results.")]
-PictureOption = Annotated[Path, typer.Option("--report", metavar="FILE.html", help="The picture.")]
-# Where nothing else is written, --out names it too.
-OnlyPictureOption = Annotated[
-    Path, typer.Option("--report", "--out", metavar="FILE.html", help="The picture.")
+PictureOption = Annotated[
+    Path, typer.Option("--report", metavar="FILE.html", help="The page with the result.")
 ]
 
 

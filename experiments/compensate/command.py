@@ -34,7 +34,7 @@ def compensate_command(
         str, typer.Option("--robot", metavar="FILE.yaml", help="The robot as `truetip calibrate` wrote it.")
     ],
     out: Annotated[
-        Path, typer.Option("--out", metavar="NEW", help="The corrected program, of the same kind.")
+        Path, typer.Option("--write", metavar="NEW", help="The corrected program, of the same kind.")
     ],
     nominal: Annotated[
         str | None,
@@ -81,7 +81,7 @@ def compensate_command(
         if not believed:
             raise ValueError(f"--robot {robot} does not say which robot was calibrated; --nominal says it")
         if out.resolve() == program.resolve():
-            raise ValueError(f"--out must be another file than the program, got {out}")
+            raise ValueError(f"--write must be another file than the program, got {out}")
         new = stack.enter_context(staged_file(out, *_suffixes(program)))
         page = stack.enter_context(staged_file(report, *PAGE))
         stack.enter_context(output.staged())

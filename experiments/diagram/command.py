@@ -29,7 +29,11 @@ def diagram_command(
     robot: RobotOption = None,
     out: Annotated[
         Path,
-        typer.Option(metavar="FILE.svg|FILE.dot", help="The drawing as SVG, or its source for graphviz."),
+        typer.Option(
+            "--write",
+            metavar="FILE.svg|FILE.dot",
+            help="The drawing as SVG, or its source for graphviz.",
+        ),
     ] = Path("diagram.svg"),
     depth: Annotated[int, typer.Option(metavar="N", help="Depth to which nested diagrams are expanded.")] = 2,
 ) -> None:

@@ -28,7 +28,7 @@ def write_diagram(path: Path, diagram: Diagram, depth: int) -> None:
         OSError: if the file cannot be written.
     """
     if path.suffix not in ENDINGS:
-        raise ValueError(f"--out {path.name}: the ending must be one of {', '.join(ENDINGS)}")
+        raise ValueError(f"--write {path.name}: the ending must be one of {', '.join(ENDINGS)}")
     if depth < 1:
         raise ValueError(f"--depth must be at least 1, got {depth}")
     text = diagram.GetGraphvizString(max_depth=depth) if path.suffix == ".dot" else svg(diagram, depth)

@@ -7,7 +7,7 @@ import numpy as np
 
 from experiments.cli.console import print_files, refusing
 from experiments.cli.json_output import human_console, json_output
-from experiments.cli.options import JsonOption, OnlyPictureOption
+from experiments.cli.options import JsonOption, PictureOption
 from experiments.cli.staging import PAGE, staged_file
 from experiments.drivetrain.figures import (
     PLAY_APPROXIMATIONS,
@@ -27,7 +27,7 @@ from robots.drivetrain.parts import PARTS
 
 
 def drivetrain_command(
-    out: OnlyPictureOption = Path("out/drivetrain.html"),
+    out: PictureOption = Path("out/drivetrain.html"),
     json_file: JsonOption = None,
 ) -> None:
     """Draw friction, efficiency, play and hysteresis as in Reiner (2010), figures 2.3 to 2.6."""

@@ -17,9 +17,10 @@ from experiments.cli.options import (
     JobsOption,
     JsonOption,
     PayloadOption,
+    PictureOption,
     StudiedRobotOption,
 )
-from experiments.cli.staging import staged_file
+from experiments.cli.staging import PAGE, staged_file
 from experiments.cli.workers import usable_cores
 from experiments.feedforward.plots import TABLE_HEAD, study_verdict, table_rows, write_study_page
 from experiments.feedforward.study import (
@@ -32,8 +33,6 @@ from experiments.feedforward.study import (
 )
 from robots.description.model import RobotFileError, RobotModel, load_robot
 from systems.feedforward import FeedforwardConfig
-
-PAGE = "feedforward.html"
 
 
 def feedforward_command(
@@ -61,7 +60,7 @@ def feedforward_command(
             help="Motions with five continuous derivatives, or sin^2 acceleration, whose fourth one jumps."
         ),
     ] = True,
-    out: Annotated[Path, typer.Option("--out", metavar="DIR", help="Folder of the figures.")] = Path("out"),
+    report: PictureOption = Path("out/feedforward.html"),
     json_file: JsonOption = None,
     jobs: JobsOption = None,
 ) -> None:
@@ -73,7 +72,7 @@ def feedforward_command(
             raise ValueError(f"--plant must be one of {', '.join(PLANTS)}, got '{plant}'")
         model, realistic = load_robot(robot), _driven(robot, plant)
         mass = model.payload.largest_mass if payload is None else payload
-        page = stack.enter_context(staged_file(out / PAGE))
+        page = stack.enter_context(staged_file(report, *PAGE))
         stack.enter_context(output.staged())
         runs = len(KINDS) * (2 + len(ANGLES_DEG) * grid * grid)
         processes = min(jobs or usable_cores(), max(runs, 1))
@@ -86,7 +85,7 @@ def feedforward_command(
         output.write(study_json(study))
     human.print(_table(study))
     human.print(escape(study_verdict(study)))
-    print_files(human, out / PAGE)
+    print_files(human, report)
 
 
 def _driven(name: str, plant: str | None) -> RobotModel | None:

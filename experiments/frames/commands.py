@@ -28,7 +28,12 @@ from robots.metrology.number_table import NumberTable, parse_table, read_table
 from robots.metrology.point_registration import register_points
 from robots.metrology.tcp_calibration import tool_centre
 
-FilesArgument = Annotated[list[Path], typer.Argument(metavar="FILE...", show_default=False)]
+FilesArgument = Annotated[
+    list[Path],
+    typer.Argument(
+        metavar="FILE...", show_default=False, help="Text files of numbers, a line a point or a pose."
+    ),
+]
 UnitOption = Annotated[str, typer.Option("--unit", metavar="mm|m", help="Unit of the lengths in the files.")]
 AnglesOption = Annotated[
     str, typer.Option("--angles", metavar="deg|rad", help="Unit of the angles in the files.")
@@ -144,7 +149,10 @@ def chain_command(
 
 
 def tool_command(
-    file: Annotated[Path, typer.Argument(metavar="FILE", show_default=False)],
+    file: Annotated[
+        Path,
+        typer.Argument(metavar="FILE", show_default=False, help="A text file of numbers, a line a pose."),
+    ],
     unit: UnitOption = "mm",
     angles: AnglesOption = "deg",
     orientation: OrientationOption = "ZYX",

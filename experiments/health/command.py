@@ -93,8 +93,9 @@ def _in_words(alarm: dict[str, Any]) -> str:
     sigma, _ = _shown(alarm["sigma"], alarm["kind"])
     day = alarm["onset_s"] / DAY
     if not alarm["sigma"]:  # whether, not by how much
-        return f"{alarm['what']} since day {day:.5g}: {alarm['suggestion']}"
-    said = f"{alarm['what']} changed by {abs(size):.3g} ± {sigma:.1g} {unit} on day {day:.5g}"
+        return f"{alarm['what']} since day {round(day, 3):g}: {alarm['suggestion']}"
+    scatter = float(f"{sigma:.1g}")
+    said = f"{alarm['what']} changed by {abs(size):.3g} ± {scatter:g} {unit} on day {round(day, 3):g}"
     return f"{said}: {alarm['suggestion']}"
 
 

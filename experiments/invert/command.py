@@ -15,8 +15,8 @@ from experiments.cli.options import (
     GridOption,
     JobsOption,
     JsonOption,
-    OnlyPictureOption,
     PayloadOption,
+    PictureOption,
     StudiedRobotOption,
 )
 from experiments.cli.staging import PAGE, staged_file
@@ -41,7 +41,7 @@ def invert_command(
             "--rehearse", help="Also make each motion once to learn the springs from the motors' torques."
         ),
     ] = False,
-    out: OnlyPictureOption = Path("out/invert.html"),
+    out: PictureOption = Path("out/invert.html"),
     json_file: JsonOption = None,
     jobs: JobsOption = None,
 ) -> None:

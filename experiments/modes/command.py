@@ -16,8 +16,8 @@ from experiments.cli.json_output import human_console, json_output
 from experiments.cli.options import (
     GridOption,
     JsonOption,
-    OnlyPictureOption,
     PayloadOption,
+    PictureOption,
     StudiedRobotOption,
 )
 from experiments.cli.staging import PAGE, staged_file
@@ -37,8 +37,8 @@ def modes_command(
         str, typer.Option(metavar="NAME", help="structure, or joints for elastic gears alone.")
     ] = "structure",
     grid: GridOption = 25,
-    mode: Annotated[int, typer.Option(metavar="N", help="Number of the animated mode, from 1.")] = 1,
-    out: OnlyPictureOption = Path("out/modes.html"),
+    mode: Annotated[int, typer.Option("--shape", metavar="N", help="Which mode is animated, from 1.")] = 1,
+    out: PictureOption = Path("out/modes.html"),
     animation: Annotated[
         Path | None,
         typer.Option(
@@ -56,7 +56,7 @@ def modes_command(
         model = load_robot(robot)
         mass = model.payload.largest_mass if payload is None else payload
         if not 1 <= mode <= SHOWN_MODES:
-            raise ValueError(f"--mode must be between 1 and {SHOWN_MODES}, got {mode}")
+            raise ValueError(f"--shape must be between 1 and {SHOWN_MODES}, got {mode}")
         animation = animation or out.with_name(f"{out.stem}-animation.html")
         page, motion = (stack.enter_context(staged_file(path, *PAGE)) for path in (out, animation))
         stack.enter_context(output.staged())

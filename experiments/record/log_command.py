@@ -20,11 +20,9 @@ from experiments.cli.staging import staged_file, staged_folder
 
 def log_command(
     file: Annotated[Path, typer.Argument(metavar="FILE.mcap", help="Record of a run.")],
-    csv: Annotated[
-        Path | None, typer.Option(metavar="FOLDER", help="A table for each topic, as CSV.")
-    ] = None,
+    csv: Annotated[Path | None, typer.Option(metavar="DIR", help="A table for each topic, as CSV.")] = None,
     parquet: Annotated[
-        Path | None, typer.Option(metavar="FOLDER", help="A table for each topic, as Parquet.")
+        Path | None, typer.Option(metavar="DIR", help="A table for each topic, as Parquet.")
     ] = None,
     npz: Annotated[Path | None, typer.Option(metavar="FILE.npz", help="All topics as numpy arrays.")] = None,
 ) -> None:

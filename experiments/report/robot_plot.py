@@ -66,5 +66,5 @@ def joints_figure(q: np.ndarray, lower: np.ndarray, upper: np.ndarray) -> go.Fig
                 marker={"size": 9, "color": "#0f7cc0", "opacity": 0.25},
             )
         )  # fmt: skip
-    figure.update_layout(showlegend=False, xaxis={"title": "position in degrees; the bar is the range"})
+    figure.update_layout(showlegend=False, xaxis={"title": "position in degrees"})
     return figure

@@ -29,13 +29,13 @@ def robustness_command(
         str, typer.Option(metavar="NAME|FILE", help="Properties drawn at random for each seed.")
     ] = ("everything"),
     laws: Annotated[
-        str, typer.Option(metavar="A,B", help="Comma-separated laws.")
+        str, typer.Option(metavar="A,B,...", help="Which laws, by name or as my_law.py:MyLaw.")
     ] = "open_loop,numerical_ik",
     cases: Annotated[
-        str, typer.Option(metavar="A,B", help=f"With commas: {', '.join(CASES)}; or all.")
+        str, typer.Option(metavar="A,B,...", help=f"Which disturbances: {', '.join(CASES)}; or all.")
     ] = "plain",
     paths: Annotated[
-        str, typer.Option(metavar="A,B", help=f"With commas: {', '.join(PATHS)}.")
+        str, typer.Option(metavar="A,B,...", help=f"Which paths: {', '.join(PATHS)}.")
     ] = "rectangle",
     seeds: Annotated[int, typer.Option(metavar="N", help="Number of random robots.")] = 3,
     first_seed: Annotated[int, typer.Option(metavar="N", help="First seed.")] = 1000,

@@ -8,6 +8,8 @@ import typer
 from rich.console import Console
 
 from diagrams.runs.simulation import Experiment
+from diagrams.scenario.scenario import load_scenario
+from diagrams.scenario.scenario_file import OptionSetting
 from experiments.cli.console import (
     print_note,
     progress_bar,
@@ -46,6 +48,7 @@ from experiments.station.guided_command import (
     on_station,
     refuse_real_time,
 )
+from experiments.station.path_correction import JOINT, PATH_CORRECTION, correct_path, refuse_mode
 
 _PATIENCE = 20.0  # s, until a browser shows what is to be watched
 
@@ -76,14 +79,33 @@ def run_command(
     mcap: McapOption = False,
     foxglove: FoxgloveOption = None,
     realtime: RealTimeOption = None,
+    mode: Annotated[
+        str,
+        typer.Option(
+            metavar="NAME",
+            help="joint: a law guides the robot; path_correction: an ABB controller runs its own path and is "
+            "corrected across it.",
+        ),
+    ] = JOINT,
 ) -> None:
-    """Run one law."""
+    """Run one law, or correct the path that a controller runs itself."""
     console = Console()
     with refusing(ValueError, OSError):
         positive("--pace", pace)
         changes = option_settings(settings, law, feedforward, camera, laps)
         name, changes = on_station(scenario, changes, station, with_cell)
+        if mode == PATH_CORRECTION and load_scenario(name, changes).station.link.kind == "egm":
+            changes = [*changes, OptionSetting("station.link.run.path_correction", "true", "--mode")]
         prepared = prepare(name, changes, robot)
+        given = {
+            "--law": law, "--feedforward": feedforward, "--laps": laps, "--live": live, "--pace": pace,
+            "--write": write, "--foxglove": foxglove, "--realtime": realtime,
+        }  # fmt: skip
+        refuse_mode(mode, prepared, given)
+        if mode == PATH_CORRECTION:
+            ask_before_moving(console, prepared, with_cell or yes)
+            correct_path(console, prepared, with_cell, out)
+            return
         law = prepared.scenario.law
         check_write(write, [law])
         check(prepared, [law])

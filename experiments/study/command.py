@@ -140,7 +140,7 @@ def _write_page(path: Path, study: Study, rows: Rows, plan: Sequence[StudyRow]) 
         sections += [
             Section(
                 f"Spread: {metric_name(metric)}",
-                f"The share of runs that are at most so far off. In the tables it is {metric}.",
+                f"The share of runs that are at most so far off. In {TABLE} it is {metric}.",
                 spread_figure(study, rows, metric),
             ),
             Section(
@@ -192,8 +192,10 @@ def study_verdict(study: Study, rows: Rows) -> str:
 
 
 def _numbers_table(study: Study, rows: Rows) -> str:
-    lines = [[metric, *line] for metric in study.metrics for line in _spread_lines(study, rows, metric)]
-    return html_table(["metric", "law", "runs", "median", "95 %", "worst"], lines)
+    lines = [
+        [FIGURES[metric], *line] for metric in study.metrics for line in _spread_lines(study, rows, metric)
+    ]
+    return html_table(["what", "law", "runs", "median", "95 %", "worst"], lines)
 
 
 def _worst_table(study: Study, rows: Rows, plan: Sequence[StudyRow]) -> str:
@@ -204,5 +206,5 @@ def _worst_table(study: Study, rows: Rows, plan: Sequence[StudyRow]) -> str:
             worst = worst_row(own, metric)
             if worst is not None:
                 command = plan[int(own["row"][worst])].command
-                lines.append([metric, law_title(law), f"{own[metric][worst]:.4g}", command])
-    return html_table(["metric", "law", "value", "command"], lines)
+                lines.append([FIGURES[metric], law_title(law), f"{own[metric][worst]:.4g}", command])
+    return html_table(["largest", "law", "value", "command"], lines)

@@ -79,7 +79,7 @@ def test_no_block_covers_another_and_no_wire_runs_through_a_block(diagram: Diagr
 
 def test_the_command_writes_svg_and_dot(tmp_path: Path):
     for name in ("picture.svg", "picture.dot"):
-        assert truetip("diagram", "--law=pbvs", f"--out={tmp_path / name}").exit_code == 0
+        assert truetip("diagram", "--law=pbvs", f"--write={tmp_path / name}").exit_code == 0
     assert (tmp_path / "picture.svg").read_text().startswith("<svg ")
     dot = (tmp_path / "picture.dot").read_text()
     assert dot.startswith("digraph")

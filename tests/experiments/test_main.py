@@ -51,9 +51,9 @@ REFUSED = {
     "folder in a file": (["run", "--out=broken.yaml/out"], "cannot write in folder broken.yaml/out"),
     "json is a folder": (["compare", "--json=."], "it is a folder"),
     "json in a file": (["compare", "--json=broken.yaml/x.json"], "cannot write in folder broken.yaml"),
-    "no picture": (["diagram", "--out=diagram.png"], "must be one of .svg, .dot"),
+    "no picture": (["diagram", "--write=diagram.png"], "must be one of .svg, .dot"),
     "json without its suffix": (["compare", "--json=x"], "x: its name must end in .json"),
-    "page without its suffix": (["zeros", "--out=x"], "x: its name must end in .html"),
+    "page without its suffix": (["zeros", "--report=x"], "x: its name must end in .html"),
     "table of a robot": (["calibrate", "--write=robot.csv"], "robot.csv: its name must end in .yaml or .yml"),
     "no depth": (["diagram", "--depth=0"], "--depth must be at least 1, got 0"),
 }

@@ -83,3 +83,12 @@ def test_the_simulated_robot_is_calibrated(robot: str):
     numbers = json.loads(Path("numbers.json").read_text())
     assert numbers["converged"]
     assert numbers["rank"] == 30
+
+
+@pytest.mark.slow
+def test_measurements_are_designed(robot: str):
+    result = truetip("design", "--robot", robot, "--count=30", "--write=where.csv", "--json=numbers.json")
+    assert result.exit_code == 0, result.output
+    numbers = json.loads(Path("numbers.json").read_text())
+    assert 0.99 * numbers["bound"] <= numbers["value"] <= numbers["bound"]
+    assert len(Path("where.csv").read_text().splitlines()) == 31

@@ -12,6 +12,7 @@ async function drawForPaper() {
   const plots = new Set(document.querySelectorAll(".js-plotly-plot"));
   for (const id in own) plots.add(document.getElementById(id));
   for (const plot of plots) {
+    if (!own[plot.id] && !plot.layout) continue;  /* not drawn yet: what draws it comes here again */
     const figure = own[plot.id] || {data: plot.data,
       layout: {...plot.layout, font: {...plot.layout.font, color: paperInk}}};
     const isDeep = figure.data.some(trace => /3d|surface|gl/.test(trace.type || ""));

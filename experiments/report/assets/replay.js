@@ -147,7 +147,8 @@ function drawCourse() {
     pen.fillStyle = getComputedStyle(document.documentElement).getPropertyValue("--soft");
     pen.font = "11px system-ui, sans-serif";
     pen.textBaseline = "bottom";
-    pen.fillText(`distance from the wanted point, ${(10 ** top).toPrecision(2)} mm at the top, ${(10 ** floor).toPrecision(1)} mm at the bottom`, 8, height);
+    const ends = `${(10 ** top).toPrecision(2)} mm at the top, ${(10 ** floor).toPrecision(1)} mm at the bottom`;
+    pen.fillText(width < 480 ? `distance: ${ends}` : `distance from the wanted point, ${ends}`, 8, height);
     courseKey = key;
   }
   cursor.style.transform = `translateX(${x(state.frame)}px)`;

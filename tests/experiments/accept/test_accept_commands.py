@@ -63,7 +63,7 @@ def test_the_table_of_a_robot_has_a_column_for_each_speed(tmp_path: Path):
         (["robot", "--cube", "0"], "--cube must be positive"),
         (["robot", "--set", "station.kind=egm"], "accept robot does not drive a real station"),
         (["cameras", "--count", "4"], "--count must be at least 5, got 4"),
-        (["cameras", "--box", "1e5"], "a ball is not seen by two cameras"),
+        (["cameras", "--cube", "1e5"], "a ball is not seen by two cameras"),
         (["cameras", "--lengths", "none.csv"], "none.csv"),
     ],
 )

@@ -37,7 +37,7 @@ def invoked(*arguments: object):
 
 
 def test_the_camera_that_is_wrong_is_named(files, tmp_path):
-    result = invoked(*files, "--out", tmp_path / "t.html", "--json", "-")
+    result = invoked(*files, "--report", tmp_path / "t.html", "--json", "-")
     assert result.exit_code == 0, result.stderr
     found = json.loads(result.stdout)
     assert found["lag_s"] == pytest.approx(0.2, abs=1e-3)
@@ -56,7 +56,7 @@ def test_what_cannot_be_compared_is_refused_in_one_line(files, tmp_path):
         ("back.csv", "back.csv, line 301: the time does not rise"),
         ("none.csv", "none.csv: no such file"),
     ):
-        result = invoked(record, tmp_path / table, "--out", tmp_path / "t.html")
+        result = invoked(record, tmp_path / table, "--report", tmp_path / "t.html")
         assert result.exit_code == 2
         assert message in result.stderr
         assert len(result.stderr.strip().splitlines()) == 1

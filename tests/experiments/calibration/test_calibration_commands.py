@@ -37,7 +37,7 @@ def calibrated(tmp_path_factory: pytest.TempPathFactory) -> Path:
 @pytest.mark.slow
 def test_a_design_is_written_with_its_bound_and_its_picture(tmp_path: Path):
     table, page = tmp_path / "design.csv", tmp_path / "design.html"
-    result = truetip("design", "--count", "12", "--json", "-", "--out", str(table), "--report", str(page))
+    result = truetip("design", "--count", "12", "--json", "-", "--write", str(table), "--report", str(page))
     assert result.exit_code == 0, result.output
     numbers = json.loads(result.stdout)
     assert set(numbers) >= {"criterion", "count", "b3", "bound", "seconds", "peak_mb"}

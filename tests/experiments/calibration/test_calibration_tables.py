@@ -62,6 +62,7 @@ def test_a_robot_without_analytic_inverse_is_calibrated_from_a_tracker(
         (["--urdf", "x.urdf", "--urdf-payload", "3"], "--urdf-payload needs --compliance"),
         (["--noise", "none"], "--noise must be estimate, source or the path of a YAML file, got 'none'"),
         (["--noise", "noise.yaml"], "--noise noise.yaml: position_mm must be positive, got 0"),
+        (["--noise", "place.yaml"], "--noise place.yaml: needs rotation_deg, as orientations are measured"),
         (["--validation", "empty.csv"], "measurements empty.csv: no row but the header"),
         (["--validation", "heavy.csv"], "no usable row; payload_kg must not be negative, got -1"),
     ],
@@ -72,6 +73,7 @@ def test_what_does_not_go_together_is_said_in_one_line(
     monkeypatch.chdir(tmp_path)
     tables(tmp_path, "irb1200")
     (tmp_path / "noise.yaml").write_text("{joint_deg: 0.1, position_mm: 0, rotation_deg: 0.1}")
+    (tmp_path / "place.yaml").write_text("{joint_deg: 0.1, position_mm: 0.1}")
     header = (tmp_path / "fresh.csv").read_text().splitlines()[0]
     (tmp_path / "empty.csv").write_text(header)
     (tmp_path / "heavy.csv").write_text(f"{header}\n0,0,0,0,0,0,0,0,0,1,0,0,0,-1")
@@ -87,6 +89,18 @@ def test_a_file_of_known_noise_is_believed(tmp_path: Path):
     assert result.exit_code == 0, result.output
     known = {"estimated": False, "joint_deg": 0.01, "position_mm": 0.1, "rotation_deg": 0.05}
     assert json.loads(result.stdout)["noise"] == pytest.approx(known)
+
+
+def test_who_measures_positions_need_not_know_how_well_they_turn(tmp_path: Path):
+    tables(tmp_path, "irb1200")
+    (tmp_path / "noise.yaml").write_text("{joint_deg: 0.01, position_mm: 0.1}")
+    arguments = ["--measurements", tmp_path / "measured.csv", "--noise", tmp_path / "noise.yaml"]
+    out = ["--out", tmp_path / "out", "--json", "-"]
+    result = truetip("calibrate", *arguments, "--position-only", *out)
+    assert result.exit_code == 0, result.output
+    numbers = json.loads(result.stdout)
+    assert numbers["noise"]["position_mm"] == pytest.approx(0.1)
+    assert numbers["rank"] == 27
 
 
 def write_lines(file: Path, seen: Observations, rows: range) -> None:
@@ -139,7 +153,7 @@ def test_an_adjustment_is_validated_on_lines_of_its_own_and_written_as_urdf(tmp_
     write_lines(tmp_path / "v.csv", seen, range(40, 60))
     (tmp_path / "noise.yaml").write_text("{joint_deg: 0, position_mm: 0.05, rotation_deg: 1}")
     (tmp_path / "cell.yaml").write_text("sigma_mm: {camera: 0.25, bar: 0.005}")
-    known = ["--noise", tmp_path / "noise.yaml", "--cell", tmp_path / "cell.yaml", "--fixed", "zero_1"]
+    known = ["--noise", tmp_path / "noise.yaml", "--instruments", tmp_path / "cell.yaml", "--fixed", "zero_1"]
     tables = ["--measurements", tmp_path / "m.csv", "--validation", tmp_path / "v.csv"]
     written = ["--urdf", tmp_path / "r.urdf", "--out", tmp_path / "out", "--json", "-"]
     result = truetip("calibrate", *tables, *known, *written)

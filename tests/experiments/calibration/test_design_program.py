@@ -10,7 +10,7 @@ from tests.experiments.commands import files, refusal, truetip
 @pytest.mark.slow
 def test_the_run_stands_beside_the_configurations(tmp_path: Path):
     written = {"run.src", "run.dat"}
-    arguments = ["--count", 12, "--out", tmp_path / "run.csv", "--report", tmp_path / "page.html"]
+    arguments = ["--count", 12, "--write", tmp_path / "run.csv", "--report", tmp_path / "page.html"]
     result = truetip("design", *arguments, "--program", "krl")
     assert result.exit_code == 0, result.output
     assert files(tmp_path) == written | {"run.csv", "page.html", "run_measured.csv"}
@@ -27,6 +27,6 @@ def test_the_run_stands_beside_the_configurations(tmp_path: Path):
     ],
 )
 def test_refusals_come_before_the_search(options: list, message: str, tmp_path: Path):
-    arguments = ["--out", tmp_path / "run.csv", "--report", tmp_path / "page.html"]
+    arguments = ["--write", tmp_path / "run.csv", "--report", tmp_path / "page.html"]
     assert message in refusal(truetip("design", *arguments, *options))
     assert files(tmp_path) == set()

@@ -10,7 +10,7 @@ from experiments.main import app
 
 
 def budget(tmp_path: Path, *options: str) -> dict:
-    arguments = ["cameras", "budget", "--out", str(tmp_path / "b.html"), "--json", "-", "--draws", "100"]
+    arguments = ["cameras", "budget", "--report", str(tmp_path / "b.html"), "--json", "-", "--draws", "100"]
     result = CliRunner().invoke(app, [*arguments, *options])
     assert result.exit_code == 0, result.stderr
     return json.loads(result.stdout)

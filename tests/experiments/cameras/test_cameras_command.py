@@ -22,7 +22,7 @@ def test_a_simulated_calibration_finds_the_cell_it_came_from(tmp_path: Path):
         "calibrate",
         "--places=300",
         f"--write={tmp_path / 'cell.yaml'}",
-        f"--out={tmp_path / 'c.html'}",
+        f"--report={tmp_path / 'c.html'}",
         "--json=-",
     )
     assert result.exit_code == 0, result.output
@@ -40,7 +40,7 @@ def test_a_simulated_calibration_finds_the_cell_it_came_from(tmp_path: Path):
 @pytest.mark.slow
 def test_a_calibration_from_a_file_is_the_one_that_wrote_it(tmp_path: Path):
     table = tmp_path / "seen.csv"
-    arguments = ("calibrate", "--places=200", f"--out={tmp_path / 'c.html'}", "--json=-")
+    arguments = ("calibrate", "--places=200", f"--report={tmp_path / 'c.html'}", "--json=-")
     simulated = run(*arguments, f"--observations={table}")
     read = run(*arguments, f"--images={table}")
     assert read.exit_code == 0, read.output
@@ -53,7 +53,7 @@ def test_a_calibration_from_a_file_is_the_one_that_wrote_it(tmp_path: Path):
 
 @pytest.mark.slow
 def test_the_table_is_that_of_motion_capture(tmp_path: Path):
-    result = run("calibrate", "--places=200", f"--out={tmp_path / 'c.html'}")
+    result = run("calibrate", "--places=200", f"--report={tmp_path / 'c.html'}")
     assert result.exit_code == 0, result.output
     assert "wand's length has a standard deviation of 0." in " ".join(result.stdout.split())
     rows = [line.split() for line in result.stdout.splitlines() if line.startswith((" 0", " 1"))]
@@ -82,14 +82,14 @@ REFUSED = {
 def test_wrong_input_is_refused_in_one_line_and_leaves_nothing(
     tmp_path: Path, command: str, option: str, message: str
 ):
-    assert message in refusal(run(command, option, f"--out={tmp_path / 'page.html'}"))
+    assert message in refusal(run(command, option, f"--report={tmp_path / 'page.html'}"))
     assert files(tmp_path) == set()
 
 
 def test_a_wrong_line_of_a_table_is_named(tmp_path: Path):
     table = tmp_path / "seen.csv"
     table.write_text(HEAD + "1,01,A,2,3\n1,99,A,2,3\n")
-    refused = refusal(run("calibrate", f"--images={table}", f"--out={tmp_path / 'page.html'}"))
+    refused = refusal(run("calibrate", f"--images={table}", f"--report={tmp_path / 'page.html'}"))
     assert "seen.csv, line 3: camera '99' is none of the cell" in refused
 
 
@@ -111,7 +111,7 @@ def test_run_and_compare_take_another_camera(tmp_path: Path):
 def test_a_study_tells_of_every_sweep_and_law(tmp_path: Path):
     page, numbers = tmp_path / "study.html", tmp_path / "study.json"
     result = run(
-        "study", "--quick", "--jobs=2", "--set=reference.path=circle", f"--out={page}", f"--json={numbers}"
+        "study", "--quick", "--jobs=2", "--set=reference.path=circle", f"--report={page}", f"--json={numbers}"
     )
     assert result.exit_code == 0, result.output
     study = json.loads(numbers.read_text())

@@ -85,3 +85,20 @@ def test_a_target_out_of_reach_is_named_by_its_line_and_nothing_is_written(folde
     )
     assert "line 7: p4: out of reach" in refusal(result)
     assert files(tmp_path) == {"far.mod"}
+
+
+def test_a_target_with_an_expression_is_left_alone_and_named_and_the_others_are_corrected(
+    folder: Path, tmp_path: Path
+):
+    own = "CONST robtarget own:=[[reach+10,0,500],[1,0,0,0],[0,0,0,0],[9E9,9E9,9E9,9E9,9E9,9E9]];"
+    text = (folder / "m.mod").read_bytes().decode()
+    text = text.replace("  PROC main()", f"{own}\r\n  PROC main()\r\n    MoveL own,v100,z10,tool0\\WObj:=w;")
+    (tmp_path / "m.mod").write_bytes(text.encode())
+    changes = {"out": tmp_path / "new.mod", "report": tmp_path / "page.html"}
+    result = truetip("compensate", tmp_path / "m.mod", *options(folder, **changes))
+    assert result.exit_code == 0, result.output
+    assert "own has expressions" in " ".join(result.output.split())
+    old, new = text.split("\r\n"), (tmp_path / "new.mod").read_bytes().decode().split("\r\n")
+    changed = [a for a, b in zip(old, new, strict=True) if a != b]
+    assert len(changed) == 20
+    assert all(line.startswith("CONST robtarget p") for line in changed)

@@ -12,7 +12,7 @@ from tests.experiments.commands import refusal, truetip
 
 @pytest.mark.slow
 def test_the_pictures_open_and_the_inverse_compensates(tmp_path: Path):
-    result = truetip("drivetrain", "--out", tmp_path / "page.html", "--json", "-")
+    result = truetip("drivetrain", "--report", tmp_path / "page.html", "--json", "-")
     assert result.exit_code == 0, result.output
     numbers = json.loads(result.stdout)
     assert numbers["hysteresis"]["residual"] < 1e-12
@@ -35,4 +35,4 @@ def test_the_gear_of_figure_2_4_starts_only_against_its_losses():
 @pytest.mark.slow
 def test_a_folder_that_cannot_be_written_is_refused(tmp_path: Path):
     (tmp_path / "file").write_text("")
-    assert "cannot write" in refusal(truetip("drivetrain", "--out", tmp_path / "file" / "page.html"))
+    assert "cannot write" in refusal(truetip("drivetrain", "--report", tmp_path / "file" / "page.html"))

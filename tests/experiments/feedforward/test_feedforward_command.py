@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 from typer.testing import Result
 
-from experiments.feedforward.command import PAGE
 from experiments.feedforward.rectangle import (
     RectangleTrial,
     rectangle,
@@ -36,7 +35,9 @@ START = np.deg2rad([0.0, -60.0, 70.0, 0.0, 0.0, 0.0])
 
 
 def run(folder: Path, *arguments: str) -> Result:
-    return truetip("feedforward", f"--out={folder}", "--grid=2", "--jobs=2", *arguments)
+    return truetip(
+        "feedforward", f"--report={folder / 'feedforward.html'}", "--grid=2", "--jobs=2", *arguments
+    )
 
 
 @pytest.mark.slow
@@ -61,7 +62,7 @@ def test_the_numbers_are_those_of_the_runs_and_the_page_opens(tmp_path: Path):
         assert found["positions"] == 4
         assert found["median_ratio"] <= found["worst_ratio"]
     assert set(numbers["tick_us"]) == set(KINDS)
-    opened = open_page(tmp_path / PAGE)
+    opened = open_page(tmp_path / "feedforward.html")
     assert not [line for line in opened.console if "rror" in line]
     assert opened.dom.count("js-plotly-plot") >= 7
 

@@ -12,7 +12,7 @@ from tests.experiments.commands import files, refusal, truetip
 
 
 def run(folder: Path, *arguments: str) -> Result:
-    return truetip("invert", f"--out={folder / 'invert.html'}", "--jobs=2", *arguments)
+    return truetip("invert", f"--report={folder / 'invert.html'}", "--jobs=2", *arguments)
 
 
 @pytest.mark.slow

@@ -15,7 +15,7 @@ from tests.experiments.commands import files, refusal, truetip
 
 
 def run(folder: Path, *arguments: str) -> Result:
-    outputs = [f"--out={folder / 'modes.html'}", f"--animation={folder / 'motion.html'}"]
+    outputs = [f"--report={folder / 'modes.html'}", f"--animation={folder / 'motion.html'}"]
     return truetip("modes", *outputs, "--grid=3", *arguments)
 
 
@@ -64,7 +64,7 @@ def test_the_table_names_frequencies_and_what_yields(tmp_path: Path):
 
 
 def test_a_mode_can_be_watched_live(tmp_path: Path):
-    result = run(tmp_path, "--robot=kr16", "--mode=2", "--meshcat")
+    result = run(tmp_path, "--robot=kr16", "--shape=2", "--meshcat")
     assert result.exit_code == 0, result.output
     assert "Mode 2 swings at http://localhost:" in result.stdout
 
@@ -81,7 +81,7 @@ def test_the_pages_open(tmp_path: Path):
 
 
 def test_the_animation_stands_beside_the_page(tmp_path: Path):
-    result = truetip("modes", f"--out={tmp_path / 'here' / 'arm.html'}", "--grid=2")
+    result = truetip("modes", f"--report={tmp_path / 'here' / 'arm.html'}", "--grid=2")
     assert result.exit_code == 0, result.output
     assert files(tmp_path) == {"here", "here/arm.html", "here/arm-animation.html"}
 
@@ -92,7 +92,7 @@ REFUSED = {
     "rigid": ("--elasticity=rigid", "elasticity must be joints or structure"),
     "elasticity": ("--elasticity=foam", "elasticity must be one of rigid, joints, structure, got 'foam'"),
     "grid": ("--grid=1", "--grid must be at least 2, got 1"),
-    "mode": ("--mode=0", "--mode must be between 1 and 6, got 0"),
+    "shape": ("--shape=0", "--shape must be between 1 and 6, got 0"),
 }  # fmt: skip
 
 
