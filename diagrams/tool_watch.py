@@ -1,9 +1,10 @@
 """A tool that is knocked out of its place while the robot moves: what the camera sees of it makes a step."""
 
+import importlib
+
 import numpy as np
 
 from robots.description.model import RobotModel
-from robots.kinematics.compiled import CompiledKinematics
 from robots.metrology.step_detection import StepDetector
 from systems.samples import PoseSample
 
@@ -23,7 +24,8 @@ class ToolWatch:
 
     def __init__(self, robot: RobotModel) -> None:
         """``robot`` is the one that the controller believes in."""
-        self._kinematics = CompiledKinematics(robot)
+        # With numba, which takes time to be imported.
+        self._kinematics = importlib.import_module("robots.kinematics.compiled").CompiledKinematics(robot)
         self._joints = np.full((_KEPT, 1 + len(robot.joints)), np.nan)
         self._count, self._last, self._steps = 0, -np.inf, StepDetector(_LEAST)
 

@@ -14,6 +14,8 @@ from diagrams.scenario.scenario import load_scenario
 from robots.description.model import load_robot
 from systems.link.udp_channel import UdpChannel
 
+pytestmark = pytest.mark.real_time
+
 CLIENT = Path(__file__).parents[1] / "systems" / "link" / "abb" / "foreign_client.py"
 
 

@@ -9,6 +9,8 @@ import pytest
 from diagrams import real_time_priority as module
 from diagrams.real_time_priority import real_time_priority
 
+pytestmark = pytest.mark.real_time
+
 
 def test_inside_the_process_comes_first_and_its_children_do_not():
     try:

@@ -17,6 +17,8 @@ from diagrams.record.run_record import RunRecord, write_log, write_tick
 from diagrams.record.topics import COMMAND, DESIRED, EVENT, JOINTS, POSE, SCHEMAS, TRUE_POSE
 from tests.experiments.synthetic import comparison
 
+pytestmark = pytest.mark.real_time
+
 
 @pytest.fixture(scope="module")
 def log() -> RunLog:

@@ -30,7 +30,8 @@ NOTEBOOKS = {
 
 
 def slow_if_dear(name: str) -> object:
-    return pytest.param(name, marks=pytest.mark.slow) if name in DEAR else name
+    marks = [pytest.mark.slow] * (name in DEAR) + [pytest.mark.real_time] * (name == "cell_over_udp")
+    return pytest.param(name, marks=marks)
 
 
 @pytest.mark.parametrize("name", [slow_if_dear(name) for name in SAID])

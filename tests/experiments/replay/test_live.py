@@ -22,6 +22,8 @@ from experiments.replay.live import (
 from robots.description.model import load_robot
 from tests.experiments.test_compare import SETTINGS, same
 
+pytestmark = pytest.mark.real_time
+
 
 def opened(speed: float | None = None) -> tuple[Experiment, LiveView]:
     scenario, robot = load_scenario("misaligned", SETTINGS), load_robot("irb1200")

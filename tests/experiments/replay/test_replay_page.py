@@ -13,6 +13,8 @@ from tests.experiments.browser_session import browser
 from tests.experiments.report.test_curves import decoded
 from tests.experiments.synthetic import comparison
 
+pytestmark = pytest.mark.real_time
+
 
 @pytest.fixture(scope="module")
 def logs():

@@ -18,7 +18,7 @@ from robots.description.model import load_robot
 from tests.experiments.browser_session import browser
 from tests.experiments.synthetic import comparison
 
-pytestmark = pytest.mark.slow
+pytestmark = [pytest.mark.slow, pytest.mark.real_time]
 
 AXE = Path(__file__).parents[3] / "node_modules" / "axe-core" / "axe.min.js"
 RULES = ["wcag2a", "wcag2aa", "wcag21a", "wcag21aa"]

@@ -11,6 +11,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+pytestmark = pytest.mark.real_time
+
 COMMAND = [sys.executable, "-m", "experiments.main"]
 PATIENCE = 120.0  # s, for a busy machine
 

@@ -6,6 +6,8 @@ import pytest
 
 from experiments.bench.faults import run_case
 
+pytestmark = pytest.mark.real_time
+
 
 @pytest.mark.slow
 @pytest.mark.parametrize(

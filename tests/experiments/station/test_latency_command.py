@@ -7,6 +7,8 @@ from experiments.main import app
 from experiments.station import latency_command
 from experiments.station.latency import ImpossibleDelayError
 
+pytestmark = pytest.mark.real_time
+
 
 def test_a_failed_measurement_leaves_nothing_behind(tmp_path, monkeypatch: pytest.MonkeyPatch):
     def fails(record):

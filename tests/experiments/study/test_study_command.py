@@ -21,6 +21,8 @@ from experiments.study.store import TABLE
 from experiments.study.study_file import Levels, Study, load_study
 from tests.experiments.commands import refusal, truetip
 
+pytestmark = pytest.mark.real_time
+
 # 1.8 s of a rigid robot; the second payload is more than the scenario allows.
 STUDY = """
 laws: [open_loop]

@@ -245,6 +245,7 @@ def test_nor_do_many_of_them(name: str):
 
 
 @pytest.mark.parametrize("path", sorted(CORPUS.iterdir()), ids=lambda path: path.name)
+@pytest.mark.real_time
 def test_what_was_once_a_problem_is_none_any_more(path: Path):
     decode = DECODERS[path.name.partition("-")[0]][0]
     began = time.process_time()
@@ -254,6 +255,7 @@ def test_what_was_once_a_problem_is_none_any_more(path: Path):
     assert time.process_time() - began < 20 * LONGEST  # the first one of a process builds tables
 
 
+@pytest.mark.real_time
 def test_a_laughing_billion_and_a_flood_of_tiny_packets_cost_no_time():
     entities = "".join(f'<!ENTITY l{n} "{f"&l{n - 1};" * 10}">' for n in range(1, 10))
     xml = f'<?xml version="1.0"?><!DOCTYPE l [<!ENTITY l0 "ha">{entities}]><l><The_6D>&l9;</The_6D></l>'

@@ -10,6 +10,8 @@ import pytest
 from systems.link.kuka.controller import RsiController, RsiRunConfig
 from tests.systems.link.kuka.rsi_loop import CYCLE, ROBOT, START
 
+pytestmark = pytest.mark.real_time
+
 CONFIG = Path("docs/kuka/RSI_EthernetConfig.xml")
 
 

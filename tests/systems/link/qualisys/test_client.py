@@ -27,6 +27,8 @@ from tests.systems.link.qualisys.wire import (
     until,
 )
 
+pytestmark = pytest.mark.real_time
+
 GREETING = say(COMMAND, "QTM RT Interface connected.")  # with a full stop, as some versions greet
 HANDSHAKE = [GREETING, say(COMMAND, "Version set to 1.25"), say(XML_PACKET, XML)]
 

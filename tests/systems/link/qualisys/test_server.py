@@ -17,6 +17,8 @@ from systems.link.qualisys.parameters import parse_bodies
 from systems.link.qualisys.server import CameraServerConfig, VirtualCameraServer
 from tests.systems.link.qualisys.wire import COMMAND, NO_MORE_DATA, TURNED, by_hand, data_by_hand, say, until
 
+pytestmark = pytest.mark.real_time
+
 BODIES = ["Base", "Werkzeug & Flansch", "lost"]
 OFFICIAL_CLIENT = Path(__file__).with_name("qtm_rt_client.py")
 

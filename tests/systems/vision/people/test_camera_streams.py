@@ -9,6 +9,8 @@ import pytest
 
 from systems.vision.people.camera_streams import CameraStreams
 
+pytestmark = pytest.mark.real_time
+
 WIDTH, HEIGHT, PERIOD = 64, 48, 0.02  # px, s
 GREY = {"left": 60, "right": 180}
 

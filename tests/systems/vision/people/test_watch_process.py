@@ -17,6 +17,8 @@ from systems.vision.people.people_follower import Mind
 from systems.vision.people.shared_watch import SharedWatch
 from systems.vision.people.watch_process import Lookout, WatchProcess, look_until_ended
 
+pytestmark = pytest.mark.real_time
+
 PATIENCE = 60.0  # s, for a process to start on a busy machine
 
 
