@@ -186,7 +186,8 @@ def calibrate_command(
         path = None if wanted.is_given else _path(prepared.scenario, study)
         output.write(calibration_json(study, path, measured.problems))
         _write_tables(stage, measured.sets)
-        write_calibration_page(stage / "report.html", prepared.title, study, path, measured.problems)
+        title = prepared.robot.name if wanted.is_given else prepared.title  # tables have no scenario
+        write_calibration_page(stage / "report.html", title, study, path, measured.problems)
         if robot_file:
             write_text(robot_file, robot_text(study.calibrated))
         if urdf_file:

@@ -98,13 +98,13 @@ def residual_rows(found: Identified) -> list[dict[str, Any]]:
 
 
 def noise_dict(found: Identified) -> dict[str, Any]:
-    """Standard deviations of one row."""
-    noise = found.noise
+    """Standard deviations of one row; that of orientations is None where none were measured."""
+    noise, has_rotation = found.noise, found.residuals.shape[1] == 6
     return {
         "estimated": not found.is_noise_known,
         "joint_deg": float(np.rad2deg(noise.joint_sigma)),
         "position_mm": 1e3 * noise.position_sigma,
-        "rotation_deg": float(np.rad2deg(noise.rotation_sigma)),
+        "rotation_deg": float(np.rad2deg(noise.rotation_sigma)) if has_rotation else None,
     }
 
 
@@ -176,7 +176,7 @@ def noise_sentence(found: Identified) -> str:
         return " The rows are free of noise."
     values = [f"{noise['joint_deg']:.2g} degrees of the joints" if noise["joint_deg"] else ""]
     values += [f"{noise['position_mm']:.2g} mm"]
-    values += [f"{noise['rotation_deg']:.2g} degrees" if found.residuals.shape[1] == 6 else ""]
+    values += [f"{noise['rotation_deg']:.2g} degrees" if noise["rotation_deg"] is not None else ""]
     how = "Estimated" if noise["estimated"] else "Known"
     text = f" {how} noise: {', '.join(filter(None, values))}."
     if not noise["estimated"] and found.misfit > _MISFIT:

@@ -37,8 +37,6 @@ _PRIOR_FADES = 0.01  # of the rms: then the prior weighs nothing
 _ROUNDS = 30
 _SETTLED = 0.02  # of its own standard deviation: change of a variance that ends the search
 _ROBUST_ROUNDS = 4
-_PLAUSIBLE = 0.03  # m: with half the rows farther off the table belongs to something else
-REASONS = "is it another robot, another direction of a joint, another unit?"
 _SPRING_SIGMAS = 3.0  # of the prior of compliances: a row that is farther off is no matter of springs
 _MOST = 0.5  # share of the rows
 _RISK = 1e-4  # that a clean table of known noise is searched for gross errors
@@ -185,7 +183,7 @@ class _Search:
                 f"{rms:.3g} mm"
             )
         if clean.all() or self._config.leave_out_outliers:
-            self._refuse_the_implausible(fit, kept)
+            self._refuse_the_implausible(fit.at.residuals[kept], fit.u)
         factor = self._factor(fit, noise, kept, found)
         self._refuse_what_is_hidden(fit, kept, reducible)
         return Identified(
@@ -249,7 +247,11 @@ class _Search:
         for turn in range(_ROBUST_ROUNDS):
             noise = NoiseModel(theta, self._shape)
             at = problem.linearise(u)
-            clean = CleanRows(at, u, noise).find(np.random.default_rng(turn))
+            rows = CleanRows(at, u, noise)
+            if not rows.num_directions:
+                self._refuse_the_implausible(at.residuals, u)
+                break
+            clean = rows.find(np.random.default_rng(turn))
             if turn and np.array_equal(clean, kept):
                 break
             kept = clean
@@ -368,18 +370,12 @@ class _Search:
         whitened = np.einsum("nij,nj->ni", noise.select(kept).whitening(at.J), at.residuals)
         return float(np.sqrt(np.sum(whitened**2) / max(whitened.size - _REDUNDANCY_OF_A_POSE, 1)))
 
-    def _refuse_the_implausible(self, fit: Fit, kept: np.ndarray) -> None:
-        distance = float(np.median(np.linalg.norm(fit.at.residuals[kept, -3:], axis=1)))
-        if distance > _PLAUSIBLE:
+    def _refuse_the_implausible(self, residuals: np.ndarray, u: np.ndarray) -> None:
+        model, x = self._problem.model, self._problem.parameters(u)
+        why = not_to_be_believed(model.names, x[: len(model)], np.linalg.norm(residuals[:, -3:], axis=1))
+        if why:
             raise IdentificationError(
-                f"no geometry near that of {self._problem.model.robot.name} explains the measurements: half "
-                f"of the positions stay more than {1e3 * distance:.0f} mm off ({REASONS})"
-            )
-        model = self._problem.model
-        off = not_to_be_believed(model.names, self._problem.parameters(fit.u)[: len(model)])
-        if off:
-            raise IdentificationError(
-                f"no geometry near that of {model.robot.name} explains the measurements: {off} ({REASONS})"
+                f"no geometry near that of {model.robot.name} explains the measurements: {why}"
             )
 
     def _refuse_what_is_hidden(self, fit: Fit, kept: np.ndarray, reducible: ReducibleModel) -> None:

@@ -20,6 +20,8 @@ OWN_FRAME = 1.0  # m and rad, of the base in a frame that has nothing to do with
 COMPLIANCES = 3.0  # times what the stiffness in the robot file says
 MASS = 0.05  # of the masses in a robot file and of a payload, relative
 CENTRE_OF_MASS = 10e-3  # m, of each coordinate
+_PLAUSIBLE = 0.03  # m: with half the rows farther off the table belongs to something else
+_REASONS = "is it another robot, another direction of a joint, another unit, more than one frame?"
 _NOT_TO_BE_BELIEVED = 10.0  # standard deviations: 100 mm or 20 degrees between two joints is another robot
 
 
@@ -57,8 +59,8 @@ def mass_sizes(mass: float = MASS, centre_of_mass: float = CENTRE_OF_MASS) -> np
     return np.concatenate([np.full(len(MASS_NAMES), mass), np.full(len(CENTRE_NAMES), centre_of_mass)])
 
 
-def not_to_be_believed(names: Sequence[str], x: np.ndarray) -> str:
-    """Which error of a joint is so large that it is none, in words.
+def not_to_be_believed(names: Sequence[str], x: np.ndarray, distances: np.ndarray) -> str:
+    """Why what was found is not the robot, in words.
 
     A search finds a geometry for much, such as one of no size for a table in metres that claims to be in
     millimetres. Base and tool may stand anywhere.
@@ -66,10 +68,14 @@ def not_to_be_believed(names: Sequence[str], x: np.ndarray) -> str:
     Args:
         names: as `robots.calibration.error_model` has them; others are passed over.
         x: their values in m and rad, shape (len(names),).
+        distances: of the measured from the predicted positions in m, any shape; NaN where there is none.
 
     Returns:
-        For example ``joint3_z would be 350 mm off``; empty if all can be believed.
+        For example ``joint3_z would be 350 mm off`` with possible reasons; empty if all can be believed.
     """
+    distance = float(np.nanmedian(distances))
+    if distance > _PLAUSIBLE:
+        return f"half of the positions stay more than {1e3 * distance:.0f} mm off ({_REASONS})"
     sizes, worst, largest = parameter_sizes(names), "", _NOT_TO_BE_BELIEVED
     for name, value, size in zip(names, x.tolist(), sizes.tolist(), strict=True):
         part, _, kind = name.partition("_")
@@ -80,5 +86,5 @@ def not_to_be_believed(names: Sequence[str], x: np.ndarray) -> str:
             if kind in ("x", "y", "z")
             else f"{np.rad2deg(abs(value)):.0f} degrees"
         )
-        worst, largest = f"{name} would be {far} off", abs(value) / size
+        worst, largest = f"{name} would be {far} off ({_REASONS})", abs(value) / size
     return worst

@@ -7,7 +7,7 @@ import numpy as np
 from scipy.special import chdtri
 
 from robots.calibration.error_model import ErrorModel
-from robots.calibration.identification import REASONS, IdentificationError
+from robots.calibration.identification import IdentificationError
 from robots.calibration.instrument_frame import instrument_frame
 from robots.calibration.instruments.noise import JOINT, InstrumentNoise, instrument_noise
 from robots.calibration.instruments.observations import MeasuringCell, Observations
@@ -171,6 +171,7 @@ class _Adjustment:
         """Searches. Raises IdentificationError."""
         problem = self._problem
         u, used = self._clean_lines()
+        self._refuse_the_implausible(u)
         fit, noise, found = self._solve(u, used)
         if not fit.is_converged:
             rms = 1e3 * float(np.sqrt(np.mean(fit.at.residuals**2)))
@@ -178,11 +179,7 @@ class _Adjustment:
                 f"the adjustment has not converged after {self._iterations} iterations and leaves "
                 f"{rms:.3g} mm"
             )
-        off = not_to_be_believed(problem.model.names, problem.parameters(fit.u)[: len(problem.model)])
-        if off:
-            raise IdentificationError(
-                f"no geometry near that of {robot.name} explains the lines: {off} ({REASONS})"
-            )
+        self._refuse_the_implausible(fit.u)
         factor = parameter_factor(fit.at, noise, self._estimated, found)
         sizes = problem.sizes[problem.columns]
         covariance = sizes[:, None] * (factor @ factor.T) * sizes
@@ -213,6 +210,18 @@ class _Adjustment:
             rank=int(np.sum(s > 1.0)),
             iterations=self._iterations,
         )
+
+    def _refuse_the_implausible(self, u: np.ndarray) -> None:
+        """Names the instrument whose lines fit worst if what was found is not the robot."""
+        model, x = self._problem.model, self._problem.parameters(u)
+        seen, distances = self._problem.observations, self._sizes(u, np.ones((1, 1)))
+        worst = int(np.argmax(self._medians(distances)))
+        why = not_to_be_believed(model.names, x[: len(model)], distances[seen.instrument == worst])
+        if why:
+            raise IdentificationError(
+                f"no geometry near that of {model.robot.name} explains the lines of "
+                f"{seen.instruments[worst]}: {why}"
+            )
 
     def _around_nominal(self, noise: InstrumentNoise, used: np.ndarray) -> np.ndarray:
         """All parameters with which the nominal robot fits best: targets, frames and anchors, in SI units."""
@@ -263,7 +272,7 @@ class _Adjustment:
         return u, used
 
     def _sizes(self, u: np.ndarray, scale: np.ndarray) -> np.ndarray:
-        """Lengths of the lines' residuals in units of the noise, (m,)."""
+        """Lengths of the residuals of all lines in units of a scale in m, (m, 1) or (1, 1): (m,)."""
         active, self._problem.active = self._problem.active, self._everything
         e = self._problem.gathered(self._problem.residuals(u)) / scale
         self._problem.active = active

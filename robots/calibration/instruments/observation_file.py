@@ -54,7 +54,8 @@ def read_observations(path: str | Path) -> tuple[Observations, list[RowProblem]]
         except ValueError as error:
             problems.append(RowProblem(line, str(error)))
     if not kept:
-        raise MeasurementFileError(f"measurements {path}: no usable row; {[p.what for p in problems][:1]}")
+        why = f"; {problems[0].what}" if problems else ""
+        raise MeasurementFileError(f"measurements {path}: no usable row{why}")
     lines, targets, instruments, positions, distances, sigmas = zip(*kept, strict=True)
     joints, payload = np.array(q), np.array(loads)
     is_other = np.any(np.diff(joints, axis=0) != 0.0, axis=1) | (np.diff(payload) != 0.0)

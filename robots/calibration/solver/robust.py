@@ -94,6 +94,11 @@ class CleanRows:
         self._N = np.swapaxes(self._G, 1, 2) @ self._G
         self._v = np.einsum("nki,nk->ni", self._G, self._y)
 
+    @property
+    def num_directions(self) -> int:
+        """How many directions the rows show better than the prior does; none where they fit to nothing."""
+        return self._G.shape[2]
+
     def find(self, rng: np.random.Generator) -> np.ndarray:
         """The rows without gross errors, (n,) bool."""
         clean = self._core(rng)

@@ -184,6 +184,16 @@ def test_a_geometry_that_no_robot_has_is_refused_however_well_it_fits():
         identify(load_robot("irb1200"), Measurements(table.q, 1e-3 * table.position, None))
 
 
+def test_rows_in_two_frames_are_refused_in_words():
+    """Nothing fits, so that not one direction shows: there is nothing to search gross errors in."""
+    drawn, rng = MatrixRobot("ur10"), np.random.default_rng(0)
+    q = drawn.configurations(80, rng)
+    position, frame = drawn.forward(q)[:, :3, 3], homogeneous(Rotation.random(rng=rng), np.full(3, 2.0))
+    position[40:] = position[40:] @ frame[:3, :3].T + frame[:3, 3]
+    with pytest.raises(IdentificationError, match=r"half of the positions stay .* more than one frame\?"):
+        identify(load_robot("ur10"), Measurements(q, position, None))
+
+
 def test_the_calibrated_robot_knows_its_parameters_and_their_covariance():
     """With these as the beginning of another calibration, no direction is free and none is known too well."""
     drawn, rng, nominal = MatrixRobot("irb1200"), np.random.default_rng(0), load_robot("irb1200")

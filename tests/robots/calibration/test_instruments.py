@@ -157,6 +157,16 @@ def test_an_instrument_that_nothing_places_is_refused():
         )
 
 
+@pytest.mark.parametrize("name", ["tracker", "camera"])
+def test_an_instrument_whose_lines_belong_to_other_configurations_is_named(name: str):
+    """However noisy the adjustment would have to believe it, and though the others fit."""
+    _, seen = observed(count=30)
+    rng, lines = np.random.default_rng(0), np.flatnonzero(seen.instrument == seen.instruments.index(name))
+    seen.position[lines] = seen.position[rng.permutation(lines)]
+    with pytest.raises(IdentificationError, match=rf"explains the lines of {name}: half of the positions"):
+        identify_with_instruments(load_robot("irb1200"), seen)
+
+
 HEAD = "q1_deg;q2_deg;q3_deg;q4_deg;q5_deg;q6_deg;target;instrument;x_mm;y_mm;z_mm;distance_mm\n"
 
 
