@@ -12,9 +12,15 @@ from experiments.calibration.calibrate import validate
 from experiments.cli.workers import Executor
 from experiments.comparison.compare import compare as run_laws
 from experiments.comparison.compare import compared_laws
+from experiments.identify.cases import MotionCases, default_cases
+from experiments.identify.recording_file import Recording
+from experiments.identify.simulated import simulated_recording
+from experiments.identify.slow import identify_slow_motions
+from experiments.identify.study import IdentifyStudy, study_recording
 from experiments.metrics.run_metrics import best_law, judged_by, summary
 from experiments.report.report import verdict
-from robots.calibration.identification import IdentificationConfig, identify
+from robots.calibration.identification import IdentificationConfig
+from robots.calibration.identification import identify as identify_geometry
 from robots.calibration.identified import Identified
 from robots.calibration.measurements import Measurements
 from robots.calibration.validation import ErrorStatistics
@@ -182,10 +188,71 @@ def calibrate(
             robot is worse at the fresh configurations; one line.
     """
     model = _robot(robot)
-    identified = identify(model, measurements, config)
+    identified = identify_geometry(model, measurements, config)
     calibrated = identified.calibrated_robot(robot if isinstance(robot, str) else model.name)
     checked = validate(identified, calibrated, fresh)
     return Calibration(calibrated, identified, checked.before, checked.after)
+
+
+def record_motions(
+    robot: RobotModel | str,
+    plant: RobotModel | str,
+    motions: MotionCases | None = None,
+    seed: int = 0,
+    processes: int | None = None,
+    progress: Progress | None = None,
+) -> Recording:
+    """Simulates short motions of an elastic robot with gyros and accelerometers on it, for `identify`.
+
+    In a script it belongs below ``if __name__ == "__main__":``, because the processes import it.
+
+    Args:
+        robot: as the controller knows it; a robot, a shipped one's name or the path of a file.
+        plant: what moves, likewise.
+        motions: where they begin, how far they go, and the sensors; None for 18 motions, with gyros on all
+            links and accelerometers on hand and flange.
+        seed: of the noise of the sensors.
+        processes: how many work at a time; None for one per core.
+        progress: as of `simulate`.
+
+    Raises:
+        ValueError: if a motion or a sensor is impossible; one line.
+        experiments.cli.workers.SimulationError: if a run broke off.
+    """
+    model = _robot(robot)
+    chosen = default_cases(model) if motions is None else motions
+    return simulated_recording(model, _robot(plant), chosen, seed, processes, progress)
+
+
+def identify(
+    robot: RobotModel | str,
+    recording: Recording,
+    plant: RobotModel | str | None = None,
+    slow: Recording | None = None,
+    gear_parts: bool = True,
+    progress: Progress | None = None,
+) -> IdentifyStudy:
+    """Finds springs, damping and play of a robot from its own motion.
+
+    Args:
+        robot: as it is believed to be; a robot, a shipped one's name or the path of a file.
+        recording: of `record_motions`, or as `experiments.identify.recording_file.read_recording` reads one.
+        plant: what moved, if that is known, to compare with.
+        slow: slow motions with torques, which tell load, counterbalance and friction beforehand.
+        gear_parts: whether gears may have play, hysteresis and ripple.
+        progress: as of `simulate`.
+
+    Returns:
+        The identified robot (``identified``) and its ``parameters`` with standard deviations, in SI units;
+        ``weak`` names springs and dampers that the motions do not show.
+
+    Raises:
+        ValueError: if the recording cannot be used or shows no motion, or a sensor sits where the robot has
+            no body; one line.
+    """
+    model, truth = _robot(robot), None if plant is None else _robot(plant)
+    of_slow = None if slow is None else identify_slow_motions(slow, model)
+    return study_recording(model, truth, recording, gear_parts, of_slow, progress)
 
 
 def _scenario(scenario: Scenario | str) -> Scenario:

@@ -19,9 +19,9 @@ from experiments.feedforward.command import realistic_robot
 from experiments.identify.cases import MotionCases, default_cases, load_cases
 from experiments.identify.plots import table_head, table_rows, verdict, write_identify_page
 from experiments.identify.recording_file import Recording, read_recording, write_recording
-from experiments.identify.simulated import places, simulated
-from experiments.identify.slow import identify_slow_recording, with_slow_motion
-from experiments.identify.study import IdentifyStudy, identify_json, study_identification, with_rectangle
+from experiments.identify.simulated import simulated_recording
+from experiments.identify.slow import identify_slow_recording
+from experiments.identify.study import IdentifyStudy, identify_json, study_recording, with_rectangle
 from experiments.report.files import write_text
 from robots.description.model import RobotFileError, RobotModel, load_robot
 from robots.description.robot_file import robot_text
@@ -107,14 +107,9 @@ def identify_command(
             recorded = _simulated(model, truth, motions, seed, jobs)
             if table:
                 write_recording(table, recorded)
-        payload = model.payload.largest_mass if recorded.payload is None else recorded.payload
         of_slow = identify_slow_recording(slow, model) if slow else None
-        if of_slow:
-            model, payload = with_slow_motion(model, of_slow), of_slow.payload
         with progress_bar(f"identification from {count(len(recorded.cases), 'motion')}") as progress:
-            study = study_identification(
-                model, truth, payload, recorded.cases, recorded.sensors, gear_parts, progress, of_slow
-            )
+            study = study_recording(model, truth, recorded, gear_parts, of_slow, progress)
         if rectangle and truth is not None:
             with progress_bar("rectangle") as progress:
                 study = with_rectangle(study, jobs, progress)
@@ -144,9 +139,7 @@ def _simulated(
     model: RobotModel, truth: RobotModel, motions: MotionCases, seed: int, jobs: int | None
 ) -> Recording:
     with progress_bar(f"recording of {count(len(motions.starts(model)), 'motion')}") as progress:
-        cases = simulated(model, truth, motions, seed, jobs, progress)
-    payload = model.payload.largest_mass if motions.payload is None else motions.payload
-    return Recording(payload, cases, places(motions.logger))
+        return simulated_recording(model, truth, motions, seed, jobs, progress)
 
 
 def _print(human: Console, study: IdentifyStudy) -> None:

@@ -14,6 +14,7 @@ from diagrams.station import SimulatedStation
 from experiments.cli.workers import Progress, SimulationError, in_processes
 from experiments.feedforward.trial import CommandPlayer, Trial, commands
 from experiments.identify.cases import MotionCases
+from experiments.identify.recording_file import Recording
 from robots.description.model import NUM_JOINTS, RobotModel
 from robots.identification.motion import SensorPlace
 from robots.identification.recording import RecordedCase
@@ -122,6 +123,20 @@ def simulated(
         )
         runs.append(CaseRun(f"{number}", trial, cases.logger, cases.ringing, 1000 * seed + number))
     return in_processes(_run, runs, processes, progress)
+
+
+def simulated_recording(
+    robot: RobotModel,
+    plant: RobotModel,
+    motions: MotionCases,
+    seed: int,
+    processes: int | None = None,
+    progress: Callable[[float], None] | None = None,
+) -> Recording:
+    """What `simulated` records, with payload and places of the sensors; arguments and errors as there."""
+    cases = simulated(robot, plant, motions, seed, processes, progress)
+    payload = robot.payload.largest_mass if motions.payload is None else motions.payload
+    return Recording(payload, cases, places(motions.logger))
 
 
 def _run(job: CaseRun, progress: Progress) -> RecordedCase:

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from scipy.interpolate import CubicSpline
 
-from experiments.identify.recording_file import read_recording
+from experiments.identify.recording_file import Recording, read_recording
 from robots.description.model import RobotModel
 from robots.identification.recording import RecordingError
 from robots.identification.slow_motion import SlowIdentification, SlowMotion, identify_slow_motion
@@ -25,6 +25,18 @@ def identify_slow_recording(path: Path, robot: RobotModel) -> SlowIdentification
     recording = read_recording(path, needs_sensors=False)
     if any(not len(case.torque) for case in recording.cases):
         raise RecordingError(f"{path}: slow motions need the torques of the motors: six columns as torque")
+    return identify_slow_motions(recording, robot)
+
+
+def identify_slow_motions(recording: Recording, robot: RobotModel) -> SlowIdentification:
+    """Finds payload, counterbalance and friction in slow motions with torques.
+
+    Raises:
+        RecordingError: if a motion has no torques.
+        ValueError: if the motions do not show what is wanted.
+    """
+    if any(not len(case.torque) for case in recording.cases):
+        raise RecordingError("slow motions need the torques of the motors")
     payload = robot.payload.largest_mass if recording.payload is None else recording.payload
     parts = [
         (c.theta, c.rate, CubicSpline(c.time, c.rate).derivative()(c.time), c.torque) for c in recording.cases

@@ -9,12 +9,13 @@ import numpy as np
 
 from experiments.cli.workers import Progress, SimulationError, in_processes
 from experiments.feedforward.rectangle import RectangleTrial
-from experiments.identify.slow import slow_json
+from experiments.identify.recording_file import Recording
+from experiments.identify.slow import slow_json, with_slow_motion
 from robots.description.model import RobotModel
 from robots.identification.arm_identification import ArmIdentification, identify_arm
 from robots.identification.identified_robot import FoundParameter, found_parameters, identified_robot
 from robots.identification.motion import SensorPlace
-from robots.identification.recording import RecordedCase
+from robots.identification.recording import RecordedCase, RecordingError
 from robots.identification.slow_motion import SlowIdentification
 from systems.feedforward import FeedforwardConfig
 
@@ -86,6 +87,33 @@ def study_identification(
     identified = identified_robot(robot, found.fit)
     seconds = time.perf_counter() - started
     return IdentifyStudy(robot, plant, payload, found, parameters, identified, seconds, slow, None)
+
+
+def study_recording(
+    robot: RobotModel,
+    plant: RobotModel | None,
+    recording: Recording,
+    gear_parts: bool = True,
+    slow: SlowIdentification | None = None,
+    progress: Callable[[float], None] | None = None,
+) -> IdentifyStudy:
+    """Identifies a robot from a whole recording; its payload is the largest where the recording has none.
+
+    Args:
+        robot: as it is believed to be.
+        plant: what moved, if that is known.
+        recording: motions, sensors and payload.
+        gear_parts: whether gears may have play, hysteresis and ripple.
+        slow: what slow motions say of load, counterbalance and friction, believed from here on.
+        progress: as of `study_identification`, and so are the errors.
+    """
+    if not recording.cases or not recording.sensors:
+        raise RecordingError("a recording needs motions and sensors: springs do not show in the motors alone")
+    payload = robot.payload.largest_mass if recording.payload is None else recording.payload
+    if slow is not None:
+        robot, payload = with_slow_motion(robot, slow), slow.payload
+    cases, sensors = recording.cases, recording.sensors
+    return study_identification(robot, plant, payload, cases, sensors, gear_parts, progress, slow)
 
 
 def with_rectangle(

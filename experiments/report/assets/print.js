@@ -16,8 +16,9 @@ async function drawForPaper() {
     const figure = own[plot.id] || {data: plot.data,
       layout: {...plot.layout, font: {...plot.layout.font, color: paperInk}}};
     const isDeep = figure.data.some(trace => /3d|surface|gl/.test(trace.type || ""));
-    const options = {format: isDeep ? "png" : "svg", width: 760, height: plot.offsetHeight || parseInt(plot.style.height) || 450,
-      scale: isDeep ? 2 : 1};
+    /* Curves a little flatter than on the screen, so that two fit on a page. */
+    const tall = plot.offsetHeight || parseInt(plot.style.height) || 450, height = Math.round(tall * (isDeep ? 1 : 0.88));
+    const options = {format: isDeep ? "png" : "svg", width: 760, height, scale: isDeep ? 2 : 1};
     const source = await Plotly.toImage({data: figure.data,
       layout: Object.assign({}, figure.layout, {autosize: false})}, options);
     if (run !== printRun) return;
