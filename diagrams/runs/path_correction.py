@@ -4,6 +4,10 @@ The controller tells nothing of its path's time; the joints say where on the pat
 is the difference between where the joints put the tool and where the camera saw it at the same instant, as
 seen in the path's frame: it does not depend on what was sent before, so no delay can make it unstable. What
 lies along the path cannot be corrected, and appears across it behind the next corner.
+
+Both sides must be on the same side of a corner, for there the frame turns at once: a correction for the edge
+before it, taken in the frame of the edge behind it, throws the tool off by as much as it should mend. Which
+frame the controller uses is told from where the joints have put the tool with what it was sent.
 """
 
 import math
@@ -18,6 +22,7 @@ from diagrams.hardware_link import HardwareLink, StationError, never
 from diagrams.scenario.scenario import Scenario
 from robots.description.model import RobotModel
 from robots.dynamics.compliant_kinematics import CompliantKinematics
+from systems.link.abb.controller import EgmRunConfig
 from systems.link.clock import steady_time
 from systems.link.protocols import PoseSource, RobotLink
 from systems.reference.path_frame import PathLine
@@ -60,11 +65,17 @@ class PathCorrectionRun:
         """Takes what to do.
 
         Raises:
-            ValueError: if the path has no length, or the station none of the camera's poses.
+            ValueError: if the path has no length, the station none of the camera's poses, or its controller
+                takes no path corrections.
         """
         if not scenario.station.link.has_camera:
             raise ValueError("path correction needs a camera: station.link.has_camera is false")
-        self._scenario, self._robot = scenario, robot
+        program = scenario.station.link.run
+        if not isinstance(program, EgmRunConfig):
+            raise ValueError(
+                f"path correction is of ABB's EGM, the station speaks {scenario.station.link.title}"
+            )
+        self._scenario, self._robot, self._lag = scenario, robot, program.correction_lag
         self._line = PathLine(make_path(scenario.reference))
         self._kinematics = CompliantKinematics(robot, scenario.station.payload)
 
@@ -98,6 +109,7 @@ class PathCorrectionRun:
         seen: list[np.ndarray] = []
         reports: list[np.ndarray] = []
         shift_W, robot_at, camera_at, exposed = np.zeros(3), 0, 0, -math.inf
+        taken = _TakenUp(self._lag)
         nominal: deque[np.ndarray] = deque()  # time in s, and where the joints put the tool in m
         began, ended = None, ""
         while not ended:
@@ -114,7 +126,7 @@ class PathCorrectionRun:
             nominal.append(np.array([time, *tip]))
             while nominal[0][0] < time - _KEPT:
                 nominal.popleft()
-            place = self._line.place(tip - shift_W, robot_at)
+            place = self._line.shifted(tip, robot_at, taken.at(time))
             robot_at = place.index
             sample = wire.pose_at(time)
             if sample.valid and sample.time > exposed:
@@ -129,8 +141,9 @@ class PathCorrectionRun:
                 across = seen_at.R_WP[:, 1:]
                 seen.append(np.array([seen_at.along, *(seen_at.p_error_W @ across), *(shift_W @ across)]))
             # Only what lies across the path where the robot is now can be taken up.
-            asked = place.R_WP.T @ shift_W
-            client.correct(np.array([0.0, *asked[1:]]))
+            asked_P = np.array([0.0, *(place.R_WP.T @ shift_W)[1:]])
+            client.correct(asked_P)
+            taken.asked_P = asked_P
             reports.append(np.array([report.time, *report.position]))
             if progress:
                 progress(place.along / self._line.length)
@@ -146,6 +159,21 @@ class PathCorrectionRun:
             place = self._line.place(point, index)
             index, row[:] = place.index, place.p_error_W @ place.R_WP[:, 1:]
         return found
+
+
+class _TakenUp:
+    """What a controller has taken up of the corrections that it was sent, with a lag in s."""
+
+    def __init__(self, lag: float) -> None:
+        self.asked_P = np.zeros(3)  # m, the newest
+        self._lag, self._shift_P, self._time = lag, np.zeros(3), -math.inf
+
+    def at(self, time: float) -> np.ndarray:
+        """The shift (3,) in m in the frame of the path at a time in s that never goes back."""
+        share = 1.0 - math.exp((self._time - time) / self._lag) if self._lag else 1.0
+        self._shift_P = self._shift_P + share * (self.asked_P - self._shift_P)
+        self._time = time
+        return self._shift_P
 
 
 def _at(kept: Sequence[np.ndarray], time: float) -> np.ndarray:

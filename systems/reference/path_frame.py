@@ -13,6 +13,7 @@ from systems.reference.cartesian_path import CartesianPath
 _SPACING = 5e-4  # m, between points of the line
 _SAMPLING = 2e-3  # s, at which the path is looked at; it moves far less than the spacing in that
 _LOOK_BACK, _LOOK_AHEAD = 0.01, 0.05  # m, about the last place: a path may cross itself
+_STEP_AHEAD = 0.005  # m, between two reports of a controller: 1.2 m/s at 4 ms; after a gap it catches up
 _LEAST_ANGLE = 0.1  # of directions, below which z of the tool says nothing
 
 
@@ -54,20 +55,47 @@ class PathLine:
 
     def place(self, p_WE: np.ndarray, last: int) -> Place:
         """Where a point (3,) in m is, not far from the point of the line where it was last."""
-        step = self.along[1]
-        first = max(0, last - int(_LOOK_BACK / step))
-        near = self.points[first : last + int(_LOOK_AHEAD / step) + 1]
-        index = first + int(np.argmin(((near - p_WE) ** 2).sum(axis=1)))
+        return self._nearest(
+            p_WE, slice(max(0, last - self._steps(_LOOK_BACK)), last + self._steps(_LOOK_AHEAD))
+        )
+
+    def shifted(self, p_WE: np.ndarray, last: int, shift_P: np.ndarray) -> Place:
+        """Where on its way a robot is that has been shifted beside the path; it never goes back.
+
+        Args:
+            p_WE: its tool (3,) in m.
+            last: index of the last place.
+            shift_P: (3,) in m in the frame of the path, wherever it is.
+        """
+        return self._nearest(p_WE, slice(last, last + self._steps(_STEP_AHEAD)), shift_P)
+
+    def _nearest(self, p_WE: np.ndarray, among: slice, shift_P: np.ndarray | None = None) -> Place:
+        near = self.points[among] if shift_P is None else self.points[among] + self.R_WP[among] @ shift_P
+        index = among.start + int(np.argmin(((near - p_WE) ** 2).sum(axis=1)))
         error = self.points[index] - p_WE
         tangent = self.R_WP[index, :, 0]
         return Place(index, float(self.along[index]), self.R_WP[index], error - (tangent @ error) * tangent)
+
+    def _steps(self, way: float) -> int:
+        return int(way / self.along[1]) + 1
 
 
 def _frames(tangent: np.ndarray, z_tool: np.ndarray, x_tool: np.ndarray) -> np.ndarray:
     """Right-handed axes (n, 3, 3) from directions (n, 3), those of the tool being unit vectors."""
     x = tangent / np.linalg.norm(tangent, axis=1, keepdims=True)
     y = np.cross(z_tool, x)
-    # Where the tool moves along its own axis, its x axis takes the place of z.
-    y = np.where(np.linalg.norm(y, axis=1, keepdims=True) > _LEAST_ANGLE, y, np.cross(x_tool, x))
+    says = np.linalg.norm(y, axis=1) > _LEAST_ANGLE
+    # Where the tool moves along its own axis, y stays as it is next to there; where it does so on a whole
+    # edge, the x axis of the tool takes the place of z.
+    for way in (range(1, len(y)), range(len(y) - 2, -1, -1)):
+        for k in way:
+            before = k - way.step
+            if (
+                not says[k]
+                and says[before]
+                and abs(x[k] @ y[before]) < _LEAST_ANGLE * np.linalg.norm(y[before])
+            ):
+                y[k], says[k] = y[before] - (x[k] @ y[before]) * x[k], True
+    y = np.where(says[:, None], y, np.cross(x_tool, x))
     y /= np.linalg.norm(y, axis=1, keepdims=True)
     return np.stack([x, y, np.cross(x, y)], -1)
