@@ -2,7 +2,13 @@
 
 import numpy as np
 from pydrake.common.value import Value
-from pydrake.systems.framework import AbstractParameterIndex, Context, LeafSystem
+from pydrake.systems.framework import (
+    AbstractParameterIndex,
+    BasicVector,
+    Context,
+    LeafSystem,
+    NumericParameterIndex,
+)
 
 from robots.description.model import NUM_JOINTS
 from systems.samples import JointSample, PersonSample, PoseSample
@@ -20,6 +26,7 @@ class HardwareStation(LeafSystem):
         out ``pose_sample``       PoseSample
     and, where another process looks for people:
         out ``person_sample``     PersonSample
+        out ``acknowledge``       vector 1: 1 while somebody lets the robot go on after a stop, else 0
 
     It touches no socket. Whoever holds the wire puts in what was received with `receive` and takes out what
     is to be sent with `command`.
@@ -46,6 +53,10 @@ class HardwareStation(LeafSystem):
                 ),
                 {self.abstract_parameter_ticket(index)},
             )
+        if has_people:
+            self._acknowledged = NumericParameterIndex(self.DeclareNumericParameter(BasicVector(np.zeros(1))))
+            ticket = self.numeric_parameter_ticket(self._acknowledged)
+            self.DeclareVectorOutputPort("acknowledge", 1, self._calc_acknowledge, {ticket})
 
     def receive(
         self,
@@ -57,6 +68,14 @@ class HardwareStation(LeafSystem):
         """Makes these the newest samples."""
         context = self.GetMyMutableContextFromRoot(root_context)
         context.get_mutable_abstract_parameter(self._received).set_value((joints, pose, people))
+
+    def acknowledge(self, root_context: Context, is_acknowledged: bool) -> None:
+        """Whether somebody lets the robot go on now; only where somebody looks for people."""
+        context = self.GetMyMutableContextFromRoot(root_context)
+        context.get_mutable_numeric_parameter(self._acknowledged).set_value([float(is_acknowledged)])
+
+    def _calc_acknowledge(self, context: Context, output: BasicVector) -> None:
+        output.set_value(context.get_numeric_parameter(self._acknowledged).value())
 
     def command(self, root_context: Context) -> tuple[np.ndarray, np.ndarray]:
         """The position (6,) in rad and velocity (6,) in rad/s that the servo commands now."""

@@ -42,7 +42,8 @@ class Servo(Diagram):
         out ``velocity_command``  vector 6 in rad/s
         out ``torque_feedforward``  vector 6 in N m, only with a feedforward or a law that knows torques
     and if it watches for people:
-        in  ``image_sample``      ImageSample; ``person_sample`` in its place where another process looks
+        in  ``image_sample``      ImageSample; ``person_sample`` in its place where another process looks,
+                                with ``acknowledge`` as of `SeparationMonitor`
         out ``person_sample``, ``speed_share``, ``stop``, ``separation``  as of `PeopleWatcher` and
                                   `SeparationMonitor`
     and to look at:
@@ -183,7 +184,8 @@ class Servo(Diagram):
         monitor = builder.AddNamedSystem("separation_monitor", watch.monitor)
         builder.ConnectInput(joints, monitor.GetInputPort("joint_sample"))
         if isinstance(watch, LiveWatch):
-            builder.ExportInput(monitor.GetInputPort("person_sample"), "person_sample")
+            for name in ("person_sample", "acknowledge"):
+                builder.ExportInput(monitor.GetInputPort(name), name)
         else:
             watcher = builder.AddNamedSystem("people_watcher", watch.watcher)
             builder.ExportInput(watcher.GetInputPort("image_sample"), "image_sample")

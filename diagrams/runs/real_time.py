@@ -73,7 +73,11 @@ class RealTimeRun:
         self._is_speed_only = self.servo.drive == "velocity"
         for name in ("position_command", "velocity_command"):
             builder.Connect(self.servo.GetOutputPort(name), self.station.GetInputPort(name))
-        for name in ("joint_sample", "pose_sample", *(("person_sample",) if self._live else ())):
+        for name in (
+            "joint_sample",
+            "pose_sample",
+            *(("person_sample", "acknowledge") if self._live else ()),
+        ):
             builder.Connect(self.station.GetOutputPort(name), self.servo.GetInputPort(name))
         ports = ["position_command", "velocity_command", "correction", "guard_status"]
         if self.servo.reference.is_slowed:
@@ -95,6 +99,7 @@ class RealTimeRun:
         self._pauses: list[tuple[float, float]] = []
         self._events: list[GuardEvent] = []
         self._stream: RunRecord | None = None
+        self._is_acknowledged: Callable[[], bool] = never
         self._stopped_ticks = 0.0  # of the guard, until the last tick
         self._stands_since: float | None = None  # s, if the guard holds the robot at rest
         self._seen_before = 0.0  # s of the path, what the camera had shown by then
@@ -117,6 +122,7 @@ class RealTimeRun:
         now: Callable[[], float] = steady_time,
         is_asked_to_end: Callable[[], bool] = never,
         record: RunRecord | None = None,
+        is_acknowledged: Callable[[], bool] = never,
     ) -> RealTimeRecord:
         """Runs the law on the station at the other end.
 
@@ -129,11 +135,12 @@ class RealTimeRun:
             now: the clock of the client's arrivals, in s.
             is_asked_to_end: whether somebody wants the run to end now.
             record: to which the run is logged while it goes on; it is closed at the end, however that is.
+            is_acknowledged: whether somebody now lets the robot go on that was stopped for people.
 
         Raises:
             StationError: if there is no controller or camera, or its cycle is not the scenario's.
         """
-        self._stream = record
+        self._stream, self._is_acknowledged = record, is_acknowledged
         collecting, switching = gc.isenabled(), sys.getswitchinterval()
         # A full search for garbage takes tens of milliseconds with Drake loaded.
         gc.collect()
@@ -269,6 +276,8 @@ class RealTimeRun:
         sample = wire.pose_at(time)
         joints = JointSample(time, report.position, wire.velocity, wire.effort, is_running)
         self.station.receive(self._context, joints, sample, people_at(self._watch, time, wire.arrived))
+        if self._watch:
+            self.station.acknowledge(self._context, self._is_acknowledged())
         if not len(self._reports):
             self._note_ports()  # here, where the log finds samples to begin with
         self._update(self._context)

@@ -43,6 +43,7 @@ def compare_on_station(
     progress: Callable[[float], None] | None = None,
     is_asked_to_end: Callable[[], bool] = never,
     recording: Callable[[str, int], RunRecord | None] = lambda law, number: None,
+    is_acknowledged: Callable[[], bool] = never,
 ) -> GuidedComparison:
     """Runs laws one after the other on the station that the scenario's link names.
 
@@ -55,6 +56,7 @@ def compare_on_station(
         progress: is called now and then with the share that is done, 0 to 1.
         is_asked_to_end: whether somebody wants an end; the run that goes on stops smoothly, none follows.
         recording: opens the record of a law's run with a number from 1.
+        is_acknowledged: whether somebody now lets the robot go on that was stopped for people.
 
     Raises:
         SimulationError: if the station is not there, or a run broke off before its path began.
@@ -72,6 +74,7 @@ def compare_on_station(
                 progress=lambda share, number=number: report((number + share) / len(jobs)),
                 is_asked_to_end=is_asked_to_end,
                 record=recording(law, len(records[law]) + 1),
+                is_acknowledged=is_acknowledged,
             )
             records[law].append(record)
             if record.ended == REQUESTED:

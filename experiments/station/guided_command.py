@@ -24,6 +24,7 @@ from experiments.cli.staging import keep_files
 from experiments.cli.workers import SimulationError
 from experiments.report.files import write_json
 from experiments.report.style import law_file_name
+from experiments.station.acknowledging import acknowledging, how
 from experiments.station.guided import compare_on_station
 from systems.link.makers import LINK_NAMES
 from systems.link.udp_channel import ChannelError, is_loopback
@@ -121,14 +122,26 @@ def guide(
         return streams[-1]
 
     label = f"{count(cycles * len(laws), 'run')} on {where}"
+    scenario = prepared.scenario
+    if scenario.station.overview.enabled and scenario.servo.separation.acknowledge:
+        console.print(how())
     with (
         refusing(ChannelError),
         asking() as end,
+        acknowledging() as given,
         progress_bar(label) as progress,
         real_time_priority(priority),
     ):
         comparison = compare_on_station(
-            prepared.scenario, prepared.robot, laws, cycles, with_cell, progress, end.is_asked, recording
+            scenario,
+            prepared.robot,
+            laws,
+            cycles,
+            with_cell,
+            progress,
+            end.is_asked,
+            recording,
+            given.is_given,
         )
     link = {**comparison.link_json(), "realtime_priority": priority}
     write_json(stage / "link.json", link)

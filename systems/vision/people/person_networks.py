@@ -17,6 +17,7 @@ _DISTANCES = 11  # of NanoDet, in steps of its grid
 _NANODET_MEAN = np.array([103.53, 116.28, 123.675])  # of blue, green and red
 _NANODET_SIGMA = np.array([57.375, 57.12, 58.395])
 _GRAY = 128.0 / 255.0  # of what YOLO sees beside an image
+_COARSEST = 32  # px, the coarsest grid of NanoDet: sides of its input are multiples of it
 _SCORE = {".onnx": 0.35, ".cfg": 0.25}
 _OVERLAP = 0.5  # intersection over union from which two boxes are one person
 
@@ -39,7 +40,7 @@ class PersonNetwork:
         for each in (self._file, *([self._file.with_suffix(".weights")] if self._is_yolo else [])):
             if not each.is_file():
                 raise ValueError(f"network {file}: there is no file {each}")
-        self.size = 416
+        self.size, self._is_cut = 416, False
         try:
             if self._is_yolo:
                 self._check_weights()
@@ -47,7 +48,8 @@ class PersonNetwork:
             else:
                 self._net = cv2.dnn.readNetFromONNX(str(file))
             self._outputs = self._net.getUnconnectedOutLayersNames()
-            self._forward(np.zeros((self.size, self.size, 3), np.uint8))
+            self._decoded(*self._forward(np.zeros((self.size, self.size, 3), np.uint8)))
+            self._is_cut = self._takes_less()
         except cv2.error as error:
             said = str(error).strip().splitlines()[-1]
             raise ValueError(f"network {file}: OpenCV cannot run it: {said}") from error
@@ -65,7 +67,7 @@ class PersonNetwork:
         height, width = image.shape[:2]
         scale = self.size / max(height, width)
         small = cv2.resize(image, (round(width * scale), round(height * scale)), interpolation=cv2.INTER_AREA)
-        boxes, scores = self._decoded(self._forward(small))
+        boxes, scores = self._decoded(*self._forward(small))
         boxes = np.clip(boxes / scale, 0.0, [width, height, width, height])
         kept = _apart(boxes, scores, _SCORE[self._file.suffix])
         boxes, scores = boxes[kept], scores[kept]
@@ -74,25 +76,39 @@ class PersonNetwork:
             boxes, scores = boxes[free], scores[free]
         return boxes, scores
 
-    def _forward(self, small: np.ndarray) -> list[np.ndarray]:
-        """What the network says of an image that fits into its input, at the upper left of it."""
+    def _takes_less(self) -> bool:
+        """Whether it takes images that are not square, of which nothing has to be computed beside them."""
+        if self._is_yolo:
+            return False
+        self._is_cut = True
+        try:
+            self._decoded(*self._forward(np.zeros((self.size // 2, self.size, 3), np.uint8)))
+        except (cv2.error, ValueError):  # its grids are fixed
+            return False
+        return True
+
+    def _forward(self, small: np.ndarray) -> tuple[list[np.ndarray], tuple[int, int]]:
+        """What the network says of an image at the upper left of its input; height and width of that, px."""
         height, width = small.shape[:2]
+        size = (self.size, self.size)
+        if self._is_cut:
+            size = (-(-height // _COARSEST) * _COARSEST, -(-width // _COARSEST) * _COARSEST)
         if self._is_yolo:
             whole = np.full((self.size, self.size, 3), _GRAY, np.float32)
             whole[:height, :width] = small[..., ::-1] / np.float32(255.0)
         else:
-            whole = np.zeros((self.size, self.size, 3), np.float32)
+            whole = np.zeros((*size, 3), np.float32)
             whole[:height, :width] = small
             whole = (whole - _NANODET_MEAN.astype(np.float32)) / _NANODET_SIGMA.astype(np.float32)
         self._net.setInput(np.ascontiguousarray(whole.transpose(2, 0, 1)[None]))
-        return list(self._net.forward(self._outputs))
+        return list(self._net.forward(self._outputs)), size
 
-    def _decoded(self, outputs: list[np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
+    def _decoded(self, outputs: list[np.ndarray], size: tuple[int, int]) -> tuple[np.ndarray, np.ndarray]:
         if self._is_yolo:  # OpenCV's own layers have turned them into boxes, in shares of the image
             rows = np.concatenate(outputs)
             middle, half = self.size * rows[:, :2], 0.5 * self.size * rows[:, 2:4]
             return np.concatenate([middle - half, middle + half], 1), rows[:, 5 + _PERSON]
-        return nanodet_boxes(outputs, self.size)
+        return nanodet_boxes(outputs, size)
 
     def _check_weights(self) -> None:
         """Refuses weights that are not as many as the cfg needs, which OpenCV would read past their end."""
@@ -108,8 +124,8 @@ class PersonNetwork:
             )
 
 
-def nanodet_boxes(outputs: Sequence[np.ndarray], size: int) -> tuple[np.ndarray, np.ndarray]:
-    """Boxes (n, 4) in px of a square input of a size, and scores (n,) of people, of all places of all grids.
+def nanodet_boxes(outputs: Sequence[np.ndarray], size: tuple[int, int]) -> tuple[np.ndarray, np.ndarray]:
+    """Boxes (n, 4) in px of an input of a height and width, and scores (n,) of people, for all places.
 
     Raises:
         ValueError: if the arrays are not those of a NanoDet.
@@ -119,15 +135,15 @@ def nanodet_boxes(outputs: Sequence[np.ndarray], size: int) -> tuple[np.ndarray,
         of_grid.setdefault(each.shape[-2], {})[each.shape[-1]] = each.reshape(each.shape[-2:])
     boxes, scores = [], []
     for places, arrays in of_grid.items():
-        side = round(places**0.5)
-        if side * side != places or set(arrays) != {_KINDS, 4 * _DISTANCES}:
+        step = max(1, round((size[0] * size[1] / places) ** 0.5))
+        columns = size[1] // step
+        if (size[0] // step) * columns != places or set(arrays) != {_KINDS, 4 * _DISTANCES}:
             shapes = ", ".join(str(each.shape) for each in outputs)
             raise ValueError(f"network: outputs of the shapes {shapes} are not those of a NanoDet")
-        step = size / side
         parts = arrays[4 * _DISTANCES].reshape(places, 4, _DISTANCES)
         weights = np.exp(parts - parts.max(axis=2, keepdims=True))
         sides = step * (weights @ np.arange(_DISTANCES)) / weights.sum(axis=2)
-        row, column = np.divmod(np.arange(places), side)
+        row, column = np.divmod(np.arange(places), columns)
         middle = step * (np.stack([column, row], 1) + 0.5)
         boxes.append(np.concatenate([middle - sides[:, :2], middle + sides[:, 2:]], 1))
         scores.append(arrays[_KINDS][:, _PERSON])

@@ -1,5 +1,6 @@
 """Somebody in the cell of a guided robot: what the monitor in the control cycle does with what it is told."""
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -62,13 +63,31 @@ def guided(
     silent: float = np.inf,
     problem: float = np.inf,
     until: float = 20.0,
+    acknowledged: tuple[float, ...] | None = None,
 ) -> RealTimeRecord:
-    wire = Lockstep(SCENARIO)
+    """A run that needs no acknowledgement, or has it for 0.1 s from some times of the path on."""
+    scenario = SCENARIO
+    if acknowledged is not None:
+        limits = replace(scenario.servo.separation, acknowledge=True)
+        scenario = replace(scenario, servo=replace(scenario.servo, separation=limits))
+    wire = Lockstep(scenario)
     told: Any = Told(near, silent, problem)
-    watch = live_watch(SCENARIO, load_robot("irb1200"))
+    watch = live_watch(scenario, load_robot("irb1200"))
     assert watch is not None
-    run = RealTimeRun(SCENARIO, "open_loop", watch=LiveWatch(watch.monitor, lambda: told))
-    return run.run(wire.link, wire.camera(), now=wire.now, is_asked_to_end=lambda: wire.time > until)
+    run = RealTimeRun(scenario, "open_loop", watch=LiveWatch(watch.monitor, lambda: told))
+
+    def is_acknowledged() -> bool:
+        origin = told.shared.origin
+        since = wire.now() - origin if origin else -1.0
+        return any(begin <= since < begin + 0.1 for begin in acknowledged or ())
+
+    return run.run(
+        wire.link,
+        wire.camera(),
+        now=wire.now,
+        is_asked_to_end=lambda: wire.time > until,
+        is_acknowledged=is_acknowledged,
+    )
 
 
 @pytest.mark.slow
@@ -99,6 +118,18 @@ def test_images_that_no_longer_come_stop_the_robot_and_a_process_that_has_ended_
     assert np.abs(silent.people.said["path_time"][after, 1]).max() < 1e-6
     broken = guided(problem=1.0)
     assert broken.ended == "nobody looks for people any more: camera 2 has gone"
+
+
+@pytest.mark.slow
+def test_after_a_stop_somebody_has_to_let_the_robot_go_on_once_the_way_is_free():
+    """Pressed while somebody is near it does not count, and it is not kept for later."""
+    run = guided((0.9, 1.8), until=6.0, acknowledged=(1.4, 3.2))
+    assert run.people is not None
+    times, rate = run.people.times, run.people.said["path_time"][:, 1]
+    stands = (times > 1.8) & (times < 3.2)
+    assert np.abs(rate[stands]).max() < 1e-6
+    assert run.people.said["stop"][stands].all()
+    assert rate[times > 3.2].max() > 0.1
 
 
 def test_a_station_in_real_time_needs_images_from_somewhere():

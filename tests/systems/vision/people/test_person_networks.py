@@ -21,7 +21,7 @@ def test_boxes_of_a_yolo_are_those_of_an_independent_decoder(tmp_path: Path):
     file = write(tmp_path, small_yolo())
     network = PersonNetwork(file)
     image = np.random.default_rng(0).integers(0, 256, (416, 416, 3), np.uint8)
-    found, scores = network._decoded(network._forward(image))
+    found, scores = network._decoded(*network._forward(image))
     raw_net = cv2.dnn.readNetFromDarknet(str(file), str(file.with_suffix(".weights")))
     raw_net.setInput((image[..., ::-1] / np.float32(255.0)).transpose(2, 0, 1)[None].copy())
     last = [name for name in raw_net.getLayerNames() if name.startswith("conv")][-1]
@@ -75,13 +75,16 @@ def test_a_nanodet_says_distances_from_the_middle_of_a_place():
     scores[0, place, 0] = 0.9
     for side, distance in enumerate((1, 2, 0, 3)):
         sides[0, place, side, distance] = 50.0
-    boxes, found = nanodet_boxes([scores, sides.reshape(1, 16, 44)], 416)
+    boxes, found = nanodet_boxes([scores, sides.reshape(1, 16, 44)], (416, 416))
     step, middle = 104.0, np.array([3.5, 2.5]) * 104.0
     expected = [middle[0] - step, middle[1] - 2 * step, middle[0], middle[1] + 3 * step]
     np.testing.assert_allclose(boxes[place], expected)
     assert found[place] == 0.9
+    # As many places over an input that is wider than it is high: row 1, column 3 of 2 by 8.
+    wide = nanodet_boxes([scores, sides.reshape(1, 16, 44)], (208, 832))[0][place]
+    np.testing.assert_allclose(wide, expected - np.array([0.0, 1.0, 0.0, 1.0]) * step)
     with pytest.raises(ValueError, match="not those of a NanoDet"):
-        nanodet_boxes([scores], 416)
+        nanodet_boxes([scores], (416, 416))
 
 
 def test_a_box_that_shows_the_robot_is_nobody(tmp_path: Path):
