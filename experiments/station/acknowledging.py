@@ -52,7 +52,8 @@ def acknowledging() -> Iterator[Acknowledgement]:
         yield given
     finally:
         ended.set()
-        signal.signal(signal.SIGUSR1, before)
+        # Who presses too late must not end what is still to be written, as the signal does by default.
+        signal.signal(signal.SIGUSR1, signal.SIG_IGN if before == signal.SIG_DFL else before)
         if listener.ident is not None:
             listener.join()
 

@@ -21,12 +21,11 @@ def test_it_counts_for_a_moment_only():
     assert not given.is_given()
 
 
-def test_a_signal_acknowledges_and_afterwards_does_what_it_did_before():
-    before = signal.getsignal(signal.SIGUSR1)
+def test_a_signal_acknowledges_and_one_that_comes_too_late_ends_nothing():
     with acknowledging() as given:
         os.kill(os.getpid(), signal.SIGUSR1)
         assert given._until > 0.0
-    assert signal.getsignal(signal.SIGUSR1) == before
+    os.kill(os.getpid(), signal.SIGUSR1)
 
 
 def test_enter_at_a_terminal_acknowledges(monkeypatch: pytest.MonkeyPatch):
