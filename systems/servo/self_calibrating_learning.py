@@ -8,7 +8,7 @@ from robots.description.model import NUM_JOINTS
 from systems.controller_model import ControllerModel
 from systems.estimation import kernels
 from systems.estimation.drives.dead_time import CommandDelay
-from systems.estimation.drives.drive_model import DriveModel
+from systems.estimation.drives.drive_model import COLUMNS, DriveModel
 from systems.estimation.drives.encoder_steps import EncoderSteps
 from systems.estimation.events import DEAD_TIME_CHANGED, Event, EventLog
 from systems.estimation.gear_errors import NUM_STATES
@@ -41,7 +41,7 @@ PLAN = Layout(
     motion=(12,),
     twist=(6,),
     unrest=(1,),
-    columns=(24,),
+    columns=(COLUMNS,),
     correction=(6,),
     states=(NUM_STATES,),
 )
@@ -230,7 +230,9 @@ class Learning:
         if left > _UPSET and instant > memory.heard.path_start[0]:
             if instant > memory.upset_at[0] + _CALM_AGAIN:
                 memory.upset_at[0] = instant
-            memory.paused_until[0] = min(instant + _UPSET_PAUSE, memory.upset_at[0] + _LONGEST_PAUSE)
+            until = min(instant + _UPSET_PAUSE, memory.upset_at[0] + _LONGEST_PAUSE)
+            if until > instant:  # or what is believed would be opened again at every instant
+                memory.paused_until[0] = until
         if instant <= memory.paused_until[0]:
             return
         if np.isfinite(memory.paused_until[0]):

@@ -18,9 +18,12 @@ from systems.estimation.arm_loads import ArmLoads
 from systems.estimation.kernels.arrays import DriveMemory, Drives
 from systems.estimation.memory import Layout
 
-_FILTERED = 5  # torque that is needed beside the feedforward; rotor, viscous, Coulomb; the load of a kilogram
-SIZE = 38
-DEAD_TIME, MASS = 0, 37
+# Torque that is needed beside the feedforward; rotor, viscous, Coulomb; the load of a kilogram, and of a kg m
+# of its first moment along x, y, z.
+_FILTERED = 8
+COLUMNS = 6 * (_FILTERED - 1)
+SIZE = 41
+DEAD_TIME, MASS, MOMENT = 0, 37, slice(38, 41)
 _STEEPEST = 0.05  # rad/s, what learning may add to the speed of a joint
 
 
@@ -37,6 +40,7 @@ class DriveModelConfig:
     dead_time_sigma: float = 3e-3  # s, of all joints alike
     lag_sigma: float = 3e-4  # s, of each joint
     payload_sigma: float = 0.5  # kg
+    moment_sigma: float = 0.07  # kg m, first moment of the payload: 7 kg whose centre is off by 10 mm
 
 
 class DriveCommand(NamedTuple):
@@ -45,7 +49,7 @@ class DriveCommand(NamedTuple):
     position: np.ndarray  # (6,) rad
     velocity: np.ndarray  # (6,) rad/s
     torque: np.ndarray  # (6,) N m, joint side, on top of what the drives do for gravity
-    columns: np.ndarray  # (24,), what `DriveModel.features` needs of this instant
+    columns: np.ndarray  # (42,), what `DriveModel.features` needs of this instant
 
 
 class DriveModel:
@@ -54,8 +58,12 @@ class DriveModel:
     A drive is e = G w: the torque w that a motion needs and nobody gives it leaves the motor behind by e,
     with k_d e' + k_p e + k_i int e dt = w. The model is e = Phi beta with columns for a shared dead time, a
     lag and an inertia of each joint, the torques of rotor, viscous and Coulomb friction through G, a constant
-    and the load of a kilogram through G; beta is learnt by recursive least squares. The mass in it makes up
-    for all that loads are wrong by. It is not that of the payload, and nobody else may take it for that.
+    and the load of a kilogram and of its first moment through G; beta is learnt by recursive least squares.
+    Without the moment friction is taken for what a payload whose centre is elsewhere weighs at the wrist:
+    both turn over with the motion. Mass and moment in it make up for all that loads are wrong by. They are
+    not those of the payload, and nobody else may take them for that.
+
+    Where drives take torques, these are sent ahead by the dead time that was learnt, as positions are.
     """
 
     def __init__(self, model: ControllerModel, config: DriveModelConfig) -> None:
@@ -82,7 +90,7 @@ class DriveModel:
         drawn = ArmGeometry(robot, np.array([], dtype=int))
         self._held = drawn.constants(np.zeros(NUM_PARAMETERS)), ArmLoads(robot).masses
         spread = [config.dead_time_sigma, *[config.lag_sigma] * 6, *[1e-4] * 6]
-        spread += [0.3, 0.3, 0.5] * 6 + [1e-5] * 6 + [config.payload_sigma]
+        spread += [0.3, 0.3, 0.5] * 6 + [1e-5] * 6 + [config.payload_sigma] + [config.moment_sigma] * 3
         self._prior = np.diag(np.array(spread) ** 2)
         self.layout = Layout(
             started=(1,),
@@ -114,13 +122,13 @@ class DriveModel:
 
         """
         known = DriveMemory(memory.started, memory.z, memory.w, memory.beta, memory.correction)
-        out, columns = np.empty((3, 6)), np.empty(24)
+        out, columns = np.empty((3, 6)), np.empty(COLUMNS)
         kernels.drives.command(self._drives, *self._held, known, motion, loads, mass, _STEEPEST, out, columns)
         position, velocity, torque = out
         return DriveCommand(position, velocity, torque, columns)
 
     def features(self, v: np.ndarray, a: np.ndarray, columns: np.ndarray) -> np.ndarray:
-        """Rows of the regression, shape (6, 38), from motion and the filtered torques (24,)."""
+        """Rows of the regression, shape (6, 41), from motion and the filtered torques (42,)."""
         Phi = np.zeros((6, SIZE))
         kernels.drives.features(v, a, columns, Phi)
         return Phi
@@ -138,11 +146,11 @@ class DriveModel:
         Args:
             memory: of the layout.
             planned: position, velocity and acceleration, (6,) each.
-            columns, correction: of the command of that instant, (24,) and (6,) in rad.
+            columns, correction: of the command of that instant, (42,) and (6,) in rad.
             actual: where the motors were, rad, (6,).
 
         Returns:
-            Phi (6, 38) and y (6,) for `learn`, and the most that is not explained yet in rad.
+            Phi (6, 41) and y (6,) for `learn`, and the most that is not explained yet in rad.
         """
         Phi, y = np.zeros((6, SIZE)), np.empty(6)
         left = kernels.drives.compare(planned, correction, columns, actual, memory.beta, Phi, y)
@@ -153,9 +161,10 @@ class DriveModel:
         kernels.drives.learn(memory.P, memory.beta, Phi, y, self._config.following_sigma**2)
 
     def widen(self, memory: SimpleNamespace) -> None:
-        """Load or dead time have changed: constants, mass and dead time are open again."""
+        """Load or dead time have changed: constants, payload and dead time are open again."""
         extra = np.zeros(SIZE)
         extra[31:37], extra[MASS], extra[DEAD_TIME] = 3e-5, 5.0, 1e-3
+        extra[MOMENT] = self._config.moment_sigma
         memory.P[_DIAGONAL, _DIAGONAL] += extra**2
 
 

@@ -8,17 +8,20 @@ from systems.estimation.kernels.geometry import place_links
 from systems.estimation.kernels.loads import hold
 from systems.estimation.kernels.poses import compiled, inner
 
+_MOST_PERIODS = 1.5  # by which torques are sent ahead or held back
+
 
 @compiled
 def features(v, a, filtered, Phi):
-    """Rows of the regression, (6, 38), which are zero before; see `DriveModel.features`."""
+    """Rows of the regression, (6, 41), which are zero before; see `DriveModel.features`."""
     for i in range(6):
         Phi[i, 0] = Phi[i, 1 + i] = v[i]
         Phi[i, 7 + i] = 1e-2 * a[i]
         for k in range(3):
             Phi[i, 13 + 3 * i + k] = filtered[6 * k + i]
         Phi[i, 31 + i] = 1.0
-        Phi[i, 37] = filtered[18 + i]
+        for k in range(4):
+            Phi[i, 37 + k] = filtered[6 * (3 + k) + i]
 
 
 @inner
@@ -27,7 +30,9 @@ def _behind(v, a, filtered, beta, i):
     total = v * beta[0] + v * beta[1 + i] + 1e-2 * a * beta[7 + i]
     for k in range(3):
         total += filtered[6 * k + i] * beta[13 + 3 * i + k]
-    return total + beta[31 + i] + filtered[18 + i] * beta[37]
+    for k in range(4):
+        total += filtered[6 * (3 + k) + i] * beta[37 + k]
+    return total + beta[31 + i]
 
 
 @compiled
@@ -39,8 +44,8 @@ def compare(planned, correction, filtered, actual, beta, Phi, y):
         correction: that was commanded beside the plan, rad, (6,).
         filtered: as of `features`.
         actual: positions of the motors, rad, (6,).
-        beta: (38,).
-        Phi: (6, 38), which are zero before, y: (6,), are written.
+        beta: (41,).
+        Phi: (6, 41), which are zero before, y: (6,), are written.
     """
     theta, v, a = planned
     features(v, a, filtered, Phi)
@@ -127,26 +132,30 @@ def command(drives, arm, masses, memory, motion, loads, mass, steepest, out, fil
         loads: of the gears, (5, 18).
         mass: of the payload, kg.
         steepest: rad/s, what the correction may add to the speed of a joint.
-        out: (3, 6), position, velocity and torque; filtered: (24,), what `features` takes, of rotor, viscous
-            and Coulomb friction and of a kilogram; are written.
+        out: (3, 6), position, velocity and torque; filtered: (42,), what `features` takes, of rotor, viscous
+            and Coulomb friction, of a kilogram and of a kg m along each axis; are written.
     """
     theta, v, a = motion
-    X_WE, frames, held, w = np.empty((4, 4)), np.empty((7, 4, 4)), np.empty(6), np.empty(5)
+    X_WE, frames, held, w = np.empty((4, 4)), np.empty((7, 4, 4)), np.empty(6), np.empty(8)
     place_links(arm, theta, X_WE, frames)
     hold(masses, drives.payload, frames, theta, held)
     is_first, most = memory.started[0] == 0.0, drives.period * steepest
+    # Periods that a torque has to be sent ahead: it arrives late by what was learnt, and is held for a period
+    # in whose middle it should be right. A dead time that is wrong by more is corrected by the plan.
+    ahead = 0.5 + min(max(memory.beta[0] / drives.period, -_MOST_PERIODS), _MOST_PERIODS)
     for i in range(6):
         w[1], w[2] = drives.rotor[i] * a[i], drives.viscous[i] * v[i]
         w[3], w[4] = drives.coulomb[i] * math.tanh(v[i] / drives.width[i]), loads[1, i]
+        for k in range(3):
+            w[5 + k] = loads[2 + k, i]
         w[0] = needed = w[1] + w[2] + w[3] + loads[0, i] + mass * loads[1, i] - held[i]
         z, last = memory.z[:, i], memory.w[:, i]
         out[0, i], out[1, i], out[2, i] = theta[i], v[i], 0.0
         if drives.takes_torque:
-            # It arrives when the motion does; drives hold it for a period, so it is that of its middle.
-            out[2, i] = needed if is_first else 1.5 * needed - 0.5 * last[0]
+            out[2, i] = needed if is_first else needed + ahead * (needed - last[0])
             last[0] = w[0] = 0.0  # nothing is missing
         if is_first:
-            for k in range(5):
+            for k in range(8):
                 z[k, 0] = w[k] / drives.ki[i]
         else:
             _filter(drives.step[i], z, last, w)
@@ -155,7 +164,7 @@ def command(drives, arm, masses, memory, motion, loads, mass, steepest, out, fil
             out[0, i] += e
             out[1, i] += (needed - drives.kp[i] * e - drives.ki[i] * integral) / drives.kd[i]
         last[0] = needed
-        for k in range(1, 5):
+        for k in range(1, 8):
             last[k], filtered[6 * (k - 1) + i] = w[k], z[k, 1]
         correction = _behind(v[i], a[i], filtered, memory.beta, i)
         before = correction if is_first else memory.correction[i]

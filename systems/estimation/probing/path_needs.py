@@ -11,7 +11,7 @@ from robots.dynamics.newton_inverse import inverse_kinematics
 from systems.estimation.tip_model import TipModel
 from systems.reference.cartesian_path import CartesianPath
 
-_MOST_INSTANTS = 48  # of the path, evenly spaced in time
+_MOST_INSTANTS = 48  # of the lap, evenly spaced in time
 _INVERSE_STEP = 0.05  # s, between two poses of the inverse kinematics
 # An angle counts as a way of the tip at an arm of 0.25 m.
 _SCALE = np.array([0.25, 0.25, 0.25, 1.0, 1.0, 1.0])
@@ -28,17 +28,20 @@ class Standing(NamedTuple):
 
 
 class PathNeeds:
-    """The path's columns: how the tip moves with each unknown, at instants all along it."""
+    """The path's columns: how the tip moves with each unknown, at instants all along its first lap.
+
+    Other laps need nothing else, and what the first one shows is known when they begin.
+    """
 
     def __init__(
         self, model: TipModel, weights: np.ndarray, path: CartesianPath, home: np.ndarray, late: float
     ) -> None:
-        """Works out the joints along the path as the nominal robot would have them.
+        """Works out the joints along the first lap as the nominal robot would have them.
 
         Args:
             model: of the tip.
             weights: of the six entries of a pose error, one over their variances.
-            path: that will be run.
+            path: that will be run, once or again and again.
             home: where the joints are near at its start, rad, (6,).
             late: s, by which samples may be late for use on the path.
 
@@ -46,7 +49,8 @@ class PathNeeds:
             ValueError: if the nominal robot does not reach the path.
         """
         self._model, self._weights = model, weights
-        length = max(path.dwell_start - path.path_start, _INVERSE_STEP)
+        end = path.lap_starts[1] if len(path.lap_starts) > 1 else path.dwell_start
+        length = max(end - path.path_start, _INVERSE_STEP)
         steps = max(1, math.ceil(length / _INVERSE_STEP))
         times = path.path_start + np.linspace(0.0, length, steps + 1)
         inverse = inverse_kinematics(model.robot, float(model.mean[model.M][0]))

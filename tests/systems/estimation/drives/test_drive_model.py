@@ -6,7 +6,14 @@ from scipy.integrate import solve_ivp
 
 from robots.description.model import load_robot
 from systems.controller_model import ControllerModel
-from systems.estimation.drives.drive_model import DEAD_TIME, MASS, SIZE, DriveModel, DriveModelConfig
+from systems.estimation.drives.drive_model import (
+    DEAD_TIME,
+    MASS,
+    MOMENT,
+    SIZE,
+    DriveModel,
+    DriveModelConfig,
+)
 
 PERIOD = 4e-3
 LOADS = np.zeros((5, 18))
@@ -47,6 +54,51 @@ def test_a_dead_time_and_wrong_friction_are_learnt():
     assert behind[0] > 1e-3
     assert behind[-250:].max() < 2e-5
     assert memory.beta[DEAD_TIME] == pytest.approx(3e-3, abs=1e-4)
+
+
+def test_a_load_that_turns_over_with_the_motion_is_not_taken_for_friction():
+    # What a payload whose centre is elsewhere weighs at the wrist changes its sign as the motion does.
+    def friction(last: int) -> np.ndarray:
+        """By how much Coulomb friction was ever believed to be off, which it is not; shape (6,)."""
+        model, memory = drives()
+        worst = np.zeros(6)
+        for k in range(500):
+            theta, v, a = motion(k * PERIOD)
+            loads = LOADS.copy()
+            loads[2, :6] = 9.81 * np.sin(3.0 * theta)
+            columns = model.command(memory, (theta, v, a), loads, 7.0).columns
+            Phi = model.features(v, a, columns)
+            behind = 0.05 * Phi[:, MOMENT.start]
+            Phi[:, last + 1 :] = 0.0  # columns that the model is to do without
+            model.learn(memory, Phi, behind)
+            worst = np.maximum(worst, np.abs(memory.beta[15:33:3]))
+        return worst
+
+    with_moment, without = friction(MOMENT.stop), friction(MASS)
+    assert with_moment.max() < 0.3 * without.max()
+
+
+def test_torques_are_sent_ahead_by_the_dead_time_that_was_learnt():
+    def torques(dead_time: float, shift: float) -> np.ndarray:
+        model, memory = drives()
+        memory.beta[DEAD_TIME] = dead_time
+        sent = [model.command(memory, motion(k * PERIOD + shift), LOADS, 7.0).torque for k in range(50)]
+        return np.array(sent)[2:]
+
+    now, ahead, wanted = torques(0.0, 0.0), torques(3e-3, 0.0), torques(0.0, 3e-3)
+    off, left = (np.abs(sent - wanted).max(axis=0) for sent in (now, ahead))
+    assert (left < 0.2 * off).all()
+
+
+def test_a_dead_time_beyond_what_is_left_to_the_drives_does_not_make_torques_jump():
+    def largest(dead_time: float) -> np.ndarray:
+        model, memory = drives()
+        memory.beta[DEAD_TIME] = dead_time
+        return np.abs([model.command(memory, motion(k * PERIOD), LOADS, 7.0).torque for k in range(200)]).max(
+            0
+        )
+
+    np.testing.assert_array_equal(largest(30e-3), largest(1.5 * PERIOD))
 
 
 def test_the_position_command_makes_up_for_a_torque_that_nobody_gives():

@@ -39,6 +39,15 @@ def test_columns_are_how_the_tip_moves():
     np.testing.assert_allclose(of.columns(q, still, still)[0, 3:, i], step, rtol=1e-3, atol=1e-7)
 
 
+def test_a_path_again_and_again_needs_what_it_needs_once():
+    paths = [make_path(ReferenceConfig(path=Circle(), settle=4.0, laps=laps)) for laps in (1, 3)]
+    once, thrice = (PathNeeds(MODEL, WEIGHTS, path, HOME, 0.5) for path in paths)
+    np.testing.assert_allclose(thrice.times, once.times, atol=1e-9)
+    np.testing.assert_allclose(thrice.q, once.q, atol=1e-9)
+    A = once.prior + once.information(once.H[:1])
+    assert thrice.expected(A, RATE) == pytest.approx(once.expected(A, RATE), rel=1e-6)
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("shape", [Rectangle(), Circle()])
 def test_what_the_design_promises_its_motion_shows(shape):
