@@ -4,6 +4,7 @@ import os
 from pathlib import Path
 
 _LATE = 1e-3  # s, above what a wake-up takes
+_WORTH_SAYING = 0.01  # s by which this machine was late
 _SCHEDULED = Path("/proc/self/schedstat")  # ns on a processor, ns of waiting for one; Linux
 _STAT = Path(
     "/proc/stat"
@@ -53,6 +54,10 @@ class HostLateness:
             f"({self.late} of {self.messages} messages late, {self.waited:.1f} s of waiting for a "
             f"processor, {self.stolen:.1f} s stolen by other machines)"
         )
+
+    def reason(self, began: float) -> str:
+        """What follows why a run ended, with times since ``began`` in s; empty if it was hardly late."""
+        return f"; {self.sentence(began)}" if self.worst > _WORTH_SAYING else ""
 
 
 def _stolen() -> float:

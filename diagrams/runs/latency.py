@@ -100,7 +100,7 @@ def measure_latency(
     wire.connect(camera is not None)
     report = wire.last
     assert report is not None
-    start, began = report.position.copy(), report.time
+    start, began, began_here = report.position.copy(), report.time, now()
     reach = np.array([-1.0, 1.0]) * math.radians(config.amplitude_deg) + start[axis]
     if reach[0] < robot.lower[axis] or reach[1] > robot.upper[axis]:
         raise ValueError(
@@ -123,9 +123,8 @@ def measure_latency(
         following = wire.next_report()
         if following is None or not following.is_ready:
             wire.stop_smoothly()
-            raise StationError(
-                "the controller fell silent" if following is None else "the controller stopped"
-            )
+            why = "the controller fell silent" if following is None else "the controller stopped"
+            raise StationError(why + wire.host.reason(began_here))
         report = following
     stamp, commanded, measured = np.array(rows).T
     reported = np.array([wire.robot_clock.station_time(round(1e6 * each)) for each in stamp])

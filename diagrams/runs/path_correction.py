@@ -111,7 +111,7 @@ class PathCorrectionRun:
         shift_W, robot_at, camera_at, exposed = np.zeros(3), 0, 0, -math.inf
         taken = _TakenUp(self._lag)
         nominal: deque[np.ndarray] = deque()  # time in s, and where the joints put the tool in m
-        began, ended = None, ""
+        began, began_here, ended = None, now(), ""
         while not ended:
             if is_asked_to_end():
                 ended = REQUESTED
@@ -119,7 +119,10 @@ class PathCorrectionRun:
             report = wire.next_report(wait=_SILENCE)
             if report is None or not report.is_ready:
                 left = self._line.length - float(self._line.along[robot_at])
-                ended = "path" if left < _NEAR_END else (wire.trouble or _broken(report is None, left))
+                ended = "path"
+                if left >= _NEAR_END:
+                    why = wire.trouble or _broken(report is None, left)
+                    ended = why + wire.host.reason(began_here)
                 break
             began = report.time if began is None else began
             time, tip = report.time - began, self._kinematics.forward(report.position)[:3, 3]

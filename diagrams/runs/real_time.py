@@ -32,7 +32,6 @@ __all__ = ["REQUESTED", "RealTimeRecord", "RealTimeRun", "StationError"]
 
 _WARM_UP = 60  # ticks
 REQUESTED = "ended on request"  # why a run ended that somebody wanted to end
-_WORTH_SAYING = 0.01  # s by which this machine was late
 _STOOD = 0.5  # s at rest by the guard, after which a run is over that nothing leads back
 _SWITCH = 5e-4  # s after which another thread, such as that of a progress bar, gives way
 
@@ -171,8 +170,8 @@ class RealTimeRun:
                 began, ended = now(), REQUESTED
             if ended != "path":
                 wire.stop_smoothly()
-                if ended != REQUESTED and wire.host.worst > _WORTH_SAYING:
-                    ended = f"{ended}; {wire.host.sentence(began)}"
+                if ended != REQUESTED:
+                    ended += wire.host.reason(began)
         finally:
             if watch:
                 watch.end()

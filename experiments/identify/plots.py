@@ -13,6 +13,8 @@ from experiments.report.plot_page import Section, html_table, sortable_table, wr
 _MEASURED, _BEFORE, _AFTER = "#7a8696", "#e0a43a", "#2f7fd0"
 _UNITS = {"gyro": "rad/s", "accelerometer": "m/s<sup>2</sup>"}
 _SHOWN_CASES = 4
+_ROW = 120  # px, of a sensor
+_NAMED = 6  # springs and dampers in the first lines of the page; more are in its table
 
 
 def table_head(study: IdentifyStudy) -> list[str]:
@@ -56,7 +58,9 @@ def verdict(study: IdentifyStudy) -> str:
             f"They are within {stiffness.max():.1%} of the truth (median {np.median(stiffness):.1%})"
             + (f", dampers within {damping.max():.0%}." if len(damping) else ".")
         )
-    if study.weak:
+    if len(study.weak) > _NAMED:
+        said.append(f"{len(study.weak)} springs and dampers are not identifiable; the table marks them.")
+    elif study.weak:
         said.append(f"Not identifiable: {', '.join(study.weak)}.")
     if study.rectangle_ratio is not None:
         said.append(
@@ -95,6 +99,7 @@ def signals_figure(study: IdentifyStudy, case: int) -> go.Figure:
             )
             figure.add_trace(trace.update(legendgroup=name, showlegend=row == 1), row, 1)
         figure.update_yaxes(title={"text": _UNITS[sensor.kind], "font": {"size": 12}}, row=row, col=1)
+    figure.update_layout(legend={"y": -60.0 / (_ROW * len(found.sensors))})  # close to the last row
     return figure.update_xaxes(title="time in s", row=len(found.sensors))
 
 
@@ -138,21 +143,21 @@ def sensitivity_rows(study: IdentifyStudy) -> list[list[str]]:
 
 def write_identify_page(path: Path, study: IdentifyStudy) -> None:
     """All of it as a page that opens offline."""
-    sections = [
-        Section(
-            "Parameters",
-            "Dampers as retardation times, damper over spring. Sigma contains what cases and sensors "
-            "disagree about; known is what is sure to 3 % (springs) or 25 % (dampers).",
-            html_table(table_head(study), table_rows(study)),
-        ),
-        Section(
-            "Spectra",
-            "All sensors and cases, each reading over the spread of what the model leaves of it.",
-            spectra_figure(study),
-            420,
-        ),
-    ]
-    height, cases = 120 * len(study.found.sensors), study.found.cases
+    parameters = Section(
+        "Parameters",
+        "Dampers as retardation times, damper over spring. Sigma contains what cases and sensors "
+        "disagree about; known is what is sure to 3 % (springs) or 25 % (dampers).",
+        html_table(table_head(study), table_rows(study)),
+    )
+    spectra = Section(
+        "Spectra",
+        "All sensors and cases, each reading over the spread of what the model leaves of it: at the natural "
+        "frequencies the identified model should leave less than the one before.",
+        spectra_figure(study),
+        420,
+    )
+    sections = [spectra, parameters]
+    height, cases = _ROW * len(study.found.sensors), study.found.cases
     for case in np.unique(np.linspace(0, len(cases) - 1, _SHOWN_CASES).astype(int)):
         title = f"Case {cases[case].name}: measured, and modelled before and after"
         note = (

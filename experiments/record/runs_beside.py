@@ -1,6 +1,7 @@
 """Two comparisons side by side: their errors over each other, and what differs between them."""
 
 import json
+import os
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -72,13 +73,14 @@ def beside_sections(one: KeptComparison, other: KeptComparison) -> tuple[str, li
         for name in dict.fromkeys([*versions[0], *versions[1]])
     ]
     same_versions = all(first == second for _, first, second in newer)
-    names = [str(one.folder), str(other.folder)]
+    names = folder_names(one.folder, other.folder)
     differing = [list(row) for row in ((place, before, after) for place, after, before in changes)]
     sections = [
         Section(
             "Errors over each other",
-            f"Distance and angle of the tip from the wanted pose: lines are {names[0]}, dashes {names[1]}.",
-            _figure([one, other]),
+            "Distance and angle of the tip from the wanted pose: lines are "
+            f"{names[0]} ({one.folder}), dashes {names[1]} ({other.folder}).",
+            _figure([one, other], names),
             620,
         ),
         Section(
@@ -116,12 +118,19 @@ def _verdict(
     )
 
 
-def _figure(kept: list[KeptComparison]) -> go.Figure:
+def folder_names(one: Path, other: Path) -> list[str]:
+    """What tells two folders apart: their ways from the folder that holds both."""
+    places = [os.path.abspath(each) for each in (one, other)]
+    short = [os.path.relpath(each, os.path.commonpath(places)) for each in places]
+    return [str(one), str(other)] if os.curdir in short else short
+
+
+def _figure(kept: list[KeptComparison], names: list[str]) -> go.Figure:
     figure = make_subplots(2, 1, shared_xaxes=True, vertical_spacing=0.06)
     colors = law_colors(dict.fromkeys(law for each in kept for law in each.errors))
-    for each, dash in zip(kept, _DASHES, strict=True):
+    for each, folder, dash in zip(kept, names, _DASHES, strict=True):
         for law, (time, distance, angle) in each.errors.items():
-            name = f"{law_title(law)}, {each.folder}"
+            name = f"{law_title(law)}, {folder}"
             for row, values in ((1, distance), (2, angle)):
                 line = {"color": colors[law], "dash": dash, "width": 1.5}
                 figure.add_trace(

@@ -176,8 +176,8 @@ def _sections(passes: dict[str, _Pass], numbers: dict[str, dict[str, Any]]) -> l
         for axis, values in zip("yz", found.asked.T, strict=True):
             if name == _CORRECTED:
                 asked.add_trace(go.Scatter(x=found.along, y=1e3 * values, mode="lines", name=axis))
-    for figure in (beside, asked):
-        figure.update_layout(xaxis={"title": "along the path in m"}, yaxis={"title": "mm"})
+    for figure, title in ((beside, "beside the path in mm"), (asked, "correction in mm")):
+        figure.update_layout(xaxis={"title": "along the path in m"}, yaxis={"title": title})
     sizes = [key for key in next(iter(numbers.values())) if key.endswith("_m")]
     rows = [
         [

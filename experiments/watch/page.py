@@ -179,7 +179,6 @@ def _timeline(run: WatchRun) -> go.Figure:
             "tickmode": "linear",
             "dtick": 0.2,
         },
-        legend={"orientation": "h", "y": 1.1},
     )
 
 

@@ -13,6 +13,13 @@ def test_a_message_is_late_if_anything_before_it_was():
     assert (host.messages, host.late) == (4, 2)
     assert (host.worst, host.worst_at) == (0.04, 112.3)
     assert host.sentence(100.0).startswith("this machine was late by 40 ms at 12.3 s (2 of 4 messages late, ")
+    assert host.reason(100.0) == f"; {host.sentence(100.0)}"
+
+
+def test_a_machine_that_was_hardly_late_is_no_reason():
+    host = HostLateness()
+    host.note(4e-3, 1.0, is_message=True)
+    assert host.reason(0.0) == ""
 
 
 def test_waiting_for_a_processor_is_counted_from_the_start():

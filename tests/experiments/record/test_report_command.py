@@ -9,6 +9,7 @@ from diagrams.record.log import RunLog
 from diagrams.scenario.scenario import load_scenario
 from experiments.comparison.errors_table import read_errors
 from experiments.metrics.run_metrics import summary
+from experiments.record.runs_beside import folder_names
 from experiments.record.runs_command import runs_below
 from experiments.record.simulated import write_records
 from experiments.report.files import write_json
@@ -111,6 +112,19 @@ def test_two_runs_side_by_side_show_what_differs_and_by_how_much(tmp_path: Path)
     time, distance, _ = read_errors(tmp_path / "early" / "errors.csv")["pbvs"]
     assert distance[time >= 0.2 - 1e-9].max() == pytest.approx(early, rel=1e-5)
     assert load_scenario(str(tmp_path / "late" / "scenario.yaml")).station.camera.delay == 0.012
+
+
+@pytest.mark.parametrize(
+    ("folders", "names"),
+    [
+        (("out/early", "out/late"), ["early", "late"]),
+        (("out/a/run", "out/b/run"), ["a/run", "b/run"]),
+        (("out", "out/late"), ["out", "out/late"]),
+        (("out", "out"), ["out", "out"]),
+    ],
+)
+def test_folders_are_named_by_what_tells_them_apart(folders: tuple[str, str], names: list[str]):
+    assert folder_names(*map(Path, folders)) == names
 
 
 def test_a_folder_that_is_no_run_is_refused_beside_another(tmp_path: Path):
