@@ -29,7 +29,7 @@ from experiments.calibration.page import write_calibration_page
 from experiments.calibration.recording import recorded_measurements
 from experiments.calibration.report import calibration_json, print_calibration
 from experiments.calibration.urdf_option import urdf_robot, urdf_sag
-from experiments.cli.console import print_files, progress_bar, refusing
+from experiments.cli.console import print_files, print_note, progress_bar, refusing
 from experiments.cli.json_output import human_console, json_output
 from experiments.cli.option_limits import at_least
 from experiments.cli.options import JsonOption, OutOption, RobotOption, ScenarioOption, SetOption
@@ -40,6 +40,7 @@ from experiments.report.files import write_text
 from robots.calibration.identification import identify
 from robots.calibration.instruments.observation_file import names_targets
 from robots.calibration.measurement_file import RowProblem, measurement_text, read_measurements
+from robots.description.foreign_sources import foreign_sources_note
 from robots.description.joint_errors import names_of
 from robots.description.robot_file import robot_text
 from robots.description.urdf import urdf_text
@@ -154,6 +155,7 @@ def calibrate_command(
         prepared = prepare(scenario, settings or [], robot, needs_path=not wanted.is_given)
         if compliance is None and not wanted.is_given:
             wanted = replace(wanted, compliance=prepared.scenario.station.elasticity == "structure")
+        print_note(human, foreign_sources_note(prepared.robot) if wanted.is_given else prepared.note)
         baked = urdf_sag(urdf, urdf_payload, urdf_pose, wanted.compliance)
         if measurements and names_targets(measurements):
             wanted.check_instruments()

@@ -16,11 +16,12 @@ from experiments.calibration.design_program import ProgramFiles
 from experiments.cli.console import print_files, progress_bar, refusing
 from experiments.cli.json_output import human_console, json_output
 from experiments.cli.options import JsonOption, PictureOption
+from experiments.cli.prepare import noted_robot
 from experiments.cli.staging import PAGE, TABLE, staged_file
 from experiments.report.files import write_text
 from experiments.report.plot_page import Section, write_plot_page
 from experiments.report.robot_plot import joints_figure, tips_figure
-from robots.description.model import RobotModel, load_robot
+from robots.description.model import RobotModel
 from robots.measurement_design.candidate_grid import AxisRange, own_ranges
 from robots.measurement_design.clear_ways import ClearWays
 from robots.measurement_design.constraints import AdmissibleConfig, AdmissibleConfigurations, View
@@ -108,7 +109,7 @@ def design_command(
         run_stage = run.staged(stack)
         table = stack.enter_context(staged_file(out, *TABLE)) if out else None
         stack.enter_context(output.staged())
-        model = load_robot(robot)
+        model = noted_robot(human, robot)
         before, started = _peak_mb(), time.perf_counter()
         view = None if camera is None else View(_place(camera))
         config = AdmissibleConfig(

@@ -10,6 +10,7 @@ from diagrams.runs.simulation import Experiment, nominal_robot
 from diagrams.scenario.carried import HOME, PATH, carried_over
 from diagrams.scenario.scenario import Scenario, ScenarioError, load_scenario, scenario_text
 from diagrams.scenario.scenario_file import OptionSetting, read_scenario_nodes, stated_keys
+from experiments.cli.console import print_note
 from robots.description.foreign_sources import foreign_sources_note
 from robots.description.model import RobotModel, load_robot
 from robots.kinematics.error_kinematics import ErrorKinematics
@@ -54,6 +55,17 @@ class Prepared:
     def text(self) -> str:
         """The whole scenario as YAML under its title."""
         return f"# {self.title}\n{scenario_text(self.scenario)}"
+
+
+def noted_robot(console: Console, name: str) -> RobotModel:
+    """A robot by its name or file; says so if the sources in the file are those of another robot.
+
+    Raises:
+        ValueError: if there is no such robot, or its file cannot be read.
+    """
+    robot = load_robot(name)
+    print_note(console, foreign_sources_note(robot))
+    return robot
 
 
 def prepare(

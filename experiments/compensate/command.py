@@ -12,6 +12,7 @@ from rich.markup import escape
 from experiments.cli.console import print_files, progress_bar, refusing
 from experiments.cli.json_output import human_console, json_output
 from experiments.cli.options import JsonOption, PictureOption
+from experiments.cli.prepare import noted_robot
 from experiments.cli.staging import PAGE, staged_file
 from experiments.compensate.report import compensation_json, verdict, write_compensation_page
 from experiments.compensate.study import CompensationStudy, compensate
@@ -88,7 +89,7 @@ def compensate_command(
         with progress_bar("targets") as progress:
             study = compensate(
                 program,
-                load_robot(believed),
+                noted_robot(human, believed),
                 true,
                 [str(other) for other in others or []],
                 (tool, base),

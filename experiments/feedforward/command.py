@@ -20,6 +20,7 @@ from experiments.cli.options import (
     PictureOption,
     StudiedRobotOption,
 )
+from experiments.cli.prepare import noted_robot
 from experiments.cli.staging import PAGE, staged_file
 from experiments.cli.workers import usable_cores
 from experiments.feedforward.plots import TABLE_HEAD, study_verdict, table_rows, write_study_page
@@ -70,7 +71,7 @@ def feedforward_command(
         at_least("--jobs", 1, jobs)
         if plant not in (None, *PLANTS):
             raise ValueError(f"--plant must be one of {', '.join(PLANTS)}, got '{plant}'")
-        model, realistic = load_robot(robot), _driven(robot, plant)
+        model, realistic = noted_robot(human, robot), _driven(robot, plant)
         mass = model.payload.largest_mass if payload is None else payload
         page = stack.enter_context(staged_file(report, *PAGE))
         stack.enter_context(output.staged())

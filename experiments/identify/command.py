@@ -14,6 +14,7 @@ from experiments.cli.console import count, print_files, progress_bar, refusing
 from experiments.cli.json_output import human_console, json_output
 from experiments.cli.option_limits import at_least
 from experiments.cli.options import JobsOption, JsonOption, PictureOption, StudiedRobotOption
+from experiments.cli.prepare import noted_robot
 from experiments.cli.staging import PAGE, TABLE, YAML, staged_file
 from experiments.feedforward.command import realistic_robot
 from experiments.identify.cases import MotionCases, default_cases, load_cases
@@ -93,7 +94,7 @@ def identify_command(
             raise ValueError("--slow says more of what was recorded, and there is no --recording")
         if recording is None and columns is not None:
             raise ValueError("--columns says what a --recording has, and there is none")
-        model = load_robot(robot)
+        model = noted_robot(human, robot)
         truth = _plant(robot, plant, recording is not None)
         page = stack.enter_context(staged_file(report, *PAGE))
         robot_file = stack.enter_context(staged_file(write, *YAML)) if write else None

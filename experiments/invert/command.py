@@ -19,11 +19,11 @@ from experiments.cli.options import (
     PictureOption,
     StudiedRobotOption,
 )
+from experiments.cli.prepare import noted_robot
 from experiments.cli.staging import PAGE, staged_file
 from experiments.cli.workers import usable_cores
 from experiments.invert.plots import TABLE_HEAD, table_rows, verdict, write_invert_page
 from experiments.invert.study import KINDS, InvertStudy, invert_json, study_inverses
-from robots.description.model import load_robot
 
 
 def invert_command(
@@ -54,7 +54,7 @@ def invert_command(
         output.staged(),
     ):
         at_least("--jobs", 1, jobs)
-        model = load_robot(robot)
+        model = noted_robot(human, robot)
         mass = model.payload.largest_mass if payload is None else payload
         runs = max(1, (len(KINDS) + rehearse) * grid * grid * (seeds if spring_error else 1))
         processes = min(jobs or usable_cores(), runs)

@@ -20,11 +20,11 @@ from experiments.cli.options import (
     PictureOption,
     StudiedRobotOption,
 )
+from experiments.cli.prepare import noted_robot
 from experiments.cli.staging import PAGE, staged_file
 from experiments.modes.study import SHOWN_MODES, ModalStudy, modes_json, spread, study_modes
 from experiments.modes.view import frequency_figure, show_mode, write_animation
 from experiments.report.plot_page import Section, html_table, write_plot_page
-from robots.description.model import load_robot
 
 STRETCHED_HEAD = ("mode", "Hz", "damp. %", "tip", "yielding joints")
 WORKSPACE_HEAD = ("mode", "Hz", "median", "damp. %", "tip", "yielding joints")
@@ -53,7 +53,7 @@ def modes_command(
     """Compute the natural frequencies and mode shapes of a robot with its motors held."""
     human = human_console(json_file)
     with json_output(json_file) as output, refusing(ValueError, OSError), ExitStack() as stack:
-        model = load_robot(robot)
+        model = noted_robot(human, robot)
         mass = model.payload.largest_mass if payload is None else payload
         if not 1 <= mode <= SHOWN_MODES:
             raise ValueError(f"--shape must be between 1 and {SHOWN_MODES}, got {mode}")

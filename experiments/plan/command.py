@@ -13,6 +13,7 @@ from diagrams.scenario.scenario import StationConfig
 from experiments.cli.console import print_files, progress_bar, refusing
 from experiments.cli.json_output import human_console, json_output
 from experiments.cli.options import JsonOption, PayloadOption, StudiedRobotOption
+from experiments.cli.prepare import noted_robot
 from experiments.cli.staging import PAGE, TABLE, staged_file, staged_folder
 from experiments.plan.plots import TABLE_HEAD, table_rows, verdict, write_plan_page
 from experiments.plan.program_option import check_language, program_files
@@ -109,7 +110,7 @@ def plan_command(
         if obstacles and not free:
             raise ValueError("--obstacles counts on free ways only; give --free too")
         boxes = read_obstacles(obstacles) if obstacles else ()
-        model = load_robot(robot)
+        model = noted_robot(human, robot)
         mass = model.payload.largest_mass if payload is None else payload
         limits = motion_limits(model, tool_speed, tool_acceleration, duty).with_reserve(reserve)
         true = None if plant is None else load_robot(plant)

@@ -16,13 +16,13 @@ from experiments.cli.options import (
     PictureOption,
     StudiedRobotOption,
 )
+from experiments.cli.prepare import noted_robot
 from experiments.cli.staging import PAGE, staged_file
 from experiments.report.plot_page import Section, write_plot_page
 from experiments.zeros.body import body_zeros
 from experiments.zeros.examples import EXAMPLES, example_named
 from experiments.zeros.plots import plane_figure, workspace_figure
 from experiments.zeros.study import ZeroStudy, study_zeros, zeros_json
-from robots.description.model import load_robot
 
 
 def zeros_command(
@@ -60,7 +60,7 @@ def zeros_command(
             name = body.name if body else f"example {example!s}".replace("_", " ")
             write_plot_page(page, f"Zeros, {name}", verdict, found.sections)
         else:
-            model = load_robot(robot)
+            model = noted_robot(human, robot)
             mass = model.payload.largest_mass if payload is None else payload
             with progress_bar(f"{grid * grid} positions") as progress:
                 study = study_zeros(model, elasticity, mass, grid, progress)

@@ -30,8 +30,11 @@ def foreign_sources(robot: RobotModel) -> dict[str, int]:
 
 
 def foreign_sources_note(robot: RobotModel) -> str:
-    """The same in a sentence; empty if there are none, or if the robot bears the name of a shipped one."""
-    if any(name == robot.name for name, _ in _shipped_files()):
+    """The same in a sentence; empty if there are none, or if the robot is a shipped one.
+
+    It may be calibrated or identified: ``KUKA KR 16-2, calibrated`` is the KUKA KR 16-2.
+    """
+    if any(robot.name == name or robot.name.startswith(f"{name}, ") for name, _ in _shipped_files()):
         return ""
     found = foreign_sources(robot)
     if not found:

@@ -197,4 +197,5 @@ def test_a_copied_robot_file_is_told_by_its_sources():
     assert "sources in the file of my arm are those of another robot" in note
     assert "of Universal Robots UR10" in note
     assert all(foreign_sources_note(load_robot(name)) == "" for name in ("irb1200", "kr16-realistic"))
+    assert foreign_sources_note(replace(robot, name=f"{robot.name}, calibrated")) == ""
     assert foreign_sources_note(load_robot(str(published("ur10_robot.urdf")))) == ""

@@ -1,0 +1,24 @@
+"""A robot for a command: what its file says of where it is from."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+from rich.console import Console
+
+from experiments.cli.prepare import noted_robot
+from robots.description.model import load_robot
+from robots.description.robot_file import robot_text
+
+
+@pytest.mark.parametrize(
+    ("name", "is_noted"), [("Our arm", True), ("Universal Robots UR10, calibrated", False)]
+)
+def test_a_copied_robot_file_is_named_and_a_calibrated_robot_is_not(
+    tmp_path: Path, name: str, is_noted: bool
+):
+    file, console = tmp_path / "mine.yaml", Console(record=True, width=300)
+    file.write_text(robot_text(replace(load_robot("ur10"), name=name)))
+    assert noted_robot(console, str(file)).name == name
+    said = f"sources in the file of {name} are those of another robot" in console.export_text()
+    assert said == is_noted
