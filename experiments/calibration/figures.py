@@ -1,6 +1,6 @@
 """Pictures of a calibration: where and how the robot was off, and what is left."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -11,8 +11,6 @@ from scipy.stats import norm
 from experiments.calibration.calibrate import CalibrationStudy
 from experiments.metrics.run_metrics import path_window, pose_errors
 from experiments.report.robot_plot import joint_origins
-from robots.calibration.identified import Identified
-from robots.calibration.residuals import expected_spread, standardised
 from robots.calibration.validation import prediction_errors
 from robots.description.model import NUM_JOINTS, RobotModel
 
@@ -51,15 +49,15 @@ def path_figure(path: Mapping[str, Any]) -> go.Figure:
     return figure
 
 
-def vectors_figure(found: Identified, before: np.ndarray) -> go.Figure:
+def vectors_figure(robot: RobotModel, points: np.ndarray, before: np.ndarray, after: np.ndarray) -> go.Figure:
     """Errors of positions as vectors in space, each kind drawn as many times longer as its name says.
 
     Args:
-        found: with the residuals after.
-        before: errors of the nominal robot at the same rows, shape (n, 6 or 3).
+        robot: the nominal one, drawn at zero joint angles.
+        points: where positions were measured in m, (n, 3).
+        before, after: errors with the nominal and with the calibrated robot in m, (n, 3).
     """
-    points = found.measurements.position
-    arm = joint_origins(found.robot, np.zeros(NUM_JOINTS))
+    arm = joint_origins(robot, np.zeros(NUM_JOINTS))
     size = float(np.ptp(np.vstack([points, arm]), axis=0).max())
     figure = go.Figure(
         go.Scatter3d(
@@ -67,14 +65,12 @@ def vectors_figure(found: Identified, before: np.ndarray) -> go.Figure:
             line={"color": "#c9d0d9", "width": 8}, marker={"size": 3, "color": "#c9d0d9"}, hoverinfo="name",
         )
     )  # fmt: skip
-    for name, errors in (("before", before[:, -3:]), ("after", found.residuals[:, -3:])):
-        kept = errors[found.kept]
-        longest = float(np.linalg.norm(kept, axis=1).max(initial=0.0))
+    for name, errors in (("before", before), ("after", after)):
+        longest = float(np.linalg.norm(errors, axis=1).max(initial=0.0))
         scale = _LONGEST * size / longest if longest > 0.0 else 1.0
-        gap = np.full(len(kept), np.nan)
-        places = points[found.kept]
+        gap = np.full(len(errors), np.nan)
         x, y, z = (
-            np.column_stack([p, p + scale * e, gap]).ravel() for p, e in zip(places.T, kept.T, strict=True)
+            np.column_stack([p, p + scale * e, gap]).ravel() for p, e in zip(points.T, errors.T, strict=True)
         )
         figure.add_trace(
             go.Scatter3d(
@@ -87,12 +83,17 @@ def vectors_figure(found: Identified, before: np.ndarray) -> go.Figure:
     return figure
 
 
-def joints_figure(found: Identified) -> go.Figure:
-    """What is left of the positions against the angle of each joint: a wave is an error of that joint."""
+def joints_figure(q: np.ndarray, residuals: np.ndarray) -> go.Figure:
+    """What is left of the positions against the angle of each joint: a wave is an error of that joint.
+
+    Args:
+        q: joint positions in rad, (n, 6).
+        residuals: in m, (n, 3).
+    """
     figure = make_subplots(
         2, 3, shared_yaxes=True, subplot_titles=[f"joint {i + 1}" for i in range(NUM_JOINTS)]
     )
-    q, e = np.rad2deg(found.measurements.q[found.kept]), 1e3 * found.residuals[found.kept, -3:]
+    q, e = np.rad2deg(q), 1e3 * residuals
     for joint in range(NUM_JOINTS):
         for column, (axis, colour) in enumerate(_AXES.items()):
             figure.add_trace(
@@ -107,9 +108,8 @@ def joints_figure(found: Identified) -> go.Figure:
     return figure
 
 
-def noise_figure(found: Identified) -> go.Figure:
-    """Residuals in units of the noise, and how a normal distribution would have them."""
-    values, sigma = standardised(found)[found.kept].ravel(), expected_spread(found)
+def noise_figure(values: np.ndarray, sigma: float) -> go.Figure:
+    """Residuals in units of the noise, (n,), and how a normal distribution of that width would have them."""
     figure = go.Figure(
         go.Histogram(x=values, histnorm="probability density", name="residuals", marker_color=COLORS["after"])
     )
@@ -121,12 +121,18 @@ def noise_figure(found: Identified) -> go.Figure:
     return figure
 
 
-def correlation_figure(found: Identified) -> go.Figure:
-    """Which parameters the measurements tell apart badly."""
-    names = list(found.names)
+def correlation_figure(names: Sequence[str], correlation: np.ndarray) -> go.Figure:
+    """Which parameters the measurements tell apart badly; a correlation (n, n) of n names."""
     figure = go.Figure(
         go.Heatmap(
-            z=found.correlation, x=names, y=names, zmin=-1.0, zmax=1.0, colorscale="RdBu", xgap=1, ygap=1
+            z=correlation,
+            x=list(names),
+            y=list(names),
+            zmin=-1.0,
+            zmax=1.0,
+            colorscale="RdBu",
+            xgap=1,
+            ygap=1,
         )
     )
     figure.update_layout(yaxis={"autorange": "reversed", "scaleanchor": "x"}, xaxis={"constrain": "domain"})

@@ -5,7 +5,9 @@ from typing import Any
 
 import numpy as np
 
-from experiments.calibration.words import rounded, unit
+from experiments.calibration.figures import correlation_figure, joints_figure, noise_figure, vectors_figure
+from experiments.calibration.page import CORRELATION_NOTE, NOISE_NOTE
+from experiments.calibration.words import icon, in_words, rounded, unit
 from experiments.report.plot_page import Section, sortable_table, write_plot_page
 from robots.calibration.instruments.identify import InstrumentCalibration
 from robots.calibration.instruments.observations import Observations
@@ -72,7 +74,8 @@ def instruments_json(
         "values": found.values.tolist(),
         "sigmas": sigmas.tolist(),
         "shares": found.shares.tolist(),
-        "correlation": (found.covariance / np.outer(sigmas, sigmas)).tolist(),
+        "correlation": found.correlation.tolist(),
+        "condition": found.condition,
         "noise": {
             "joint_deg": float(np.rad2deg(found.noise[0])),
             **{name: 1e3 * float(s) for name, s in zip(seen.instruments, found.noise[1:], strict=True)},
@@ -140,6 +143,30 @@ def _lines_table(
     return sortable_table(name, head, rows)
 
 
+def _pictures(found: InstrumentCalibration) -> list[Section]:
+    """Errors in space, against the joints and against the noise; distances are no vectors and left out."""
+    seen = found.observations
+    whole = found.used & np.isfinite(found.residuals).all(axis=1) & ~np.isfinite(seen.distance)
+    sections = []
+    if whole.any():
+        X = found.setting.frames[seen.instrument[whole]]
+        before, after = (_in_world(X, e[whole]) for e in (found.before, found.residuals))
+        points = _in_world(X, seen.position[whole] - X[:, :3, 3])
+        figure = vectors_figure(found.robot, points, before, after)
+        note = "Of the lines with three coordinates, in the world of the robot."
+        sections.append(Section("Errors in space", note, figure, 560))
+        note = "Along the axes of the world. A wave over a joint is something that the model lacks."
+        figure = joints_figure(seen.q[seen.row[whole]], after)
+        sections.append(Section("What is left against the joints", note, figure, 520))
+    figure = noise_figure(found.standardised, found.spread)
+    return [*sections, Section("Is it noise?", NOISE_NOTE, figure, 320)]
+
+
+def _in_world(X: np.ndarray, vectors: np.ndarray) -> np.ndarray:
+    """Vectors (n, 3) in frames of instruments X (n, 4, 4), which have the world of the robot, turned back."""
+    return np.einsum("nji,nj->ni", X[:, :3, :3], vectors)
+
+
 def write_instruments_page(page: Path, found: InstrumentCalibration, checked: FreshLines | None) -> None:
     """The page for people. Raises OSError if it cannot be written."""
     errors = (found.before, found.residuals)
@@ -154,11 +181,16 @@ def write_instruments_page(page: Path, found: InstrumentCalibration, checked: Fr
     for name, value, sigma, share in zip(found.names, found.values, sigmas, found.shares, strict=True):
         label, factor = unit(name)
         shown = rounded(factor * value, _CONFIDENCE * factor * sigma)
-        parameters.append([name, *shown, label, f"{100.0 * share:.1f} %"])
+        parameters.append(
+            [in_words(name), name, icon(name, found.robot), *shown, label, f"{100.0 * share:.1f} %"]
+        )
     note = (
         "All parameters with 95 % confidence: of the robot, of targets on the tool, of frames on top of "
         "where the nominal robot puts them, of anchors. What the data do not show has its prior."
     )
-    head = ["name", "value", "±", "unit", "from the data"]
+    head = ["what", "name", "", "value", "±", "unit", "from the data"]
+    sections += _pictures(found)
     sections.append(Section("Parameters", note, sortable_table("parameters", head, parameters)))
+    note = CORRELATION_NOTE.format(condition=found.condition)
+    sections.append(Section("Correlation", note, correlation_figure(found.names, found.correlation), 760))
     write_plot_page(page, f"Calibration, {found.robot.name}", sentence(found), sections)

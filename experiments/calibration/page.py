@@ -28,9 +28,18 @@ from experiments.calibration.words import icon, in_words, rounded, unit
 from experiments.report.plot_page import Section, html_table, sortable_table, write_plot_page
 from experiments.report.robot_plot import tips_figure
 from robots.calibration.prior import CENTRE_OF_MASS, MASS
+from robots.calibration.residuals import expected_spread, standardised
 from robots.calibration.validation import prediction_errors
 
 _CONFIDENCE = 1.96  # standard deviations to either side hold 95 %
+NOISE_NOTE = (
+    "Residuals of all axes in units of the noise, correlations taken out. Where noise and model are right "
+    "they follow the curve, narrower than one because the parameters follow the noise a little."
+)
+CORRELATION_NOTE = (
+    "Pairs near one or minus one change the tool in nearly the same way: only their sum, or their "
+    "difference, is well known. Condition number {condition:.3g}."
+)
 
 
 def write_calibration_page(
@@ -72,21 +81,19 @@ def _residuals(study: CalibrationStudy) -> list[Section]:
         "Measured less predicted pose of every row, before with the nominal robot, after with the calibrated "
         "one. A click on a head sorts."
     )
-    table = sortable_table("poses", *_pose_table(study, before))
-    noise = (
-        "Residuals of all axes in units of the noise, correlations taken out. Where noise and model are "
-        "right they follow the curve, narrower than one because the parameters follow the noise a little."
-    )
+    table, kept = sortable_table("poses", *_pose_table(study, before)), found.kept
+    points, after = found.measurements.position[kept], found.residuals[kept, -3:]
+    white = standardised(found)[kept].ravel()
     return [
         Section("Error of every pose", note, table),
-        Section("Errors in space", "", vectors_figure(found, before), 560),
+        Section("Errors in space", "", vectors_figure(found.robot, points, before[kept, -3:], after), 560),
         Section(
             "What is left against the joints",
             "Positions along the axes of the world. A wave over a joint is something that the model lacks.",
-            joints_figure(found),
+            joints_figure(found.measurements.q[kept], after),
             520,
         ),
-        Section("Is it noise?", noise, noise_figure(found), 320),
+        Section("Is it noise?", NOISE_NOTE, noise_figure(white, expected_spread(found)), 320),
     ]
 
 
@@ -117,14 +124,12 @@ def _parameters(study: CalibrationStudy) -> list[Section]:
         f"{1e3 * CENTRE_OF_MASS:.0f} mm."
     )
     frames = "The frames of the nominal robot at zero joint angles, along whose axes the parameters count."
-    correlation = (
-        "Pairs near one or minus one change the tool in nearly the same way: only their sum, or their "
-        f"difference, is well known. Condition number {study.identified.condition:.3g}."
-    )
+    found = study.identified
+    correlation = CORRELATION_NOTE.format(condition=found.condition)
     return [
         Section("Parameters", note, sortable_table("parameters", *_parameter_table(study))),
-        Section("Frames", frames, frames_figure(study.identified.robot), 480),
-        Section("Correlation", correlation, correlation_figure(study.identified), 620),
+        Section("Frames", frames, frames_figure(found.robot), 480),
+        Section("Correlation", correlation, correlation_figure(found.names, found.correlation), 620),
     ]
 
 

@@ -29,8 +29,19 @@ def in_words(name: str) -> str:
         return f"joint {kind[1]}, turned along by joint {kind[0]}"
     if part == "c":
         return f"joint {kind}, compliance"
+    if part in ("mass", "centre", "target", "frame", "anchor"):
+        return _of_things(part, kind)
     place = f"frame of joint {part.removeprefix('joint')}" if part.startswith("joint") else part
     return f"{place}, {_KINDS[kind]}"
+
+
+def _of_things(part: str, kind: str) -> str:
+    """Of bodies, targets and instruments, whose names may have any letters."""
+    if part == "mass":
+        return f"{kind.replace('_', ' ')}, mass"
+    thing, _, direction = kind.rpartition("_")
+    what = {"centre": "centre of mass", "frame": "frame of instrument"}.get(part, part)
+    return f"{what} {thing.replace('_', ' ')}, {_KINDS[direction]}"
 
 
 def unit(name: str) -> tuple[str, float]:
@@ -59,13 +70,18 @@ def rounded(value: float, uncertainty: float) -> tuple[str, str]:
 
 
 def icon(name: str, robot: RobotModel) -> Markup:
-    """The axes of a frame with an arrow along the one that is shifted, or around the one that is turned."""
+    """The axes of a frame with an arrow along the one that is shifted, or around the one that is turned.
+
+    Nothing for a mass, which has no direction.
+    """
     part, _, kind = name.partition("_")
+    if part == "mass":
+        return Markup("")
     if part in ("zero", "scale", "c", "sine", "cosine", "motor", "wave", "coupling"):
         axis = "xyz"[int(np.argmax(np.abs(robot.axes[int(kind[-1]) - 1])))]
         is_turn = True
     else:
-        axis, is_turn = kind[-1], kind.startswith("r")
+        axis, is_turn = kind[-1], kind.rpartition("_")[2].startswith("r")
     x, y = _ORIGIN
     lines = []
     for letter, (dx, dy) in _DIRECTIONS.items():

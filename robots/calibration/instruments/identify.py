@@ -54,12 +54,21 @@ class InstrumentCalibration:
     noise: np.ndarray  # standard deviations: of the joints in rad, of every instrument in m
     used: np.ndarray  # (m,) bool
     rank: int  # directions that the data show better than what was known before
+    condition: float  # of these directions, in units of what was known before
+    standardised: np.ndarray  # (any,) residuals of the lines used, made white and of unit size by the noise
+    spread: float  # their standard deviation where the noise is right: a fit makes it less than one
     iterations: int
 
     @property
     def outliers(self) -> tuple[int, ...]:
         """The lines with gross errors."""
         return tuple(map(int, self.observations.lines[~self.used]))
+
+    @property
+    def correlation(self) -> np.ndarray:
+        """Of the free parameters, (f, f)."""
+        sigmas = np.sqrt(np.diagonal(self.covariance))
+        return self.covariance / np.outer(sigmas, sigmas)
 
     def calibrated_robot(self, of: str = "") -> RobotModel:
         """The robot as it is, in its own world; ``of`` is the one that was calibrated."""
@@ -183,8 +192,10 @@ class _Adjustment:
         factor = parameter_factor(fit.at, noise, self._estimated, found)
         sizes = problem.sizes[problem.columns]
         covariance = sizes[:, None] * (factor @ factor.T) * sizes
-        A = (noise.whitening(fit.at.J) @ fit.at.A).reshape(-1, len(sizes))
-        s = np.linalg.svd(np.linalg.qr(A, mode="r"), compute_uv=False)
+        W = noise.whitening(fit.at.J)
+        s = np.linalg.svd(np.linalg.qr((W @ fit.at.A).reshape(-1, len(sizes)), mode="r"), compute_uv=False)
+        rank = int(np.sum(s > 1.0))
+        white = np.einsum("nij,nj->ni", W, fit.at.residuals)[noise.instrument >= 0]
         problem.active = self._everything
         values = problem.parameters(fit.u)
         seen = self._everything
@@ -207,7 +218,10 @@ class _Adjustment:
             residuals=np.where(seen, problem.gathered(problem.residuals(fit.u)), np.nan),
             noise=np.sqrt(noise.theta),
             used=used,
-            rank=int(np.sum(s > 1.0)),
+            rank=rank,
+            condition=float(s[0] / s[rank - 1]) if rank else float("inf"),
+            standardised=white,
+            spread=float(np.sqrt(max(1.0 - np.sum(s**2 / (1.0 + s**2)) / max(white.size, 1), 0.0))),
             iterations=self._iterations,
         )
 

@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from experiments.calibration.words import in_words, rounded
+from experiments.calibration.words import icon, in_words, rounded
 from robots.calibration.error_model import ErrorModel
 from robots.calibration.measurement_file import measurement_text
 from robots.calibration.measurements import SOURCE_NOISE, Measurements
@@ -74,3 +74,14 @@ def test_every_parameter_has_words_of_its_own():
     names = ErrorModel(load_robot("irb1200"), tuple(KINDS)).names
     assert len({in_words(name) for name in (*names, "c_1", "c_6")}) == len(names) + 2
     assert in_words("joint3_rz") == "frame of joint 3, turn about z"
+
+
+def test_targets_instruments_and_masses_have_words_whatever_their_names():
+    assert in_words("target_left_ball_x") == "target left ball, shift along x"
+    assert in_words("frame_tracker_rz") == "frame of instrument tracker, turn about z"
+    assert in_words("centre_link_2_y") == "centre of mass link 2, shift along y"
+    assert in_words("mass_payload") == "payload, mass"
+    robot = load_robot("irb1200")
+    assert icon("mass_link_1", robot) == ""
+    assert "ellipse" in icon("frame_tracker_rz", robot)
+    assert "polygon" in icon("anchor_bar_z", robot)

@@ -138,7 +138,17 @@ def test_a_table_of_targets_and_instruments_becomes_a_robot(tmp_path: Path):
     assert set(found["frames"]) == {"tracker", "camera"}
     assert set(found["anchors_mm"]) == {"bar"}
     assert len(found["residuals"]) == len(seen)
-    assert "Every line" in (tmp_path / "out" / "report.html").read_text()
+    page = (tmp_path / "out" / "report.html").read_text()
+    titles = (
+        "Every line",
+        "Errors in space",
+        "What is left against the joints",
+        "Is it noise?",
+        "Correlation",
+    )
+    assert all(title in page for title in titles)
+    assert "frame of instrument tracker, turn about z" in page
+    assert np.isfinite(found["condition"])
     q = true.configurations(20, np.random.default_rng(5))
     assert worst_step(tmp_path / "r.yaml", true, q, found) < 1e-10
     refused = truetip("calibrate", *arguments, "--position-only", "--out", tmp_path / "no")
