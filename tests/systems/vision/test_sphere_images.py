@@ -74,7 +74,7 @@ def test_on_the_axis_it_is_a_circle_and_behind_the_camera_nothing():
     ellipses = sphere_images(cameras, cameras.p_WC[0] + np.array([[3.0], [-3.0]]) * axis, 0.1)
     scale = 3000.0**2 * 0.1**2 / (3.0**2 - 0.1**2)
     np.testing.assert_allclose(ellipses.center[0, 0], cameras.center[0], atol=1e-9)
-    np.testing.assert_allclose(ellipses.shape[0, 0], scale * np.eye(2), rtol=1e-9)
+    np.testing.assert_allclose(ellipses.shape[0, 0], scale * np.eye(2), rtol=1e-9, atol=1e-9)
     assert np.isnan(ellipses.center[0, 1]).all()
 
 
