@@ -26,7 +26,7 @@ from experiments.bench.bare import BarePlant
 from experiments.bench.cameras import cameras
 from experiments.bench.exact import EXACT
 from experiments.bench.feedforward import feedforward
-from experiments.bench.identification import identification
+from experiments.bench.identification import designs, identification
 from experiments.bench.images import images
 from experiments.bench.learning import learning
 from experiments.bench.tracking import tracking
@@ -94,6 +94,7 @@ def benchmarks() -> Iterator[Row]:
     yield from kinematics(robot)
     yield from design(robot)
     yield from identification()
+    yield from designs()
     yield from feedforward()
     yield from tracking()
     yield from images()

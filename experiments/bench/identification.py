@@ -1,4 +1,4 @@
-"""Benchmark of identifications: processor time, the best of several, against what is allowed.
+"""Benchmark of identifications and of designs for them: processor time against what is allowed.
 
 Alone: ``python -m experiments.bench.identification``.
 """
@@ -16,6 +16,8 @@ from robots.calibration.measurements import SOURCE_NOISE, Measurements
 from robots.description.geometric_errors import GeometricErrors
 from robots.description.model import RobotModel, load_robot
 from robots.kinematics.error_kinematics import ErrorKinematics
+from robots.measurement_design.constraints import AdmissibleConfig, AdmissibleConfigurations
+from robots.measurement_design.design import design_measurements
 
 POSES, POSITIONS = 75, 1000
 PLACES = np.array([[0.0, 0.0, 0.1], [0.08, 0.0, 0.05], [0.0, -0.07, 0.12]])  # m, of three targets in the tool
@@ -24,6 +26,8 @@ TRACKER_NOISE, GROSS = 5e-5, 0.02  # m
 BAD_ROWS = [5, 20, 40]
 ALLOWED = {"known": 50.0, "estimated": 100.0, "robust": 500.0, "targets": 2000.0}  # ms
 REPEATS = 5
+DESIGNED = ("irb1200", "irb140", "kr16", "puma560", "ur10")
+DESIGN_ALLOWED = 10.0  # s
 
 Row = tuple[str, str, float, str, float, str]  # name, what it is, value, unit, yardstick, what that is
 
@@ -50,6 +54,20 @@ def identification() -> Iterator[Row]:
     }
     for name, (text, run) in cases.items():
         yield f"identification_{name}", text, _best(run), "ms", ALLOWED[name], "allowed"
+
+
+def designs() -> Iterator[Row]:
+    """Configurations to be measured, with the robot's own ranges, floor and arm; each once."""
+    for number, name in enumerate(DESIGNED):
+        robot = load_robot(name)
+        admissible = AdmissibleConfigurations(robot, AdmissibleConfig())
+        if number == 0:
+            design_measurements(robot, admissible=admissible)  # compiles
+        started = time.process_time()
+        design = design_measurements(robot, admissible=admissible)
+        spent = time.process_time() - started
+        text = f"design of {POSES} poses, {name}, {design.value / design.bound:.2%} of its bound"
+        yield f"design_{name}", text, spent, "s", DESIGN_ALLOWED, "allowed"
 
 
 def _best(run: Callable[[], object]) -> float:
@@ -99,5 +117,6 @@ def _lines(robot: RobotModel, rng: np.random.Generator) -> Observations:
 
 
 if __name__ == "__main__":
-    for _, text, value, unit, allowed, _ in identification():
-        print(f"{text}: {value:.0f} {unit}, allowed {allowed:.0f} {unit}")
+    for rows in (identification(), designs()):
+        for _, text, value, unit, allowed, _ in rows:
+            print(f"{text}: {value:.3g} {unit}, allowed {allowed:.3g} {unit}")

