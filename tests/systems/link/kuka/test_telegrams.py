@@ -61,6 +61,7 @@ def test_a_changed_telegram_is_read_with_finite_numbers_or_refused(data):
     assert np.isfinite([telegram.measured, telegram.setpoint, telegram.pose]).all()
 
 
+@pytest.mark.real_time
 def test_entities_are_not_expanded():
     laughs = "".join(f'<!ENTITY l{i} "{f"&l{i - 1};" * 10}">' for i in range(1, 10))
     data = f'<!DOCTYPE Sen [<!ENTITY l0 "ha">{laughs}]><Sen><IPOC>&l9;</IPOC></Sen>'.encode()
