@@ -51,6 +51,8 @@ def started(tmp_path: Path, *arguments: str) -> tuple[subprocess.Popen, list[int
         env=environment,
         cwd=tmp_path,
         start_new_session=True,
+        # What a shell starts in the background ignores it, and hands that down.
+        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),
     )
     until(lambda: children(process.pid), "child")
     return process, children(process.pid)
