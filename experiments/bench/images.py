@@ -24,7 +24,7 @@ from systems.vision.marker_body import load_body
 from systems.vision.tracking.tracker import Tracker, TrackerState
 
 EVERY = 10  # frames of the path apart
-REQUIRED_FRAME_TIME = 10.0  # ms
+REQUIRED_FRAME_TIME = 3.0  # ms
 REQUIRED_CENTROID = 0.1  # px
 
 

@@ -78,6 +78,12 @@ class Cameras:
         """Projection matrices P = K (R_CW | p_CW), Probst (2024) eq. (3.6), without lens, (n, 3, 4)."""
         return self.intrinsics @ np.concatenate([self.R_CW, self.p_CW[:, :, None]], axis=2)
 
+    @cached_property
+    def arrays(self) -> tuple[np.ndarray, ...]:
+        """Focal lengths, principal points, lenses and poses as `systems.vision.kernels` takes them."""
+        each = self.focal, self.center, self.radial, self.tangential, self.R_CW, self.p_CW
+        return tuple(np.ascontiguousarray(array, dtype=float) for array in each)
+
     def depth(self, p_W: np.ndarray) -> np.ndarray:
         """Distances of points (..., 3) in front of the image planes in m, (n, ...)."""
         p_W = np.asarray(p_W, dtype=float)

@@ -16,7 +16,7 @@ from systems.vision.depth_of_field import DepthOfField
 from systems.vision.marker_body import DetectionBody
 from systems.vision.rendering import Picture, Sensor, draw
 from systems.vision.sphere_images import Ellipses, sphere_images
-from systems.vision.tracking.pose_refinement import moved
+from systems.vision.tracking.pose_refinement import linearize, moved
 from systems.vision.visibility import occluded
 
 CLEAR_OF_NOISE = 6.0  # sigma; one dark pixel in a thousand million is further from the background
@@ -78,7 +78,7 @@ class ImageSource:
         """
         if X_WE is None:
             return self._windows.copy()
-        expected = self._cameras.project(self._body.p_E @ X_WE[:3, :3].T + X_WE[:3, 3])
+        expected, _ = linearize(self._cameras, self._body.p_E, X_WE)
         near = self._cameras.depth(X_WE[:3, 3])
         reach = self._config.margin + self._cameras.focal.max(1) * self._body.diameter / np.maximum(near, 0.1)
         # Without a marker in front of the camera there is nothing between the two corners.

@@ -1,6 +1,6 @@
 """Blob detection: connected bright regions that look like a sphere, and their centroids.
 
-Pixels above a threshold are put together to components by OpenCV. The middle of a component is the mean of
+Pixels above a threshold are put together to components. The middle of a component is the mean of
 its pixels weighted by brightness, Probst (2024) eq. (3.41), corrected: the factors 1/K and 1/J in front of
 the sums do not belong there, and the weight is what a pixel is brighter than the threshold. Weighted with
 all of its brightness, a pixel at the edge would count for much or not at all, as noise decides; so it counts
@@ -9,17 +9,15 @@ for nothing at the moment when it drops out.
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import cache
-from typing import Any
 
-import cv2
 import numpy as np
 
+from systems.vision import kernels
 from systems.vision.camera_model import Cameras
 from systems.vision.rendering import FULL_SCALE, Picture
 from systems.vision.sphere_images import sphere_centers
 
-_LARGEST_LABEL = 32_767  # more components than that are no picture of markers
+_MOST_PIECES = 32_767  # of components; more than that are no picture of markers
 
 
 @dataclass
@@ -59,11 +57,12 @@ def blobs_in(pictures: Sequence[Picture], cameras: Cameras, config: CentroidConf
     Returns:
         Pixels, shape (n, b, 2), b at least one, NaN where there is none; in no order that means anything.
     """
-    found = _markers(pictures, config)
-    most = max(1, *(len(area) for _, area in found))
-    middles, areas = np.full((len(found), most, 2), np.nan), np.full((len(found), most), np.nan)
-    for i, (middle, area) in enumerate(found):
-        middles[i, : len(area)], areas[i, : len(area)] = middle, area
+    camera, middle, area = _markers(pictures, config)
+    count = np.bincount(camera, minlength=len(pictures))
+    most = max(1, int(count.max(initial=0)))
+    middles, areas = np.full((len(pictures), most, 2), np.nan), np.full((len(pictures), most), np.nan)
+    place = np.arange(len(camera)) - (np.cumsum(count) - count)[camera]
+    middles[camera, place], areas[camera, place] = middle, area
     return sphere_centers(cameras, middles, areas)
 
 
@@ -72,61 +71,21 @@ def centroids(picture: Picture, config: CentroidConfig) -> tuple[np.ndarray, np.
 
     A blob at the edge of the window is left out, for it may go on behind it.
     """
-    return _markers([picture], config)[0]
+    return _markers([picture], config)[1:]
 
 
-def _markers(pictures: Sequence[Picture], config: CentroidConfig) -> list[tuple[np.ndarray, np.ndarray]]:
-    """`centroids` of several pictures; what numpy has to do is done for all of them at once."""
-    components = [_components(picture, int(config.threshold * FULL_SCALE)) for picture in pictures]
-    weighted, plain, is_whole = (np.concatenate(parts) for parts in zip(*components, strict=True))
+def _markers(
+    pictures: Sequence[Picture], config: CentroidConfig
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """`centroids` of several pictures one after another, and before them which picture each is in, (k,)."""
+    level = int(config.threshold * FULL_SCALE)
+    found = [kernels.components.components(picture.pixels, level, _MOST_PIECES) for picture in pictures]
+    weighted, plain, is_whole = (np.concatenate(parts) for parts in zip(*found, strict=True))
     area = plain[:, 0]
     is_marker = is_whole & (area >= config.smallest) & (area <= config.largest) & _is_round(plain, config)
-    ends = np.cumsum([len(part) for part, _, _ in components])
-    which = np.searchsorted(ends, np.flatnonzero(is_marker), side="right")
-    middle, area = weighted[is_marker, 1:3] / weighted[is_marker, :1], area[is_marker]
-    return [(middle[which == i] + picture.corner, area[which == i]) for i, picture in enumerate(pictures)]
-
-
-def _components(picture: Picture, level: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Sums as of `moments`, weighted and plain, (k, 6), and which components are off the edges, (k,)."""
-    pixels = picture.pixels
-    nothing = np.empty((0, 6)), np.empty((0, 6)), np.empty(0, bool)
-    if not pixels.size:
-        return nothing
-    _, lit = cv2.threshold(pixels, level, 1, cv2.THRESH_BINARY)
-    # Most of a window is dark. OpenCV's own statistics take three times as long as finding the components.
-    left, top, width, height = cv2.boundingRect(lit)
-    if not width:
-        return nothing
-    right, bottom = left + width, top + height
-    # OpenCV looks at blocks of 2 x 2 pixels: with the same blocks components keep their order.
-    left, top = left - left % 2, top - top % 2
-    part = slice(top, bottom), slice(left, right)
-    count, found = cv2.connectedComponents(lit[part], connectivity=8, ltype=cv2.CV_32S)
-    labels = np.asarray(found, np.int32)
-    if not 1 < count < _LARGEST_LABEL:
-        return nothing
-    weighted, plain = np.zeros((count, 6)), np.zeros((count, 6))
-    is_whole = np.ones(count, bool)
-    is_whole[0] = False  # the background
-    _moments()(pixels[part], labels, left, top, float(level), weighted, plain)
-    for beyond, edge in (
-        (left == 0, labels[:, 0]),
-        (top == 0, labels[0]),
-        (right == pixels.shape[1], labels[:, -1]),
-        (bottom == pixels.shape[0], labels[-1]),
-    ):
-        if beyond:
-            is_whole[edge] = False
-    return weighted, plain, is_whole
-
-
-@cache
-def _moments() -> Any:
-    """The compiled sums: numba takes a third of a second to import, and not everybody looks at pictures."""
-    from systems.vision.blobs.moments import moments
-
-    return moments
+    camera = np.repeat(np.arange(len(pictures)), [len(part) for part, _, _ in found])[is_marker]
+    corner = np.array([picture.corner for picture in pictures])
+    return camera, weighted[is_marker, 1:3] / weighted[is_marker, :1] + corner[camera], area[is_marker]
 
 
 def _is_round(sums: np.ndarray, config: CentroidConfig) -> np.ndarray:

@@ -85,8 +85,9 @@ class SceneMatcher:
 
 def blobs_of_points(blobs: np.ndarray, index: np.ndarray) -> np.ndarray:
     """The pixels of points: blobs (n, b, 2) and indices (n, k) with -1 for none to (n, k, 2) with NaN."""
-    pixels = np.take_along_axis(blobs, np.maximum(index, 0)[..., None], axis=1)
-    return np.where(index[..., None] >= 0, pixels, np.nan)
+    pixels = blobs[np.arange(len(blobs))[:, None], index]
+    pixels[index < 0] = np.nan
+    return pixels
 
 
 def _from_two_views(P_1: np.ndarray, P_2: np.ndarray, x_1: np.ndarray, x_2: np.ndarray) -> np.ndarray:

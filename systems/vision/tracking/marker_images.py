@@ -2,6 +2,7 @@
 
 import numpy as np
 
+from systems.vision import kernels
 from systems.vision.camera_model import Cameras
 from systems.vision.marker_body import DetectionBody
 
@@ -13,13 +14,7 @@ def marker_diameters(cameras: Cameras, body: DetectionBody, p_W: np.ndarray) -> 
 
 def touching(pixels: np.ndarray, diameters: np.ndarray) -> np.ndarray:
     """Which images of markers touch each other: (n, m, 2) and (n, m) to (n, m, m), False on the diagonal."""
-    u, v = pixels[..., 0], pixels[..., 1]
-    du, dv = u[:, :, None] - u[:, None], v[:, :, None] - v[:, None]
-    reach = 0.5 * (diameters[:, :, None] + diameters[:, None])
-    close = du * du + dv * dv < reach * reach
-    diagonal = np.arange(pixels.shape[1])
-    close[:, diagonal, diagonal] = False
-    return close
+    return kernels.frames.touching(pixels, diameters)
 
 
 def image_shares(close: np.ndarray, seen: np.ndarray, diameters: np.ndarray) -> np.ndarray:
@@ -54,6 +49,8 @@ def shared_images(close: np.ndarray, seen: np.ndarray, diameters: np.ndarray) ->
 
     Cameras with fewer of them than the s of the one with most have rows of zeros behind them.
     """
+    if not close.any():
+        return np.zeros((len(close), 0, close.shape[-1]))
     share = image_shares(close, seen, diameters)
     shared = np.count_nonzero(share, axis=2) > 1
     order = np.argsort(~shared, axis=1, kind="stable")[:, : shared.sum(1).max()]

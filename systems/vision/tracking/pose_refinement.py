@@ -8,11 +8,13 @@ The steps are written here because a tracker makes two or three of them in every
 information matrix of the last one for its covariance; that they converged is checked.
 """
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
 
 from robots.metrology.least_squares import UndeterminedError
+from systems.vision import kernels
 from systems.vision.camera_model import Cameras
 
 _STEPS = 20
@@ -50,7 +52,8 @@ def refine_pose(
     for _ in range(_STEPS):
         predicted, J = linearize(cameras, p_E, X_WE)
         if share is not None and share.size:
-            predicted, J = (np.concatenate([each, shared(each, share)], 1) for each in (predicted, J))
+            predicted = np.concatenate([predicted, shared(predicted, share)], 1)
+            J = np.concatenate([J, shared(J, share)], 1)
         step, fit = gauss_newton_step(predicted, J, pixels, X_WE)
         X_WE = fit.X_WE
         if np.abs(step).max() < _CONVERGED:
@@ -64,12 +67,8 @@ def linearize(cameras: Cameras, p_E: np.ndarray, X_WE: np.ndarray) -> tuple[np.n
     A small motion is a rotation vector in rad about the axes of the world through the tool's origin, then a
     translation in m.
     """
-    arm = p_E @ X_WE[:3, :3].T
-    pixels, J_point = cameras.project_with_jacobian(arm + X_WE[:3, 3])
-    jx, jy, jz = np.moveaxis(J_point, -1, 0)
-    x, y, z = arm.T[:, :, None]
-    turning = np.stack([y * jz - z * jy, z * jx - x * jz, x * jy - y * jx], -1)
-    return pixels, np.concatenate([turning, J_point], -1)
+    p_E, X_WE = np.ascontiguousarray(p_E, dtype=float), np.ascontiguousarray(X_WE)
+    return kernels.frames.linearize(*cameras.arrays, p_E, X_WE)
 
 
 def shared(of_markers: np.ndarray, share: np.ndarray) -> np.ndarray:
@@ -78,10 +77,7 @@ def shared(of_markers: np.ndarray, share: np.ndarray) -> np.ndarray:
     A row of ``share``, (n, s, m), that is zero gives NaN. The result has the shape (n, s, ...).
     """
     n, m = of_markers.shape[:2]
-    flat = of_markers.reshape(n, m, -1)
-    # A marker behind a camera is NaN there and has no share in anything.
-    mean = share @ np.where(np.isnan(flat), 0.0, flat)
-    mean[~share.any(2)] = np.nan
+    mean = kernels.frames.weighted(of_markers.reshape(n, m, -1), share)
     return mean.reshape(n, -1, *of_markers.shape[2:])
 
 
@@ -93,28 +89,26 @@ def gauss_newton_step(
     Raises:
         UndeterminedError: if the pixels do not determine the pose.
     """
-    used = ~np.isnan(pixels[..., 0] - predicted[..., 0])
-    rows, error = J[used].reshape(-1, 6), (pixels[used] - predicted[used]).ravel()
-    if len(error) < 6:
-        raise UndeterminedError(f"a pose takes at least three pixels, got {len(error) // 2}")
-    information = rows.T @ rows
+    information, right, count = kernels.frames.normal_equations(predicted, J, pixels)
+    if count < 3:
+        raise UndeterminedError(f"a pose takes at least three pixels, got {count}")
     least = np.linalg.eigvalsh(information)[0]
     if not least > _LEAST_INFORMATION:
         raise UndeterminedError("the pixels leave a direction of the pose free")
     cofactor = np.linalg.inv(information)
-    step = cofactor @ (rows.T @ error)
-    left = error - rows @ step
-    sigma = float(np.sqrt(left @ left / max(len(error) - 6, 1)))
-    return step, PixelFit(moved(X_WE, step), cofactor, sigma, len(error) // 2)
+    step = cofactor @ right
+    left = kernels.frames.squared_residual(predicted, J, pixels, step)
+    sigma = float(np.sqrt(left / max(2 * count - 6, 1)))
+    return step, PixelFit(moved(X_WE, step), cofactor, sigma, count)
 
 
 def moved(X_WE: np.ndarray, motion: np.ndarray) -> np.ndarray:
     """A pose (4, 4) after a small motion (6,): a turn about its origin, then a shift, both in the world."""
-    x, y, z = motion[:3]
-    angle = np.sqrt(x * x + y * y + z * z)
+    x, y, z = motion[:3].tolist()
+    angle = math.sqrt(x * x + y * y + z * z)
     half = 0.5 * angle
-    s = np.sin(half) / angle if angle > 0.0 else 0.5
-    w, x, y, z = np.cos(half), s * x, s * y, s * z
+    s = math.sin(half) / angle if angle > 0.0 else 0.5
+    w, x, y, z = math.cos(half), s * x, s * y, s * z
     R = np.array(
         [
             [1.0 - 2.0 * (y * y + z * z), 2.0 * (x * y - w * z), 2.0 * (x * z + w * y)],
