@@ -22,7 +22,7 @@ from experiments.cli.options import (
 from experiments.cli.prepare import noted_robot
 from experiments.cli.staging import PAGE, staged_file
 from experiments.cli.workers import usable_cores
-from experiments.invert.plots import TABLE_HEAD, table_rows, verdict, write_invert_page
+from experiments.invert.plots import TABLE_HEAD, refusals, table_rows, verdict, write_invert_page
 from experiments.invert.study import KINDS, InvertStudy, invert_json, study_inverses
 
 
@@ -66,7 +66,8 @@ def invert_command(
         write_invert_page(page, study)
         output.write(invert_json(study))
     human.print(_table(study))
-    human.print(escape(verdict(study)))
+    for line in [verdict(study), *refusals(study)]:
+        human.print(escape(line))
     print_files(human, out)
 
 

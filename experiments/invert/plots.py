@@ -1,5 +1,6 @@
 """The page of a study of inverses: how the wrist rings, and what the motors do beside a rigid robot's."""
 
+from html import escape
 from pathlib import Path
 
 import numpy as np
@@ -53,12 +54,25 @@ def verdict(study: InvertStudy) -> str:
     )
 
 
+def posture(pose: np.ndarray) -> str:
+    """Where a motion begins, in words."""
+    axis_2, axis_3 = np.rad2deg(pose[1:3])
+    return f"{axis_2:.0f} and {axis_3:.0f} degrees"
+
+
+def refusals(study: InvertStudy) -> list[str]:
+    """A line for each position that the stable inverse refuses."""
+    return [f"From axes 2 and 3 at {posture(pose)}: {reason}" for pose, reason in study.refusals]
+
+
 def ringing_figure(study: InvertStudy) -> go.Figure:
-    """How the wrist accelerates after the motion from the first position."""
+    """How the wrist accelerates after the motion from the first position in which all inverses are there."""
     figure = go.Figure()
-    curves = [(kind, FEEDFORWARDS[kind].title, study.ringing[kind][0][0], "solid") for kind in KINDS]
+    curves = [
+        (kind, FEEDFORWARDS[kind].title, study.ringing[kind][0][study.shown], "solid") for kind in KINDS
+    ]
     for kind, of_robots in study.rehearsed.items():
-        curves.append((kind, f"{FEEDFORWARDS[kind].title}, rehearsed", of_robots[0][0], "dot"))
+        curves.append((kind, f"{FEEDFORWARDS[kind].title}, rehearsed", of_robots[0][study.shown], "dot"))
     for kind, name, one, dash in curves:
         if not len(one.times):
             continue
@@ -99,7 +113,10 @@ def write_invert_page(path: Path, study: InvertStudy) -> None:
     sections = [
         Section("All motions", text, html_table(TABLE_HEAD, table_rows(study))),
         Section(
-            "Ringing of the wrist", "After the motion from the first position.", ringing_figure(study), 420
+            "Ringing of the wrist",
+            f"After the motion from axes 2 and 3 at {posture(study.poses[study.shown])}.",
+            ringing_figure(study),
+            420,
         ),
         Section(
             "What the motors do beside those of a rigid robot",
@@ -109,5 +126,8 @@ def write_invert_page(path: Path, study: InvertStudy) -> None:
             760,
         ),
     ]
+    if refused := refusals(study):
+        listed = "".join(f"<li>{escape(line)}</li>" for line in refused)
+        sections.insert(1, Section("Positions without a stable inverse", "", f"<ul>{listed}</ul>"))
     title = f"Stable inverse, {study.robot.name}, {study.payload:g} kg"
     write_plot_page(path, title, verdict(study), sections)

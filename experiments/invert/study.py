@@ -2,7 +2,7 @@
 
 import time
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -24,10 +24,11 @@ _SHARES = (0.3, 0.7)  # of the ranges of axes 2 and 3, between which the motions
 
 @dataclass(frozen=True)
 class Ringing:
-    """How the wrist moves after a motion; empty where the stable inverse was not found."""
+    """How the wrist moves after a motion; empty where the inverse refuses it."""
 
     times: np.ndarray  # (n,) s
     accelerations: np.ndarray  # (n, 3) m/s^2
+    refused: str = ""  # why there is no motion
 
     @property
     def criterion(self) -> float:
@@ -46,13 +47,20 @@ class InvertStudy:
     poses: np.ndarray  # (k, 6) rad
     ringing: Mapping[str, list[list[Ringing]]]  # by kind, of each true robot and pose
     rehearsed: Mapping[str, list[list[Ringing]]]  # the same with springs from a rehearsal, where one was made
-    example: Mapping[str, np.ndarray]  # by kind, commands (n, 3, 6) at ticks from the first pose
+    shown: int  # index of the first pose in which every inverse is there
+    example: Mapping[str, np.ndarray]  # by kind, commands (n, 3, 6) at ticks from that pose
     seconds: float  # that the stable inverse takes
 
     def criterion(self, kind: str, is_rehearsed: bool = False) -> np.ndarray:
         """C in m/s, shape (s, k)."""
         of = self.rehearsed if is_rehearsed else self.ringing
         return np.array([[one.criterion for one in row] for row in of[kind]])
+
+    @property
+    def refusals(self) -> list[tuple[np.ndarray, str]]:
+        """Where the stable inverse of the first robot was not found (rad, (6,)), and why."""
+        of_first = zip(self.poses, self.ringing["stable"][0], strict=True)
+        return [(pose, one.refused) for pose, one in of_first if one.refused]
 
     def found(self, kind: str, is_rehearsed: bool = False) -> np.ndarray:
         """C in m/s in a row, (n,), without those for which there was no stable inverse."""
@@ -136,9 +144,11 @@ def study_inverses(
     for kind in REHEARSED if rehearse else ():
         of_kind = iter(each[kind] for each in found)
         rehearsed[kind] = [[next(of_kind) for _ in poses] for _ in plants]
+    # From the first position in which every inverse is there.
+    shown = next((i for i, one in enumerate(ringing["stable"][0]) if not one.refused), 0)
     example = {}
     seconds = np.nan
-    for trial in trials[:: len(plants) * len(poses)]:
+    for trial in trials[shown :: len(plants) * len(poses)]:
         started = time.perf_counter()
         try:
             example[trial.config.kind] = commands(trial, example_times(trial), _PERIOD)
@@ -146,7 +156,9 @@ def study_inverses(
             continue
         if trial.config.kind == "stable":
             seconds = time.perf_counter() - started
-    return InvertStudy(robot, payload, angle_deg, spring_error, poses, ringing, rehearsed, example, seconds)
+    return InvertStudy(
+        robot, payload, angle_deg, spring_error, poses, ringing, rehearsed, shown, example, seconds
+    )
 
 
 def example_times(trial: Trial) -> np.ndarray:
@@ -199,12 +211,12 @@ def _work(job: Trial | Rehearsal, progress: Progress) -> Any:
             found = job.run(progress)
             return {kind: Ringing(*found[kind]) if kind in found else nothing for kind in REHEARSED}
         return Ringing(*job.ringing(progress))
-    except ValueError:  # no bounded motion, or one that begins long before the path
-        return nothing
+    except ValueError as error:  # no bounded motion, or one that begins long before the path
+        return nothing if isinstance(job, Rehearsal) else replace(nothing, refused=str(error))
     except RuntimeError as error:
         raise SimulationError(f"{kind}: {' '.join(str(error).split())}") from error
 
 
 def ahead_of_rigid(study: InvertStudy, kind: str) -> np.ndarray:
-    """How far the motors of the first pose are from those of a rigid robot, in rad, shape (n, 6)."""
+    """How far the motors of the shown pose are from those of a rigid robot, in rad, shape (n, 6)."""
     return study.example[kind][:, 0] - study.example["rigid"][:, 0]

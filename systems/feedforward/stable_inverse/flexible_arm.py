@@ -95,6 +95,17 @@ class FlexibleArm:
         positions[self.motors] = q
         return self.place(positions)
 
+    def mobility(self, q: np.ndarray) -> float:
+        """How well axes 1 to 3 of a rigid robot at q (rad, shape (6,)) move the point in every direction.
+
+        The smallest singular value over the largest: zero where the arm is stretched, or the point on axis 1.
+        """
+        positions = np.zeros(self.size)
+        positions[self.motors] = q
+        self._plant.SetPositions(self._context, positions)
+        values = np.linalg.svd(self._lever()[:, self.motors[:3]], compute_uv=False)
+        return float(values[-1] / values[0])
+
     def residuals(
         self, motion: tuple[np.ndarray, np.ndarray, np.ndarray], q: np.ndarray, wanted: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray]:
@@ -131,13 +142,17 @@ class FlexibleArm:
                 self.torques(q, v + step / _DIFFERENCE, vdot) - self.torques(q, v - step / _DIFFERENCE, vdot)
             )
         self._plant.SetPositions(self._context, q)
-        mass, world = self._plant.CalcMassMatrix(self._context), self._plant.world_frame()
-        lever = self._plant.CalcJacobianTranslationalVelocity(
-            self._context, JacobianWrtVariable.kV, self._point, np.zeros(3), world, world
-        )
+        mass = self._plant.CalcMassMatrix(self._context)
         kinematic = np.zeros((6, n))
         return Pencil(
             np.vstack([kinematic, mass[self.sprung]]),
             np.vstack([kinematic, damping[self.sprung]]),
-            np.vstack([lever, self._wrist, stiffness[self.sprung]]),
+            np.vstack([self._lever(), self._wrist, stiffness[self.sprung]]),
+        )
+
+    def _lever(self) -> np.ndarray:
+        """How all joints move the point, in m/rad, shape (3, size)."""
+        world = self._plant.world_frame()
+        return self._plant.CalcJacobianTranslationalVelocity(
+            self._context, JacobianWrtVariable.kV, self._point, np.zeros(3), world, world
         )

@@ -34,6 +34,7 @@ _LINEARISED = 5  # samples from one linearisation to the next; they change as sl
 _ENOUGH = 5e-5  # m, what the point may be off its path where an exact motion does not exist
 _EFFORT = 1e-6  # m per rad/s^2 of the motors beyond a motion that is nearly right; costs some micrometres
 _MATRICES = ("mass", "damping", "stiffness")
+_HARDLY = 0.02  # of the best direction: how well axes 1 to 3 move the point where its path may be refused
 _AT_REST = 1e-3  # rad/s; where the structure rings at some 10 Hz that is a hundredth of a millirad
 
 
@@ -109,8 +110,22 @@ class StableFeedforward(Feedforward):
             q: rad, shape (n, 6).
 
         Raises:
-            NoBoundedMotionError: if it is off the path by more than 0.05 mm, or the iteration does not end.
+            NoBoundedMotionError: if it is off the path by more than 0.05 mm, or the iteration does not end;
+                it says when the arm is stretched on the way, or the point on axis 1.
         """
+        try:
+            return self._bounded_plan(times, q)
+        except NoBoundedMotionError as error:
+            mobility = [self._arm.mobility(row) for row in q]
+            worst = int(np.argmin(mobility))
+            if mobility[worst] > _HARDLY:
+                raise
+            raise NoBoundedMotionError(
+                f"feedforward stable: {times[worst]:.3f} s from the start the arm is stretched, or its wrist "
+                "near axis 1: its joints cannot move the point in every direction there"
+            ) from error
+
+    def _bounded_plan(self, times: np.ndarray, q: np.ndarray) -> Plan:
         step = times[1] - times[0]
         margin = round(_MARGIN / step)
         try:

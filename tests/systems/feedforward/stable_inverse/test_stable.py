@@ -11,6 +11,7 @@ from systems.controller_model import ControllerModel
 from systems.feedforward import FeedforwardConfig, JointReference
 from systems.feedforward.elastic_structure import ElasticStructureFeedforward
 from systems.feedforward.prefilter import PrefilterConfig
+from systems.feedforward.stable_inverse.bounded_inverse import NoBoundedMotionError
 from systems.feedforward.stable_inverse.stable import Plan, StableFeedforward
 from systems.reference.paths import ReferenceConfig, make_path
 from systems.reference.shapes import Circle
@@ -70,6 +71,28 @@ def test_where_zeros_change_sides_it_is_a_hundredth_of_a_millimetre_off_and_star
     assert 1e-7 < plan.history[-1] < 1e-5  # m: not exact
     assert plan.first >= 0.0
     assert np.abs(plan.velocity([0.0, plan.rigid.x[-1]])).max() < 2e-3  # rad/s
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("angle_deg", [30.0, 45.0])
+def test_a_motion_may_be_large(angle_deg: float):
+    """The zeros wander with the pose; the equations are linear about the motion, sample by sample."""
+    profile = PolynomialProfile.lasting(0.6, np.deg2rad(angle_deg))
+    times = np.arange(0.0, SETTLE + profile.duration + SETTLE, STEP)
+    axes = np.array([1.0, 1.0, 1.0, 0.0, 0.0, 0.0])
+    plan = inverse(point="wrist").plan(times, START + profile.at_times(times - SETTLE)[0][:, None] * axes)
+    assert plan.history[-1] < 5e-5  # m, what `plan` may leave where zeros change sides
+
+
+@pytest.mark.slow
+def test_where_the_arm_is_stretched_on_the_way_it_says_so():
+    """From there on axis 3 at -37 degrees turns by 45: past the stretched arm of a KR 210."""
+    start = np.deg2rad([0.0, -45.0, -37.0, 0.0, 0.0, 0.0])
+    profile = PolynomialProfile.lasting(0.6, np.deg2rad(45.0))
+    times = np.arange(0.0, SETTLE + profile.duration + SETTLE, STEP)
+    axes = np.array([1.0, 1.0, 1.0, 0.0, 0.0, 0.0])
+    with pytest.raises(NoBoundedMotionError, match=r"0\.7.. s from the start the arm is stretched"):
+        inverse(point="wrist").plan(times, start + profile.at_times(times - SETTLE)[0][:, None] * axes)
 
 
 @pytest.mark.slow
