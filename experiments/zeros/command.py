@@ -21,7 +21,7 @@ from experiments.cli.staging import PAGE, staged_file
 from experiments.report.plot_page import Section, write_plot_page
 from experiments.zeros.body import body_zeros
 from experiments.zeros.examples import EXAMPLES, example_named
-from experiments.zeros.plots import plane_figure, workspace_figure
+from experiments.zeros.plots import faster_zeros, plane_figure, workspace_figure
 from experiments.zeros.study import ZeroStudy, study_zeros, zeros_json
 
 
@@ -96,6 +96,10 @@ def _write_study(page: Path, study: ZeroStudy, verdict: str) -> None:
         sections.append(Section("Slowest zero in the right half-plane", note, workspace_figure(study), 560))
     middle = study.regular[len(study.regular) // 2]
     sections.append(
-        Section("All zeros of the middle position", "Poles of the exact inverse.", plane_figure(middle))
+        Section(
+            "Zeros of the middle position",
+            f"Poles of the exact inverse.{faster_zeros(middle)}",
+            plane_figure(middle),
+        )
     )
     write_plot_page(page, f"Zeros, {study.robot.name}", verdict, sections)

@@ -22,6 +22,7 @@ from experiments.zeros.linear_arm import TIMES as ARM_TIMES
 from experiments.zeros.plots import (
     arm_locus_figure,
     beam_figure,
+    faster_zeros,
     gain_figure,
     locus_figure,
     plane_figure,
@@ -56,7 +57,7 @@ def two_joint_arm() -> Example:
     numbers = {**one_json(zeros), "x_l_m": 0.5, "largest_stable_x_l_m": limit}
     note = "Reiner (2010), figure 3.9: a pair goes to infinity and comes back on the real axis."
     sections = [
-        Section("Zeros, x_l = 0.5 m", "", plane_figure(zeros)),
+        Section("Zeros, x_l = 0.5 m", faster_zeros(zeros).strip(), plane_figure(zeros)),
         Section("Zeros by the place of the output", note, arm_locus_figure(two_joint_arm_zeros), 420),
     ]
     return Example(numbers, verdict, sections)

@@ -10,6 +10,8 @@ from experiments.zeros.study import ZeroStudy
 from robots.dynamics.modal_beam import ModalBeam
 from robots.dynamics.transmission_zeros import Zeros
 
+_WIDTH = 3.0  # of the plane that is shown, relative to its height
+
 
 def workspace_figure(study: ZeroStudy) -> go.Figure:
     """Contours of the slowest zero in the right half-plane by real part; white where there is none."""
@@ -22,7 +24,7 @@ def workspace_figure(study: ZeroStudy) -> go.Figure:
             colorbar={
                 "title": "1/s",
                 "tickvals": [0, 1, 2, 3, 4, 5],
-                "ticktext": ["1", "10", "100", "1e3", "1e4", "1e5"],
+                "ticktext": ["1", "10", "100", "1,000", "10,000", "100,000"],
             },
             customdata=study.slowest_rhp.T,
             hovertemplate="axis 2: %{x:.0f}°<br>axis 3: %{y:.0f}°<br>%{customdata:.0f} 1/s<extra></extra>",
@@ -43,7 +45,24 @@ def plane_figure(zeros: Zeros) -> go.Figure:
         )
     )
     figure.add_vline(x=0.0, line={"dash": "dot", "width": 1})
-    return figure.update_layout(xaxis={"title": "real part in 1/s"}, yaxis={"title": "imaginary part in 1/s"})
+    shown = _largest_shown(zeros)
+    xaxis = {"title": "real part in 1/s"} | ({"range": [-shown, shown]} if np.isfinite(shown) else {})
+    return figure.update_layout(xaxis=xaxis, yaxis={"title": "imaginary part in 1/s"})
+
+
+def faster_zeros(zeros: Zeros) -> str:
+    """The real parts that `plane_figure` has no room for, in a sentence; empty if there are none."""
+    real = np.sort(np.real(zeros.values))
+    outside = real[np.abs(real) > _largest_shown(zeros)]
+    if not len(outside):
+        return ""
+    return f" Not shown, because they are so fast: {', '.join(f'{value:,.0f}' for value in outside)} 1/s."
+
+
+def _largest_shown(zeros: Zeros) -> float:
+    """Real parts up to a few times what the imaginary ones are: the others would squeeze them into a line."""
+    highest = float(np.abs(np.imag(zeros.values)).max(initial=0.0))
+    return _WIDTH * highest if highest > 0.0 else np.inf
 
 
 def beam_figure(num_modes: int, boundary: str = "clamped") -> go.Figure:
