@@ -58,9 +58,36 @@ def is_command(position, velocity, absurd):
     return total < absurd
 
 
+@compiled
+def may_be_sent(rows, position, velocity, mean, speed, last, passed, span, slack):
+    """Whether a message may be sent as it is.
+
+    Args:
+        rows: of each joint lower and upper limit, speed and acceleration, (6, 4).
+        position, velocity: in the message, (6,) each in rad and rad/s.
+        mean: speeds since the last message, (6,) rad/s.
+        speed: mean speeds before it, (6,) rad/s.
+        last: velocity in the last message, (6,) rad/s.
+        passed, span: s, since the last message, and from the middle of the time before it to that since.
+        slack: by how many times a speed may be larger, because it rounds.
+    """
+    for i in range(6):
+        lower, upper, top, most = rows[i, 0], rows[i, 1], slack * rows[i, 2], rows[i, 3]
+        if not (
+            lower <= position[i] <= upper
+            and abs(velocity[i]) <= top
+            and abs(mean[i]) <= top
+            and abs(velocity[i] - last[i]) <= passed * most
+            and abs(mean[i] - speed[i]) <= span * most
+        ):
+            return False
+    return True
+
+
 def warm_up() -> None:
     """Calls everything once with arrays as a tick has them, so that no tick waits for a compiler."""
     six = np.zeros(6)
     excess(six, 1.0, 1.0)
     is_command(six, six, 1.0)
     is_allowed(np.zeros((6, 6)), six, six, six, six, six)
+    may_be_sent(np.zeros((6, 4)), six, six, six, six, six, 1.0, 1.0, 1.0)
