@@ -13,6 +13,7 @@ from robots.description.model import RobotModel
 from systems.guard.joint_limits import JointLimits
 from systems.guard.message_guard import LONGEST_OWED, MOST_BRIDGED, MessageGuard, PassedTime
 from systems.link.clock import ClockConfig, StampClock, steady_time
+from systems.link.poses_on_path import PosesOnPath
 from systems.link.protocols import PoseSource, RobotLink, RobotReport
 from systems.reference.joint_mover import smooth_motion
 from systems.samples import PoseSample
@@ -26,12 +27,13 @@ _LONGEST_APPROACH = 60.0  # s
 _APPROACH_GAIN = 2.0  # 1/s, where only speeds are sent
 _PHASE_SHARE = 0.02  # of the distance between a stamp and its tick, by which the phase follows
 _SLICE = 8e-4  # s between two looks at the camera
-_WARM_UP = 7e-4  # s before the next report is due
+_LATEST, _EARLIEST = 7e-4, 2e-3  # s before the next report is due, to prepare for it
+_MARGIN = 3e-4  # s, to be ready before it is due
+_SOONER, _LATER = 0.1, 0.01  # of the distance, by which the beginning follows what preparations take
 _CLOSE = 3e-4  # s about the time at which it is due: a frame of the camera would delay the reply
 _WATCH = 1e-3  # s after it was due, until which one looks all the time: who sleeps wakes late and cold
 _CYCLE_TOLERANCE = 5e-3  # relative
 _CLOCK_STEP = 0.02  # s by which stamps may run ahead of arrivals: jitter, and a stall before
-_AHEAD = 0.1  # s by which a sample may seem to be exposed after the report that it is used with
 _SAME_COUNT = 1000  # messages; four seconds: whose number is further ahead is of another count
 _RESTS = 25  # messages at rest that end a stop
 
@@ -89,7 +91,7 @@ class HardwareLink:
             is_asked_to_end: whether somebody wants an end, while one waits or approaches.
             note_joints: is told the arrival of every report in s, and its joint positions (6,) in rad.
         """
-        self._client, self._camera, self._now = client, camera, now
+        self._client, self._has_camera, self._now = client, camera is not None, now
         self._is_asked_to_end, self._note_joints = is_asked_to_end, note_joints
         self._link, self._speed, self._period = scenario.station.link, robot.speed, scenario.station.period
         self._is_speed_only = is_speed_only
@@ -97,7 +99,7 @@ class HardwareLink:
         self.last: RobotReport | None = None
         self._unlearned: tuple[float, float] | None = None  # stamp and arrival of the last report, in s
         self.turn_around = array("f")  # s, from a report in to its reply out
-        self._sample = PoseSample()
+        self.poses = PosesOnPath(camera, self.robot_clock)
         self._phase = 0.0  # s, of the newest stamp against its tick
         self._time = PassedTime(self._period)
         limits = JointLimits(robot, scenario.servo.guard.speed_share)
@@ -107,19 +109,14 @@ class HardwareLink:
         self.gap = 0.0  # s, the same without an upper limit
         self.clock_step = 0.0  # s by which the stamp of the newest report ran ahead of its arrival
         self.host = HostLateness()
+        self._ahead = _LATEST  # s, before the next report is due, at which to prepare for it
         self._heard = self._stamp = 0.0  # s of the steady clock and the controller's, of the newest message
         self._has_rested = True  # whether the robot has stood still since it was commanded, whatever was sent
-        self._origin = 0.0  # s of the steady clock: samples exposed before are not of this path
 
     @property
     def epoch(self) -> int:
         """Grows whenever commands must start anew."""
         return self._client.epoch
-
-    @property
-    def sample(self) -> PoseSample:
-        """The newest sample of the camera; its time is of the steady clock."""
-        return self._sample
 
     @property
     def velocity(self) -> np.ndarray:
@@ -145,10 +142,9 @@ class HardwareLink:
                 raise EndedOnRequest
             what, place = self._client.why_not_ready(), self._client.place
             raise StationError(f"{what}: waited {link.connect:g} s on {place}")
-        while needs_camera and self._camera is not None and not self._sample.valid:
+        while needs_camera and self._has_camera and not self.poses.newest.valid:
             if self._now() > deadline:
-                report = self._camera.report()
-                why = report.last_error or "it does not see the body"
+                why = self.poses.problem()
                 raise StationError(f"no pose from the camera within {link.connect:g} s: {why}")
             self.next_report()
         self._check_cycle()
@@ -201,7 +197,7 @@ class HardwareLink:
         return None
 
     def next_report(
-        self, wait: float | None = None, warm_up: Callable[[], None] | None = None
+        self, wait: float | None = None, prepare: Callable[[], None] | None = None
     ) -> RobotReport | None:
         """The next report; None after a silence of ``wait``, by default the one that counts as a break.
 
@@ -209,17 +205,18 @@ class HardwareLink:
 
         Args:
             wait: longest silence in s.
-            warm_up: called once, shortly before the report is expected, where a processor that has slept
-                would need twice the time for what is new to its caches.
+            prepare: called shortly before the report is expected, and again if the camera sees something
+                new after that. What can be known of the answer beforehand shall be worked out then; and a
+                processor that has slept would need twice the time for what is new to its caches.
         """
         now = self._now()
         deadline = now + (self._link.break_after if wait is None else wait)
         expected = self._client.arrived + self._period
-        is_prepared = False
+        prepared_for: PoseSample | None = None
         self._learn_clock()
         self._poll_camera()
         while True:
-            pause = _pause(now, expected, deadline, is_prepared)
+            pause = _pause(now, expected - self._ahead, expected, deadline, prepared_for is not None)
             began, report = now, self._client.poll(pause)
             if report is not None:
                 break
@@ -229,10 +226,13 @@ class HardwareLink:
                 return None
             if not -_CLOSE < now - expected < _CLOSE:
                 self._poll_camera()
-            if warm_up is not None and now >= expected - _WARM_UP:
-                warm_up()
-                self._client.warm_up()
-                warm_up, is_prepared = None, True
+            is_time = prepare is not None and now >= expected - self._ahead
+            if prepare is not None and is_time and prepared_for is not self.poses.newest:
+                if prepared_for is None:
+                    self._client.warm_up()
+                prepared_for = self.poses.newest
+                prepare()
+                self._note_preparation(self._now() - now)
         self.host.note(self._now() - began - pause, self._now(), is_message=True)
         self._note_time(report)
         if self._note_joints is not None:
@@ -240,6 +240,11 @@ class HardwareLink:
         self.last = report
         self._unlearned = (report.time, self._client.arrived)
         return report
+
+    def _note_preparation(self, took: float) -> None:
+        """Begins as early as it takes, in s, but one that was held up for once does not decide."""
+        wanted = min(_EARLIEST, max(_LATEST, _MARGIN + took))
+        self._ahead += (_SOONER if wanted > self._ahead else _LATER) * (wanted - self._ahead)
 
     def _note_time(self, report: RobotReport) -> None:
         """How much time has really passed since the last report, and whether a clock has been set."""
@@ -282,20 +287,13 @@ class HardwareLink:
 
     def start_path(self) -> None:
         """What the camera saw before now belongs to another time."""
-        self._origin = self._now()
+        self.poses.start_path(self._now())
         self._phase = 0.0
 
     def pose_at(self, time: float) -> PoseSample:
         """The newest sample of the camera on the path's clock, which shows ``time`` at the newest report."""
-        sample, last = self._sample, self.last
-        assert last is not None
-        if not sample.valid or sample.time < self._origin:
-            return PoseSample()
-        # The report left when its stamp says; its own arrival has jitter.
-        reported = self.robot_clock.station_time(round(1e6 * last.time))
-        if sample.time - reported > _AHEAD:  # one clock has been set, and samples until then would not count
-            return PoseSample()
-        return PoseSample(time + sample.time - reported, sample.X_WE, sample.valid, sample.residual)
+        assert self.last is not None
+        return self.poses.at(time, self.last.time)
 
     def send_command(self, position: np.ndarray, velocity: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Replies to the newest report, if it may be answered, with what the limits allow; returns that."""
@@ -376,16 +374,20 @@ class HardwareLink:
 
     def _poll_camera(self) -> None:
         self._client.poll_aside()
-        if self._camera is not None:
-            sample = self._camera.poll(self._now())
-            if sample is not None:
-                self._sample = sample
+        self.poses.poll(self._now())
 
 
-def _pause(now: float, expected: float, deadline: float, is_prepared: bool) -> float:
-    """How long to sleep for a report at most, in s; not at all once everything is prepared for it."""
+def _pause(now: float, begin: float, expected: float, deadline: float, is_prepared: bool) -> float:
+    """How long to sleep at most, in s; not at all between the end of the preparation and the report.
+
+    Args:
+        now: s, as all times of one clock.
+        begin: when the preparation shall begin.
+        expected: when the report is due.
+        deadline: until when it is waited for.
+        is_prepared: whether all is ready for it.
+    """
     if is_prepared and now < expected + _WATCH:
         return 0.0
-    until_warm_up = expected - _WARM_UP - now
-    longest = until_warm_up if 0.0 < until_warm_up < _SLICE else _SLICE
+    longest = begin - now if 0.0 < begin - now < _SLICE else _SLICE
     return min(longest, max(0.0, deadline - now))

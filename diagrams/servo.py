@@ -58,6 +58,7 @@ class Servo(Diagram):
         model: what the controller believes.
         drive: the drive that it commands, ``"position"``, ``"velocity"`` or ``"cascade"``.
         has_torque: whether there is a torque to feed forward.
+        guard: the system of the guard.
         tick_clock: of the law's updates, if the servo has made the law.
     """
 
@@ -102,7 +103,7 @@ class Servo(Diagram):
         builder.AddNamedSystem("law", self.law)
         feedforward = scenario.servo.feedforward
         self.has_torque = feedforward.kind != "none" or self.law.HasOutputPort("torque_feedforward")
-        guard = builder.AddNamedSystem("guard", self._guard(config, scenario.servo.guard))
+        self.guard = guard = builder.AddNamedSystem("guard", self._guard(config, scenario.servo.guard))
         self._connect_reference(builder)
         if self.law.HasInputPort("deviation"):
             builder.Connect(guard.GetOutputPort("deviation"), self.law.GetInputPort("deviation"))
@@ -299,6 +300,14 @@ def learnt(servo: Servo, root_context: Context) -> dict[str, Any] | None:
     """What a law that learns has found out until now, as its ``learnt(context)`` says; None for others."""
     report = getattr(servo.law, "learnt", None)
     return None if report is None else dict(report(servo.law.GetMyContextFromRoot(root_context)))
+
+
+def hear(servo: Servo, root_context: Context) -> None:
+    """Tells guard and law of samples that came after their tick, see their ``hear(context)``."""
+    for part in (servo.guard, servo.law):
+        told = getattr(part, "hear", None)
+        if told is not None:
+            told(part.GetMyMutableContextFromRoot(root_context))
 
 
 def learn(servo: Servo, root_context: Context) -> None:

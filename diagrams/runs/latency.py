@@ -115,7 +115,7 @@ def measure_latency(
         velocity[axis] = speed
         wire.send_command(position, velocity)
         rows.append((report.time, position[axis], report.position[axis]))
-        sample = wire.sample
+        sample = wire.poses.newest
         if sample.valid and (not frames or sample.time != frames[-1][0]):
             frames.append((sample.time, *sample.X_WE.translation()))
         if progress and len(rows) % 50 == 0:

@@ -4,6 +4,7 @@ import gc
 import math
 import sys
 from collections.abc import Callable
+from functools import partial
 
 import numpy as np
 from pydrake.systems.framework import Context, Diagram, DiagramBuilder, System
@@ -17,8 +18,10 @@ from diagrams.record.run_record import RunRecord, marks, write_event
 from diagrams.record.spool import Spool, SpooledLog
 from diagrams.runs.real_time_record import RealTimeRecord, fill_gaps, write_run_tick
 from diagrams.runs.simulation import guard_events, start_position
+from diagrams.runs.standstill import Standstill
+from diagrams.runs.tick_ahead import TickAhead
 from diagrams.scenario.scenario import Scenario, ScenarioError
-from diagrams.servo import Servo, calibrated, law_name, learn, learnt
+from diagrams.servo import Servo, calibrated, hear, law_name, learn, learnt
 from diagrams.tool_watch import ToolWatch
 from robots.description.model import NUM_JOINTS, RobotModel, load_robot
 from systems.guard.guard import KINDS
@@ -89,7 +92,8 @@ class RealTimeRun:
         self.start = start_position(self.servo.model, scenario, self.path)
         self._warm_up()
         self._context: Context = self.diagram.CreateDefaultContext()
-        self._scratch = self.diagram.CreateDefaultContext()
+        self._ahead = TickAhead(self.diagram, self.station)
+        self._joints = JointSample()  # of the newest tick
         self._next = 0  # the tick that the context stands before
         self._reports = Spool(2 + 2 * NUM_JOINTS)  # tick, stamp in s, positions in rad, efforts in N m
         self._exposures = Spool(17)  # s of the path, and the pose
@@ -99,9 +103,7 @@ class RealTimeRun:
         self._events: list[GuardEvent] = []
         self._stream: RunRecord | None = None
         self._is_acknowledged: Callable[[], bool] = never
-        self._stopped_ticks = 0.0  # of the guard, until the last tick
-        self._stands_since: float | None = None  # s, if the guard holds the robot at rest
-        self._seen_before = 0.0  # s of the path, what the camera had shown by then
+        self._standstill = Standstill(self.servo)
 
     @property
     def uses_camera(self) -> bool:
@@ -192,14 +194,14 @@ class RealTimeRun:
         is_asked_to_end: Callable[[], bool],
     ) -> str:
         """Runs the path to its end; returns why it ended."""
-        epoch, tick, shown = wire.epoch, -1, 0.0
+        epoch, tick, shown, prepare = wire.epoch, -1, 0.0, partial(self._prepare, wire)
         wire.start_path()
         if self._watch:
             self._watch.shared.begin_path(now())
         while self.servo.path_time(self._context) < self.path.duration + 0.5 * self.period:
             if is_asked_to_end():
                 return REQUESTED
-            report = wire.next_report(warm_up=self._warm_up_next)
+            report = wire.next_report(prepare=prepare)
             is_seeding = False
             if report is None or not report.is_ready or wire.epoch != epoch:
                 why = wire.trouble or (
@@ -234,32 +236,10 @@ class RealTimeRun:
                 progress(min(1.0, self.servo.path_time(self._context) / self.path.duration))
                 if self._watch and self._watch.problem:
                     return f"nobody looks for people any more: {self._watch.problem}"
-            if self._stands_for(tick) > _STOOD and not self.scenario.servo.guard.resume:
+            stood = self._standstill.lasts(self._context, tick * self.period, self._last_exposure)
+            if stood > _STOOD and not self.scenario.servo.guard.resume:
                 break
-        return self._why_it_stands() if self._stands_since is not None else "path"
-
-    def _stands_for(self, tick: int) -> float:
-        """How long the guard has held the robot at rest until a tick, in s."""
-        status = self.servo.GetOutputPort("guard_status").Eval(self.servo.GetMyContextFromRoot(self._context))
-        stopped = float(status[KINDS.index("stopped")])
-        if stopped == self._stopped_ticks:
-            self._stands_since = None
-            return 0.0
-        self._stopped_ticks = stopped
-        if self._stands_since is None:
-            self._stands_since, self._seen_before = tick * self.period, max(self._last_exposure, 0.0)
-        return tick * self.period - self._stands_since
-
-    def _why_it_stands(self) -> str:
-        since, seen = self._stands_since or 0.0, self._seen_before
-        status = self.servo.GetOutputPort("guard_status").Eval(self.servo.GetMyContextFromRoot(self._context))
-        is_blind = self.uses_camera and not status[KINDS.index("no_command")]
-        why = (
-            f"the camera has shown nothing usable since {seen:.1f} s"
-            if is_blind
-            else "the law had no command"
-        )
-        return f"stopped by the guard at {since:.1f} s: {why}"
+        return self._standstill.reason(self._context) if self._standstill.since is not None else "path"
 
     def _note(self, tick: int, kind: str, detail: str) -> None:
         self._events.append(GuardEvent(tick * self.period, kind, detail))
@@ -274,14 +254,20 @@ class RealTimeRun:
         time = tick * self.period
         sample = wire.pose_at(time)
         joints = JointSample(time, report.position, wire.velocity, wire.effort, is_running)
+        is_usual = is_running and math.isfinite(sum(report.position.tolist()))
+        known = self._ahead.command(time, sample) if is_usual else None
+        if known is not None:
+            sent = wire.send_command(*known)
+            self._context = self._ahead.take_over(self._context)
+        self._joints = joints
         self.station.receive(self._context, joints, sample, people_at(self._watch, time, wire.arrived))
         if self._watch:
             self.station.acknowledge(self._context, self._is_acknowledged())
         if not len(self._reports):
             self._note_ports()  # here, where the log finds samples to begin with
-        self._update(self._context)
-        sent = wire.send_command(*self.station.command(self._context))
-        learn(self.servo, self._context)  # nobody waits for it any more
+        if known is None:
+            self._update(self._context)
+            sent = wire.send_command(*self.station.command(self._context))
         if self._stream is not None:
             write_run_tick(
                 self._stream, self.servo, self._context, time, report, wire.effort, sent,
@@ -291,6 +277,10 @@ class RealTimeRun:
         if found is not None:
             self._note(tick, *found)
         self._stand_before_next()
+        # Nobody waits for the rest; it is last, because what stands at the ports was known before.
+        if known is not None:
+            hear(self.servo, self._context)
+        learn(self.servo, self._context)
         self._reports.append(tick, report.time, report.position, wire.effort)
         if sample.valid and sample.time > self._last_exposure:
             self._last_exposure = sample.time
@@ -326,14 +316,14 @@ class RealTimeRun:
             self.station.command(context)
             self._log.values(self.servo.GetMyContextFromRoot(context))
 
-    def _warm_up_next(self) -> None:
-        """Computes the next tick beforehand with the last samples, and forgets it.
-
-        What it needs is then in the caches of the processor, and what depends on time alone in those of the
-        context.
-        """
-        self._scratch.SetDiscreteState(self.diagram.EvalUniquePeriodicDiscreteUpdate(self._context))
-        self.station.command(self._scratch)
+    def _prepare(self, wire: HardwareLink) -> None:
+        """Does before the message comes what can be done: all of the tick, if the law needs no joints."""
+        last, sample = self._joints, wire.poses.coming
+        is_free = last.running and not (self._live or self.servo.traits.awaits_joints)
+        if is_free and sample is not None:
+            self._ahead.work_out(self._context, last, sample)
+        else:
+            self._ahead.rehearse(self._context)
 
     def _record(
         self, counters: dict[str, int], camera: PoseSource | None, wire: HardwareLink, ended: str

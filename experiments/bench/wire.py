@@ -10,6 +10,9 @@ is, in the servo's own receive loop. The third sends the bytes back as they are.
 moment at which a message can be read to the reply's departure. A cycle is missed when its message is not
 answered before the next one is there. Where the machine held up the sender, which then catches up, the next
 one comes too soon for any answer: such misses are counted apart.
+
+On a machine that does other work, too, ``chrt -r 10 python -m experiments.bench.wire`` measures what the
+parts do, and not who else had the processor: all of them inherit the priority.
 """
 
 import itertools
@@ -188,7 +191,7 @@ def _awake_echo() -> None:
         loop = HardwareLink(client, None, scenario, robot, False)
         print(client.ports[0], flush=True)
         times, overtaken_by, last = [], [], None
-        while (report := loop.next_report(wait=60.0 if last is None else 2.0, warm_up=_nothing)) is not None:
+        while (report := loop.next_report(wait=60.0 if last is None else 2.0, prepare=_nothing)) is not None:
             if client.send(report.position, np.zeros(NUM_JOINTS)):
                 times.append(steady_time() - loop.arrived)
             if last is not None and report.seqno > last + 1:
@@ -274,6 +277,9 @@ def main() -> None:
         rows = learning() if words == ["learning"] else wire(float(words[0]) if words else 0.0)
         for name, text, value, unit, yardstick, against in rows:
             print(f"{name:32s} {text:48s} {value:8.3f} {unit:3s} {against} {yardstick:.3f} {unit}")
+        policy, (load, *_) = os.sched_getscheduler(0), os.getloadavg()
+        kind = {os.SCHED_FIFO: "SCHED_FIFO", os.SCHED_RR: "SCHED_RR"}.get(policy, "no real-time priority")
+        print(f"{kind}, load {load:.1f} on {os.cpu_count()} processors")
 
 
 if __name__ == "__main__":

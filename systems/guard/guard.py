@@ -349,6 +349,11 @@ class CommandGuard(LeafSystem):
         state[_BEFORE], state[_POSITIONS] = position, limits.moved(position, step, period)
         state[_VELOCITIES] = velocity
 
+    def hear(self, context: Context) -> None:
+        """Takes note of where the joints were at the last tick, which was done before that was known."""
+        joints: JointSample = self._joints.Eval(context)
+        context.get_mutable_discrete_state(0).get_mutable_value()[_WERE_AT] = joints.position
+
     def _remember(self, context: Context, discrete_state: DiscreteValues) -> None:
         """Makes the issued command the state and decides from the clocks how the next tick will go."""
         state, kinds, last_sample, were_at = self._next.Eval(context)

@@ -29,6 +29,7 @@ class Compensation(ServoLaw):
     colour = "#b89400"
     Config = CompensationConfig
     uses_camera = False
+    awaits_joints = False
     memory_size = 12
 
     def initial_state(self, moment: LawInput) -> np.ndarray:

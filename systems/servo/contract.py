@@ -33,6 +33,8 @@ class LawTraits:
     uses_camera: bool = True  # False: a camera that sees nothing does not stop it
     learns_from_camera: bool = False  # it goes on without samples, but a run begins with the camera
     commands_motors: bool = False  # its positions start from the motors': gears are wound up in them already
+    # Whether it needs the joints of a tick for it, while the robot runs, and not just to learn from, later
+    awaits_joints: bool = True
     is_compared: bool = False  # whether a comparison has it unless told otherwise
     Config: type[LawConfig] = LawConfig  # its gains and limits
 
@@ -55,6 +57,7 @@ def law_traits(law: type | System) -> LawTraits:
         uses_camera=getattr(kind, "uses_camera", True),
         learns_from_camera=getattr(kind, "learns_from_camera", False),
         commands_motors=getattr(kind, "commands_motors", False),
+        awaits_joints=getattr(kind, "awaits_joints", True),
         is_compared=getattr(kind, "is_compared", False),
         Config=config,
     )

@@ -86,6 +86,7 @@ class ServoLaw(LeafSystem):
     colour = ""  # in reports, #rrggbb; empty to be given one
     uses_camera = True
     commands_motors = False  # whether positions start from the motors': gears are wound up in them already
+    awaits_joints = True  # whether the joints of a tick have a part in it, while the robot runs
     is_compared = False  # whether a comparison has it unless told otherwise
     Config = LawConfig
     memory_size = NUM_JOINTS  # how many numbers a law remembers

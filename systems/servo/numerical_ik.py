@@ -27,6 +27,7 @@ class NumericalIk(ServoLaw):
     title = "Numerical IK"
     colour = "#0f7cc0"
     Config = NumericalIkConfig
+    awaits_joints = False
     is_compared = True
     memory_size = 18
 

@@ -23,6 +23,7 @@ class OpenLoop(ServoLaw):
     colour = "#8a8f98"
     Config = OpenLoopConfig
     uses_camera = False
+    awaits_joints = False
     is_compared = True
     memory_size = 18
 

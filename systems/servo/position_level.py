@@ -80,6 +80,7 @@ class PositionLevel(ServoLaw):
     title = "Position level"
     colour = "#009e73"
     Config = PositionLevelConfig
+    awaits_joints = False
     is_compared = True
     memory_size = 24
 

@@ -63,6 +63,7 @@ class SelfCalibrating(LeafSystem):
     uses_camera = False  # what it knows stays true when the camera sees nothing
     learns_from_camera = True
     commands_motors = True
+    awaits_joints = False
     is_compared = False
     Config = SelfCalibratingConfig
 
@@ -222,6 +223,21 @@ class SelfCalibrating(LeafSystem):
         """The robot as it is known now, see `systems.estimation.findings.calibrated_robot`."""
         return calibrated_robot(self.estimator, self.memory(context).estimator, of)
 
+    def hear(self, context: Context) -> None:
+        """Takes note of the samples of the last tick, whose command did not wait for the joints."""
+        state = context.get_mutable_discrete_state()
+        memory = self._views(state.get_mutable_value(int(self._memory)))
+        self._hear(context, memory, state, self._joints.Eval(context).time)
+
+    def _hear(
+        self, context: Context, memory: SimpleNamespace, discrete_state: DiscreteValues, time: float
+    ) -> None:
+        """Takes note of the samples of a tick at a time in s."""
+        samples = self._joints.Eval(context), self._camera.Eval(context)
+        self._learning.hear(memory, time, samples, self._reference.Eval(context).path.path_start)
+        seen = (memory.heard.accepted[0], 0.0, memory.heard.newest[0])
+        discrete_state.set_value(int(self._outputs[4]), seen)
+
     def learn(self, context: Context) -> None:
         """Learns from what was heard at the last tick, and works out the next command.
 
@@ -244,12 +260,10 @@ class SelfCalibrating(LeafSystem):
         time = context.get_time()
         reference: PathAhead = self._reference.Eval(context)
         joints: JointSample = self._joints.Eval(context)
-        sample: PoseSample = self._camera.Eval(context)
         memory = self._views(discrete_state.get_mutable_value(int(self._memory)))
         self._learning.learn(memory)  # unless somebody has asked for it since the last tick
-        self._learning.hear(memory, time, (joints, sample), reference.path.path_start)
-        seen = (memory.heard.accepted[0], 0.0, memory.heard.newest[0])
-        discrete_state.set_value(int(self._outputs[4]), seen)
+        if joints.time > memory.heard.joints[0]:  # or they come later, see `hear`
+            self._hear(context, memory, discrete_state, time)
         if not joints.running:
             # When it runs again it starts from where it stands then.
             self._next.take_back(memory)

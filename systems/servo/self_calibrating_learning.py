@@ -78,6 +78,7 @@ class Learning:
             "heard": Layout(  # at the last tick
                 is_new=(1,),  # whether nothing has been learnt of it yet
                 time=(1,),
+                joints=(1,),  # when they were there, s
                 has_pose=(1,),
                 newest=(1,),  # exposure of the newest pose, s
                 X_WE=(4, 4),
@@ -98,7 +99,7 @@ class Learning:
         self.drives.start(memory.drives)
         self.steps.start(memory.steps)
         memory.upset_at[0] = memory.paused_until[0] = -np.inf
-        memory.heard.newest[0] = memory.heard.accepted[0] = -np.inf
+        memory.heard.newest[0] = memory.heard.accepted[0] = memory.heard.joints[0] = -np.inf
         self.delay.start(memory.delay, self._model.command_delay)
 
     def hear(
@@ -123,6 +124,7 @@ class Learning:
         self.delay.search.measure(memory.delay.search, joints.time, joints.position)
         heard = memory.heard
         heard.time[0], heard.is_new[0], heard.path_start[0] = time, 1.0, path_start
+        heard.joints[0] = joints.time
         heard.has_pose[0] = sample.valid and sample.time > heard.newest[0]
         if heard.has_pose[0]:
             heard.newest[0], heard.X_WE[:] = sample.time, sample.X_WE.GetAsMatrix4()

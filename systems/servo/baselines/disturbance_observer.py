@@ -26,6 +26,7 @@ class DisturbanceObserver(ServoLaw):
 
     title = "Disturbance observer"
     colour = "#a16207"
+    awaits_joints = False
 
     def __init__(self, model: ControllerModel, config: LawConfig, guard: GuardConfig) -> None:
         """Checks the configuration. Raises ValueError as `ServoLaw`."""

@@ -32,6 +32,7 @@ class IterativeLearning(ServoLaw):
 
     title = "Iterative learning"
     colour = "#9d174d"
+    awaits_joints = False
 
     def __init__(self, model: ControllerModel, config: LawConfig, guard: GuardConfig) -> None:
         """Checks the configuration. Raises ValueError as `ServoLaw`."""
