@@ -5,6 +5,7 @@ from dataclasses import dataclass, replace
 from functools import partial
 
 import numpy as np
+from pydrake.systems.framework import Context, System
 
 from diagrams.scenario.controller_model import controller_model
 from diagrams.scenario.scenario import Scenario
@@ -12,7 +13,7 @@ from diagrams.watching import empty_cell, joints_along, separation_monitor, watc
 from robots.description.model import RobotModel
 from robots.kinematics.arm_capsules import Capsules
 from systems.cell.overview.drawn_images import DrawnImages, FlatPictures
-from systems.guard.separation.separation_monitor import STATUS, SeparationMonitor
+from systems.guard.separation.separation_monitor import FAR, STATUS, SeparationMonitor
 from systems.link.clock import steady_time
 from systems.reference.paths import make_path
 from systems.samples import PersonSample
@@ -51,6 +52,41 @@ class LivePeople:
         """Of the images that a decision after the first second knew, in s."""
         age = self.said["separation"][self.times > 1.0, STATUS.index("age")]
         return float(age.max(initial=0.0))
+
+
+class StopEvents:
+    """What a run says of its stops for people, one decision of the monitor after the other."""
+
+    def __init__(self) -> None:
+        """Before the first decision: nobody has been near."""
+        self._stopped = self._pressed = False
+
+    def note(self, servo: System, root_context: Context, is_acknowledged: bool) -> list[tuple[str, str]]:
+        """What has changed since the last time.
+
+        Args:
+            servo: with the ports of the monitor.
+            root_context: of the diagram that it is in.
+            is_acknowledged: whether somebody now lets the robot go on.
+
+        Returns:
+            Kinds and details of events.
+        """
+        context = servo.GetMyContextFromRoot(root_context)
+        stopped = servo.GetOutputPort("stop").Eval(context)[0] > 0.5
+        status = servo.GetOutputPort("separation").Eval(context)
+        distance, age = status[STATUS.index("distance")], status[STATUS.index("age")]
+        near = f"somebody is {distance:.2f} m away" if distance < FAR else "nobody is seen"
+        why = f"{near}, images are {age:.2f} s old" if age < FAR else "no image has been trusted yet"
+        found = []
+        if stopped and not self._stopped:
+            found.append(("stopped_for_people", why))
+        if is_acknowledged and not self._pressed and self._stopped:
+            found.append(("acknowledged", why))
+        if self._stopped and not stopped:
+            found.append(("goes_on", why))
+        self._stopped, self._pressed = stopped, is_acknowledged
+        return found
 
 
 @dataclass(frozen=True)

@@ -9,7 +9,7 @@ from robots.metrology.step_detection import StepDetector
 from systems.samples import PoseSample
 
 DISPLACED = "tool_displaced"  # the kind of the event
-_LEAST = 1.5e-4  # m, of a step: smaller ones are those of gears that change their flank
+_FLANK = 1.9e-4  # rad, by which a gear that changes its flank turns the arm: smaller steps are such ones
 _GAP = 0.1  # s between samples, in which a robot gets so far that a bend looks like a step
 _KEPT = 128  # joint positions, the newest: half a second at 250 Hz
 
@@ -27,7 +27,10 @@ class ToolWatch:
         # With numba, which takes time to be imported.
         self._kinematics = importlib.import_module("robots.kinematics.compiled").CompiledKinematics(robot)
         self._joints = np.full((_KEPT, 1 + len(robot.joints)), np.nan)
-        self._count, self._last, self._steps = 0, -np.inf, StepDetector(_LEAST)
+        beyond = [*(joint.placement for joint in robot.joints[2:]), robot.tool]  # the second joint
+        length = sum(float(np.linalg.norm(each.pose().translation())) for each in beyond)
+        self._least = _FLANK * length
+        self._count, self._last, self._steps = 0, -np.inf, StepDetector(self._least)
 
     def note(self, time: float, position: np.ndarray, sample: PoseSample) -> tuple[str, str] | None:
         """The joints (6,) in rad at a time in s, and the newest sample of the camera then.
@@ -41,7 +44,7 @@ class ToolWatch:
         if not sample.valid or sample.time <= self._last or self._count < 2:
             return None
         if sample.time - self._last > _GAP:
-            self._steps = StepDetector(_LEAST)
+            self._steps = StepDetector(self._least)
         self._last = sample.time
         deviation = self._deviation(sample)
         found = None if deviation is None else self._steps.add(sample.time, deviation)

@@ -14,6 +14,7 @@ import math
 from collections import deque
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import partial
 from typing import Protocol
 
 import numpy as np
@@ -54,6 +55,7 @@ class CorrectedPass:
     asked: np.ndarray  # (n, 2) m, correction that was sent then
     stamps: np.ndarray  # (m,) s, the controller's clock
     joints: np.ndarray  # (m, 6) rad
+    places: np.ndarray  # (m,) of the line, where the joints say that the robot was on its way
     length: float  # m, of the path
     ended: str  # why: "path", or what broke off
 
@@ -129,8 +131,9 @@ class PathCorrectionRun:
             nominal.append(np.array([time, *tip]))
             while nominal[0][0] < time - _KEPT:
                 nominal.popleft()
-            place = self._line.shifted(tip, robot_at, taken.at(time))
+            place = self._line.shifted(tip, robot_at, partial(taken.up_to, time))
             robot_at = place.index
+            taken.note(time, place.R_WP)
             sample = wire.pose_at(time)
             if sample.valid and sample.time > exposed:
                 share = 1.0 if math.isinf(exposed) else 1.0 - math.exp((exposed - sample.time) / _SMOOTHING)
@@ -147,13 +150,13 @@ class PathCorrectionRun:
             asked_P = np.array([0.0, *(place.R_WP.T @ shift_W)[1:]])
             client.correct(asked_P)
             taken.asked_P = asked_P
-            reports.append(np.array([report.time, *report.position]))
+            reports.append(np.array([report.time, *report.position, robot_at]))
             if progress:
                 progress(place.along / self._line.length)
-        rows, log = np.array(seen).reshape(-1, 5), np.array(reports).reshape(-1, 7)
-        return CorrectedPass(
-            rows[:, 0], rows[:, 1:3], rows[:, 3:], log[:, 0], log[:, 1:], self._line.length, ended
-        )
+        rows, log = np.array(seen).reshape(-1, 5), np.array(reports).reshape(-1, 8)
+        joints, places = log[:, 1:7], log[:, 7].astype(int)
+        length = self._line.length
+        return CorrectedPass(rows[:, 0], rows[:, 1:3], rows[:, 3:], log[:, 0], joints, places, length, ended)
 
     def beside(self, p_WE: np.ndarray) -> np.ndarray:
         """How far points (n, 3) of a pass in m, in their order, lie beside the path: (n, 2) along y and z."""
@@ -163,20 +166,38 @@ class PathCorrectionRun:
             index, row[:] = place.index, place.p_error_W @ place.R_WP[:, 1:]
         return found
 
+    def across(self, p_WE: np.ndarray, places: np.ndarray) -> np.ndarray:
+        """How far points (n, 3) in m lie across the edges that the robot is on: (n, 2) along y and z.
+
+        At a corner the tool may be beside the edge that the robot has left, by what lies along the one that
+        it is on. No path correction takes that away, and it does not count here.
+
+        Args:
+            p_WE: of a pass, in their order.
+            places: (n,) of the line, where the robot was.
+        """
+        found, index = np.zeros((len(p_WE), 2)), 0
+        for row, point, robot_at in zip(found, p_WE, places, strict=True):
+            index = self._line.place(point, index).index
+            row[:] = (self._line.points[index] - point) @ self._line.R_WP[robot_at, :, 1:]
+        return found
+
 
 class _TakenUp:
     """What a controller has taken up of the corrections that it was sent, with a lag in s."""
 
     def __init__(self, lag: float) -> None:
         self.asked_P = np.zeros(3)  # m, the newest
-        self._lag, self._shift_P, self._time = lag, np.zeros(3), -math.inf
+        self._lag, self._shift_W, self._time = lag, np.zeros(3), -math.inf
 
-    def at(self, time: float) -> np.ndarray:
-        """The shift (3,) in m in the frame of the path at a time in s that never goes back."""
+    def up_to(self, time: float, R_WP: np.ndarray) -> np.ndarray:
+        """The shifts (..., 3) in m in the world at a time in s, had it used frames (..., 3, 3) since."""
         share = 1.0 - math.exp((self._time - time) / self._lag) if self._lag else 1.0
-        self._shift_P = self._shift_P + share * (self.asked_P - self._shift_P)
-        self._time = time
-        return self._shift_P
+        return self._shift_W + share * (R_WP @ self.asked_P - self._shift_W)
+
+    def note(self, time: float, R_WP: np.ndarray) -> None:
+        """Which frame (3, 3) it has used until a time in s that never goes back."""
+        self._shift_W, self._time = self.up_to(time, R_WP), time
 
 
 def _at(kept: Sequence[np.ndarray], time: float) -> np.ndarray:

@@ -11,7 +11,7 @@ from pydrake.systems.framework import Context, Diagram, DiagramBuilder, System
 
 from diagrams.hardware import HardwareStation
 from diagrams.hardware_link import EndedOnRequest, HardwareLink, StationError, never
-from diagrams.live_watch import OF_WATCH, LivePeople, LiveWatch, live_watch, people_at
+from diagrams.live_watch import OF_WATCH, LivePeople, LiveWatch, StopEvents, live_watch, people_at
 from diagrams.record.log import GuardEvent, RunLog
 from diagrams.record.played import measured_along, path_marks, played
 from diagrams.record.run_record import RunRecord, marks, write_event
@@ -104,6 +104,7 @@ class RealTimeRun:
         self._stream: RunRecord | None = None
         self._is_acknowledged: Callable[[], bool] = never
         self._standstill = Standstill(self.servo)
+        self._stops = StopEvents()
 
     @property
     def uses_camera(self) -> bool:
@@ -261,8 +262,9 @@ class RealTimeRun:
             self._context = self._ahead.take_over(self._context)
         self._joints = joints
         self.station.receive(self._context, joints, sample, people_at(self._watch, time, wire.arrived))
+        is_acknowledged = self._watch is not None and self._is_acknowledged()
         if self._watch:
-            self.station.acknowledge(self._context, self._is_acknowledged())
+            self.station.acknowledge(self._context, is_acknowledged)
         if not len(self._reports):
             self._note_ports()  # here, where the log finds samples to begin with
         if known is None:
@@ -273,9 +275,10 @@ class RealTimeRun:
                 self._stream, self.servo, self._context, time, report, wire.effort, sent,
                 sample if sample.time > self._last_exposure else PoseSample(),
             )  # fmt: skip
+        events = self._stops.note(self.servo, self._context, is_acknowledged) if self._watch else []
         found = self._tool.note(time, report.position, sample)
-        if found is not None:
-            self._note(tick, *found)
+        for event in (*events, *([found] if found else [])):
+            self._note(tick, *event)
         self._stand_before_next()
         # Nobody waits for the rest; it is last, because what stands at the ports was known before.
         if known is not None:

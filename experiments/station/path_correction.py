@@ -30,6 +30,10 @@ from systems.link.udp_channel import ChannelError
 JOINT, PATH_CORRECTION = "joint", "path_correction"
 MODES = (JOINT, PATH_CORRECTION)
 _CORRECTED, _PLAIN = "corrected", "without correction"
+_ACROSS = (
+    "Across: at right angles to the edge that the robot is on by its joints. At a corner the tool is beside "
+    "the edge before it, too, by what lies along the edge behind it: no path correction takes that away."
+)
 _PAGE, _NUMBERS, _RECORD = "path_correction.html", "path_correction.json", "path_correction.mcap"
 
 
@@ -38,7 +42,8 @@ class _Pass:
     """A pass and, of a virtual cell, the truth about it."""
 
     found: CorrectedPass
-    true_beside: np.ndarray | None  # (m, 2) m
+    true_beside: np.ndarray | None = None  # (m, 2) m
+    true_across: np.ndarray | None = None  # (m, 2) m, across the edge that the robot is on
 
 
 def refuse_mode(mode: str, prepared: Prepared, given: dict[str, Any]) -> None:
@@ -64,6 +69,11 @@ def refuse_mode(mode: str, prepared: Prepared, given: dict[str, Any]) -> None:
     if station.link.kind != "egm":
         raise ValueError(
             f"--mode path_correction is of ABB's EGM, got a station that speaks {station.link.title}"
+        )
+    if station.overview.enabled:
+        raise ValueError(
+            "--mode path_correction does not watch for people: the controller runs its own path and would "
+            "not stop for them; add --set station.overview.enabled=false"
         )
     for name, value in given.items():
         if value not in (None, False):
@@ -134,21 +144,26 @@ def _run(
         found = run.run(client, camera, corrects, progress, is_asked_to_end=is_asked_to_end)
     truth: CellRecord | None = station.cell.truth if station.cell else None
     if truth is None:
-        return _Pass(found, None)
+        return _Pass(found)
     X_WE, _ = truth.at(found.stamps)
     known = np.isfinite(X_WE[:, 0, 3])
-    return _Pass(found, run.beside(X_WE[known, :3, 3]))
+    tool = X_WE[known, :3, 3]
+    return _Pass(found, run.beside(tool), run.across(tool, found.places[known]))
 
 
 def _numbers(each: _Pass) -> dict[str, Any]:
     found = each.found
     result: dict[str, Any] = {"ended": found.ended, "exposures": len(found.along), "length_m": found.length}
-    for name, beside in (("camera", found.beside), ("true", each.true_beside)):
+    for name, beside in (
+        ("beside_camera", found.beside),
+        ("beside_true", each.true_beside),
+        ("across_true", each.true_across),
+    ):
         if beside is not None and len(beside):
             off = np.linalg.norm(beside, axis=1)
-            result[f"median_beside_{name}_m"] = float(np.median(off))
-            result[f"rms_beside_{name}_m"] = float(np.sqrt(np.mean(off**2)))
-            result[f"largest_beside_{name}_m"] = float(off.max())
+            result[f"median_{name}_m"] = float(np.median(off))
+            result[f"rms_{name}_m"] = float(np.sqrt(np.mean(off**2)))
+            result[f"largest_{name}_m"] = float(off.max())
     return result
 
 
@@ -162,6 +177,8 @@ def _verdict(numbers: dict[str, dict[str, Any]]) -> str:
         sizes = [1e3 * each[f"{size}_beside_{kind}_m"] for size in ("median", "rms", "largest")]
         end = "" if each["ended"] == "path" else f" (not the whole path: {each['ended']})"
         beside = "{:.3g} mm beside the path in the median, {:.3g} rms, {:.3g} at most".format(*sizes)
+        if "largest_across_true_m" in each:
+            beside += f" ({1e3 * each['largest_across_true_m']:.3g} across the edge that the robot is on)"
         said.append(f"{name}: {beside}{end}")
     text = "; ".join(said)
     return f"{text[:1].upper()}{text[1:]}."
@@ -194,5 +211,9 @@ def _sections(passes: dict[str, _Pass], numbers: dict[str, dict[str, Any]]) -> l
             beside,
         ),
         Section("Correction", "As sent to the controller, in the frame of its path.", asked, 320),
-        Section("Numbers", "", html_table(("", *numbers), rows)),
+        Section(
+            "Numbers",
+            _ACROSS if "largest_across_true_m" in next(iter(numbers.values())) else "",
+            html_table(("", *numbers), rows),
+        ),
     ]

@@ -65,7 +65,13 @@ def record_command(
         check_suffix(out, TABLE)
         check_suffix(mcap or "all.mcap", (".mcap",))
         q = read_configurations(design)
-        link = load_scenario(scenario, settings).station.link
+        station = load_scenario(scenario, settings).station
+        link = station.link
+        if station.overview.enabled:
+            raise ValueError(
+                "record does not watch for people: add --set station.overview.enabled=false, and see that "
+                "nobody is near"
+            )
         if not link.has_camera:
             raise ValueError("record needs a camera: station.link.has_camera is false")
         name, changes = on_station(scenario, list(settings or []), link.kind, with_cell)

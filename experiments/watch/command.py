@@ -57,7 +57,11 @@ def watch_command(
     out: PictureOption = Path("out/watch.html"),
     json_file: JsonOption = None,
 ) -> None:
-    """Watch for people and slow the robot for them; an aid, not a safety function."""
+    """Watch for people and slow the robot for them; an aid, not a safety function.
+
+    In a simulation or on recorded images. A running cell is watched by the run that guides its robot: truetip
+    run --scenario cell-watched --station egm, or --with-cell to try it.
+    """
     human = human_console(json_file)
     with json_output(json_file) as output, refusing(ValueError, OSError), ExitStack() as stack:
         at_least("--places", 1, places)

@@ -4,6 +4,7 @@ The frame of the path P is the one that controllers use for path corrections: x 
 the z axis of the tool as that allows, y = z x x.
 """
 
+from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
@@ -59,18 +60,21 @@ class PathLine:
             p_WE, slice(max(0, last - self._steps(_LOOK_BACK)), last + self._steps(_LOOK_AHEAD))
         )
 
-    def shifted(self, p_WE: np.ndarray, last: int, shift_P: np.ndarray) -> Place:
+    def shifted(self, p_WE: np.ndarray, last: int, shifts: Callable[[np.ndarray], np.ndarray]) -> Place:
         """Where on its way a robot is that has been shifted beside the path; it never goes back.
 
         Args:
             p_WE: its tool (3,) in m.
             last: index of the last place.
-            shift_P: (3,) in m in the frame of the path, wherever it is.
+            shifts: from frames R_WP of the path (n, 3, 3), in which the robot may be, to the shifts (n, 3) in
+                m in the world that it would have in them.
         """
-        return self._nearest(p_WE, slice(last, last + self._steps(_STEP_AHEAD)), shift_P)
+        return self._nearest(p_WE, slice(last, last + self._steps(_STEP_AHEAD)), shifts)
 
-    def _nearest(self, p_WE: np.ndarray, among: slice, shift_P: np.ndarray | None = None) -> Place:
-        near = self.points[among] if shift_P is None else self.points[among] + self.R_WP[among] @ shift_P
+    def _nearest(
+        self, p_WE: np.ndarray, among: slice, shifts: Callable[[np.ndarray], np.ndarray] | None = None
+    ) -> Place:
+        near = self.points[among] + (shifts(self.R_WP[among]) if shifts else 0.0)
         index = among.start + int(np.argmin(((near - p_WE) ** 2).sum(axis=1)))
         error = self.points[index] - p_WE
         tangent = self.R_WP[index, :, 0]

@@ -28,7 +28,7 @@ _STEP = 1e-4  # s, over which speeds of the arm are told from differences
 _LEAST_RATE = 0.2  # below which the full speed of the path is not told from the commands
 _FORGET = 0.02  # of the largest full speed per decision
 _GRADES = 20  # of the share that is put out
-_FAR = 1e3  # m, where nobody is
+FAR = 1e3  # m, where nobody is
 
 
 class SeparationMonitor(LeafSystem):
@@ -145,7 +145,7 @@ class SeparationMonitor(LeafSystem):
                 self._nearest(each.points, arm.start, arm.end, arm.radius) - each.reach
                 for each in sample.people
             ),
-            default=_FAR,
+            default=FAR,
         )
         walking = max((float(np.linalg.norm(each.velocity)) for each in sample.people), default=0.0)
         terms = self.terms(full, joints.position, walking)
@@ -156,13 +156,13 @@ class SeparationMonitor(LeafSystem):
             is_clear = distance > needed and age < config.slow_after
             if is_clear and (not config.acknowledge or self._is_acknowledged(context)):
                 state[_STOPPED] = 0.0
-        elif time > config.stop_after or distance < _FAR:  # nobody was there before the first images
+        elif time > config.stop_after or distance < FAR:  # nobody was there before the first images
             state[_STOPPED] = float(distance < needed or age >= config.stop_after)
         share = min(allowed, state[_SHARE] + config.rise * self._every * self._tick)
         state[_SHARE] = 0.0 if state[_STOPPED] else share
         state[_FULL] = full
         zone = _STOP if state[_STOPPED] else (_SLOW if allowed < 1.0 else _FREE)
-        state[_STATUS] = distance, terms.total, zone, min(age, _FAR)
+        state[_STATUS] = distance, terms.total, zone, min(age, FAR)
         discrete_state.set_value(self._state, state)
 
     def _full_speed(self, state: np.ndarray, velocity: np.ndarray, rate: float) -> np.ndarray:

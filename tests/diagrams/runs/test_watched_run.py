@@ -8,12 +8,13 @@ import pytest
 
 from diagrams.live_watch import LiveWatch, live_watch
 from diagrams.runs.real_time import RealTimeRecord, RealTimeRun
-from diagrams.scenario.scenario import load_scenario
+from diagrams.scenario.scenario import Scenario, load_scenario
 from robots.description.model import load_robot
 from systems.reference.paths import make_path
 from systems.samples import Person, PersonSample
 from systems.vision.people.shared_watch import SharedWatch
 from tests.diagrams.lockstep import Lockstep
+from tests.diagrams.runs.test_rsi_run import RsiLockstep
 
 SCENARIO = load_scenario(
     "cell-watched",
@@ -64,15 +65,16 @@ def guided(
     problem: float = np.inf,
     until: float = 20.0,
     acknowledged: tuple[float, ...] | None = None,
+    wired: tuple[Scenario, type[Lockstep]] = (SCENARIO, Lockstep),
 ) -> RealTimeRecord:
     """A run that needs no acknowledgement, or has it for 0.1 s from some times of the path on."""
-    scenario = SCENARIO
+    scenario, kind = wired
     if acknowledged is not None:
         limits = replace(scenario.servo.separation, acknowledge=True)
         scenario = replace(scenario, servo=replace(scenario.servo, separation=limits))
-    wire = Lockstep(scenario)
+    wire = kind(scenario)
     told: Any = Told(near, silent, problem)
-    watch = live_watch(scenario, load_robot("irb1200"))
+    watch = live_watch(scenario, load_robot(scenario.robot))
     assert watch is not None
     run = RealTimeRun(scenario, "open_loop", watch=LiveWatch(watch.monitor, lambda: told))
 
@@ -130,6 +132,33 @@ def test_after_a_stop_somebody_has_to_let_the_robot_go_on_once_the_way_is_free()
     assert np.abs(rate[stands]).max() < 1e-6
     assert run.people.said["stop"][stands].all()
     assert rate[times > 3.2].max() > 0.1
+    said = [(event.time, event.kind) for event in run.events]
+    assert [kind for _, kind in said] == ["stopped_for_people", "acknowledged", "acknowledged", "goes_on"]
+    # Told by the first decision after the chain's delay; gone on with the decision after the button.
+    decision = SCENARIO.servo.separation.period + 2.0 * SCENARIO.station.period
+    assert [at for at, _ in said] == pytest.approx(
+        [0.9 + LATE + 0.5 * PERIOD, 1.4, 3.2, 3.2], abs=0.5 * PERIOD + decision
+    )
+
+
+@pytest.mark.slow
+def test_a_robot_under_rsi_rests_while_somebody_is_near_too():
+    people = {
+        "overview": {"enabled": "true", "source": "drawn", "width": 320, "period": 0.2},
+        "separation": {"acknowledge": "false", "slow_after": 0.6, "stop_after": 1.2},
+    }
+    settings = [f"station.overview.{name}={value}" for name, value in people["overview"].items()]
+    settings += [f"servo.separation.{name}={value}" for name, value in people["separation"].items()]
+    settings += ["servo.people.computation=0.1", "reference.settle=0.5", "reference.dwell=0.5"]
+    record = guided((0.9, 2.5), wired=(load_scenario("cell-kuka", settings), RsiLockstep))
+    assert record.ended == "path"
+    assert record.people is not None
+    assert [event.kind for event in record.events] == ["stopped_for_people", "goes_on"]
+    stopped, goes_on = (event.time for event in record.events)
+    stands = (record.people.times > stopped + SCENARIO.reference.slowing + 0.1) & (
+        record.people.times < goes_on
+    )
+    assert np.abs(record.people.said["path_time"][stands, 1]).max() < 1e-6
 
 
 def test_a_station_in_real_time_needs_images_from_somewhere():

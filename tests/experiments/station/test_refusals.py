@@ -51,6 +51,10 @@ def test_a_cell_whose_messages_and_ears_are_in_different_networks_is_refused():
         (["--mode", "path"], "--mode must be one of joint, path_correction, got 'path'"),
         (["--mode", "path_correction"], "add --station egm, or --with-cell"),
         (["--mode", "path_correction", "--station", "rsi"], "is of ABB's EGM, got a station that speaks RSI"),
+        (
+            ["--mode", "path_correction", "--with-cell", "--scenario", "cell-watched"],
+            "--mode path_correction does not watch for people",
+        ),
         (["--mode", "path_correction", "--with-cell", "--law", "pbvs"], "--law does not go with"),
         (
             ["--mode", "path_correction", "--with-cell", "--set", "station.link.has_camera=false"],

@@ -43,13 +43,17 @@ def test_the_frame_is_right_handed_and_x_is_the_direction_of_motion():
 def test_a_shifted_robot_is_past_a_corner_when_its_shift_has_turned():
     """What it was sent tells the edge before the corner from that behind it, where places alone do not."""
     line, shift_P = PathLine(SQUARE), np.array([0.0, -8e-3, 12e-3])
+
+    def shifts(R_WP: np.ndarray) -> np.ndarray:
+        return R_WP @ shift_P
+
     corner = int(np.flatnonzero(np.abs(np.diff(line.R_WP[:, :, 0], axis=0)).max(axis=1) > 0.1)[0]) + 1
     for index in (corner - 1, corner):
         tip = line.points[index] + line.R_WP[index] @ shift_P
-        assert line.shifted(tip, corner - 4, shift_P).index == index
+        assert line.shifted(tip, corner - 4, shifts).index == index
     # It never goes back, and after a gap in the reports it does not leave the way out.
-    assert line.shifted(line.points[0], corner, shift_P).index >= corner
-    assert line.along[line.shifted(line.points[-1], corner, shift_P).index] < line.along[corner] + 0.01
+    assert line.shifted(line.points[0], corner, shifts).index >= corner
+    assert line.along[line.shifted(line.points[-1], corner, shifts).index] < line.along[corner] + 0.01
 
 
 def test_the_frame_goes_on_where_the_tool_moves_along_its_own_axis():
