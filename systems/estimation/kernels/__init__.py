@@ -10,6 +10,7 @@ from types import ModuleType
 
 _COMPILED = (
     "drives",
+    "gears",
     "geometry",
     "history",
     "information",

@@ -125,6 +125,15 @@ class DriveMemory(NamedTuple):
     correction: np.ndarray  # (6,) rad
 
 
+class Gap(NamedTuple):
+    """Play of a gear, and what stands beside its teeth."""
+
+    half: float  # rad, half of the play
+    impulse: float  # N m s, that brings teeth from the middle to a side
+    held: float  # of the stiffness of the gear, what the hysteresis has
+    width: float  # rad of deflection, after which it has turned over
+
+
 class Ring(NamedTuple):
     """Rows of numbers with their times, the last ones of all that there were."""
 

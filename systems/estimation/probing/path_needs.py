@@ -74,7 +74,7 @@ class PathNeeds:
         shapes = None
         if model.has_gear_errors:
             teeth = -np.sign(loads[:, 0, :6])
-            still = np.hstack((np.zeros((len(q), 2 * NUM_JOINTS)), teeth))
+            still = np.hstack((np.zeros_like(teeth), teeth, teeth))
             shapes = np.array([model.gear_shapes(*row) for row in zip(q, still, strict=True)])
         return model.predict(self._constants, model.mean, q, loads, twist, shapes).H
 
