@@ -120,4 +120,4 @@ def test_two_gaps_make_up_the_motion_of_a_gear_whose_hysteresis_carries_in_its_g
 
     assert left([0, 1, 2, 3]) < 0.5 * gap
     if share:
-        assert left([0, 1, 2]) > 0.7 * gap  # an open gap is crossed at another time: wrong by nearly all of it
+        assert left([0, 1, 2]) > 0.7 * gap  # open, it is crossed at another time
