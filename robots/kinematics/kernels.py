@@ -5,6 +5,7 @@ made.
 """
 
 import math
+from typing import Any
 
 import numpy as np
 from numba import njit
@@ -13,8 +14,10 @@ from robots.kinematics.forward import DAMPING, MANIPULABILITY_THRESHOLD
 
 _TINY = np.finfo(float).tiny
 
-# Compiled once a machine, then read from a file; a division by zero gives inf or NaN, as numpy's does.
-compiled = njit(cache=True, error_model="numpy")
+_jit: Any = njit
+# Compiled once a machine, then read from a file; a division by zero gives inf or NaN, as numpy's does. The
+# way into C is not needed; numba takes that option without declaring it.
+compiled = _jit(cache=True, error_model="numpy", no_cfunc_wrapper=True)
 
 
 @compiled

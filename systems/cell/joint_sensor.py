@@ -42,7 +42,7 @@ class JointSensor(LeafSystem):
         state = self._state.Eval(context)
         torque = self._torque.Eval(context)
         velocity = state[NUM_JOINTS:]
-        if velocity @ velocity > self._fastest**2:
+        if math.hypot(*velocity.tolist()) > self._fastest:
             raise RuntimeError(
                 f"the simulated robot has run away: a joint is faster than {self._fastest:.0f} rad/s at "
                 f"t = {context.get_time():.3f} s; check the gains and delays"

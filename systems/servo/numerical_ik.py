@@ -21,7 +21,7 @@ class NumericalIk(ServoLaw):
     offsets, that of the latter.
 
     The memory holds q_d, found from the halfway point by one Newton step, then the commanded positions and
-    their last velocity (trapezoidal rule).
+    their last velocity (trapezoidal rule), then the point halfway where both will be at the next tick.
     """
 
     title = "Numerical IK"
@@ -29,23 +29,27 @@ class NumericalIk(ServoLaw):
     Config = NumericalIkConfig
     awaits_joints = False
     is_compared = True
-    memory_size = 18
+    memory_size = 24
 
     def initial_state(self, moment: LawInput) -> np.ndarray:
-        """Both at the measured positions, at rest."""
-        return np.concatenate([moment.position, moment.position, np.zeros(6)])
+        """All at the measured positions, at rest."""
+        position = moment.position
+        return np.concatenate([position, position, np.zeros(6), position])
 
     def step(self, moment: LawInput, memory: np.ndarray) -> LawOutput:
         """One step of the trapezoidal rule, with feedback of the pose error where there is a sample."""
-        q_d, q, last_velocity = memory[:6], memory[6:12], memory[12:]
-        # Where both will be at this tick, to which the wanted pose and twist belong.
-        halfway = 0.5 * (q + q_d) + self.period * last_velocity
-        rows, J = self.kinematics.rows_and_jacobian(halfway)
-        correction = J.dot(q - q_d)
-        twist = moment.V_WD
-        if moment.measured is not None:
-            gains = self.config.rotation, self.config.translation
-            feedback = self.kernels.sine_feedback(*moment.measured, twist, *gains)
-            twist = twist + self.within_limits(feedback, correction)
-        following = self.kernels.numerical_ik(moment.X_WD, twist, rows, J, halfway, memory, self.period)
-        return LawOutput(following[6:12], following[12:], correction, following)
+        config, measured = self.config, moment.measured
+        rows, J = self.kinematics.rows_and_jacobian(memory[18:])
+        following, correction = self.kernels.numerical_ik(
+            moment.X_WD,
+            moment.V_WD,
+            *(measured or (rows, rows)),
+            measured is not None,
+            rows,
+            J,
+            memory,
+            (config.rotation, config.translation),
+            (self.angle_limit, config.correction_limit),
+            self.period,
+        )
+        return LawOutput(following[6:12], following[12:18], correction, following)

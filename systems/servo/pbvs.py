@@ -6,8 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from robots.configuration.quantity import quantity
-from robots.kinematics.forward import robust_solve
-from robots.pose import angular_velocity, error_of_rows, euler_difference, zyx_angles
+from robots.pose import angular_velocity, euler_difference, zyx_angles
 from systems.servo.law import LawInput, LawOutput, ServoLaw, check_branch_continuity
 from systems.servo.law_config import LawConfig
 
@@ -45,10 +44,11 @@ class Pbvs(ServoLaw):
         velocity = rates[:, 1]
         q_d = memory + rates[:, 0] + self.period * velocity
         rows, J = self.kinematics.rows_and_jacobian(moment.position)
-        correction = np.array(error_of_rows(rows.tolist(), moment.X_WD.tolist()))
+        correction = np.empty(6)
+        self.kernels.error(rows, moment.X_WD, correction)
         if moment.measured is not None:
             twist = self.within_limits(self._feedback(*moment.measured), correction)
-            added = robust_solve(J, twist)
+            added = self.kernels.robust_solve(J, twist[:, None])[:, 0]
             fastest = math.radians(self.config.correction_speed_limit_deg_s)
             largest = max(map(abs, added.tolist()))
             velocity = velocity + added * min(1.0, fastest / max(largest, 1e-12))

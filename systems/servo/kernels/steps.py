@@ -117,22 +117,35 @@ def newton_step(X_WD, V_WD, X_WE, J, lower, upper, joints):
 
 
 @compiled
-def numerical_ik(X_WD, V_WD, X_WE, J, halfway, memory, period):
-    """The memory of the next tick, (18,), of `systems.servo.numerical_ik.NumericalIk`.
+def numerical_ik(X_WD, V_WD, wanted, seen, is_seen, X_WE, J, memory, gains, limits, period):
+    """The memory of the next tick, (24,), of `systems.servo.numerical_ik.NumericalIk`, and its correction.
 
     Args:
-        X_WD, V_WD: wanted pose, and the twist towards it.
-        X_WE, J: pose and Jacobian at the joints ``halfway``, (6,) rad.
-        memory: of the last tick, (18,).
+        X_WD, V_WD: wanted pose and twist.
+        wanted, seen: poses at an exposure; only if something ``is_seen``.
+        X_WE, J: pose and Jacobian at the joints halfway.
+        memory: of the last tick, (24,).
+        gains: of rotation and translation in 1/s.
+        limits: of the correction in rad and m.
         period: of a tick in s.
     """
-    rates = follow_path(X_WD, V_WD, X_WE, J)
-    following = np.empty(18)
+    correction, twist = np.zeros(6), V_WD.copy()
     for i in range(6):
-        following[i] = halfway[i] + rates[i, 0]
-        following[6 + i] = memory[6 + i] + 0.5 * period * (rates[i, 1] + memory[12 + i])
-        following[12 + i] = rates[i, 1]
-    return following
+        for k in range(6):
+            correction[i] += J[i, k] * (memory[6 + k] - memory[k])
+    if is_seen:
+        feedback = sine_feedback(wanted, seen, V_WD, gains[0], gains[1])
+        limit_twist(feedback, correction, limits[0], limits[1])
+        for i in range(6):
+            twist[i] += feedback[i]
+    rates = follow_path(X_WD, twist, X_WE, J)
+    following = np.empty(24)
+    for i in range(6):
+        on_path = memory[18 + i] + rates[i, 0]
+        commanded = memory[6 + i] + 0.5 * period * (rates[i, 1] + memory[12 + i])
+        following[i], following[6 + i], following[12 + i] = on_path, commanded, rates[i, 1]
+        following[18 + i] = 0.5 * (commanded + on_path) + period * rates[i, 1]
+    return following, correction
 
 
 def warm_up() -> None:
@@ -142,4 +155,6 @@ def warm_up() -> None:
     limit_twist(sine_feedback(X, X, V, 1.0, 1.0), V, 1.0, 1.0)
     follow_path(X, V, X, J)
     newton_step(X, V, X, J, V, V, np.zeros(12))
-    numerical_ik(X, V, X, J, V, np.zeros(18), 1.0)
+    robust_solve(J, V[:, None])
+    error(X, X, np.empty(6))
+    numerical_ik(X, V, X, X, True, X, J, np.zeros(24), (1.0, 1.0), (1.0, 1.0), 1.0)
