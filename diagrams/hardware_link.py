@@ -172,17 +172,18 @@ class HardwareLink:
 
     def _check_cycle(self) -> None:
         """Measures the cycle on a hundred messages. Raises StationError if it is not the scenario's."""
+        began = self._now()
         first = self.next_report()
         last, count = first, 0
         while count < 100 and (report := self.next_report()) is not None and last is not None:
             count, last = count + (report.seqno - last.seqno) % 2**32, report
         if first is None or last is None or count < 100:
-            raise StationError("the controller fell silent")
+            raise StationError("the controller fell silent" + self.host.reason(began))
         cycle = (last.time - first.time) / count
         if abs(cycle / self._period - 1.0) > _CYCLE_TOLERANCE:
             raise StationError(
                 f"the controller sends every {1e3 * cycle:.3f} ms, "
-                f"station.period is {1e3 * self._period:g} ms"
+                f"station.period is {1e3 * self._period:g} ms{self.host.reason(began)}"
             )
 
     def wait_until_ready(self, within: float) -> RobotReport | None:
