@@ -57,7 +57,8 @@ def law_traits(law: type | System) -> LawTraits:
         uses_camera=getattr(kind, "uses_camera", True),
         learns_from_camera=getattr(kind, "learns_from_camera", False),
         commands_motors=getattr(kind, "commands_motors", False),
-        awaits_joints=getattr(kind, "awaits_joints", True),
+        # Not inherited: who extends a law may use joints where that law did not.
+        awaits_joints=vars(kind).get("awaits_joints", True),
         is_compared=getattr(kind, "is_compared", False),
         Config=config,
     )

@@ -9,6 +9,7 @@ from diagrams.scenario.scenario import load_scenario
 from systems.samples import PoseSample
 from systems.servo import LAWS
 from systems.servo.contract import law_traits
+from systems.servo.numerical_ik import NumericalIk
 from tests.diagrams.lockstep import Lockstep
 
 UNTIL = 1.2  # s of the path's time
@@ -59,3 +60,11 @@ def test_nor_does_it_where_messages_are_lost_late_and_out_of_order(law: str, mon
 def test_a_law_that_awaits_the_joints_gets_them(monkeypatch):
     _, share = begun("pbvs", [], True, monkeypatch)
     assert share == 0.0
+
+
+def test_a_law_that_extends_another_awaits_joints_unless_it_says_otherwise():
+    class Extended(NumericalIk):
+        pass
+
+    assert not law_traits(NumericalIk).awaits_joints
+    assert law_traits(Extended).awaits_joints
