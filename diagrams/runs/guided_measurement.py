@@ -6,6 +6,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from diagrams.hardware_link import EndedOnRequest, HardwareLink, StationError, never
+from diagrams.runs.undisturbed import undisturbed
 from diagrams.scenario.scenario import Scenario
 from robots.calibration.dwells import DwellRule, Recording, mean_at_rest
 from robots.description.model import NUM_JOINTS, RobotModel
@@ -51,6 +52,7 @@ class GuidedMeasurement:
         self._scenario, self._robot = scenario, robot
         self._rule, self._share = rule or DwellRule(), speed_share
 
+    @undisturbed()
     def run(
         self,
         client: RobotLink,

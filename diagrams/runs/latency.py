@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from diagrams.hardware_link import HardwareLink, StationError
+from diagrams.runs.undisturbed import undisturbed
 from diagrams.scenario.scenario import Scenario
 from robots.description.model import NUM_JOINTS, RobotModel
 from systems.link.clock import ClockQuality, steady_time
@@ -70,6 +71,7 @@ def _rise(s: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     return s**3 * (10.0 - 15.0 * s + 6.0 * s**2), 30.0 * s**2 * (1.0 - s) ** 2
 
 
+@undisturbed()
 def measure_latency(
     scenario: Scenario,
     robot: RobotModel,

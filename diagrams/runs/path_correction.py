@@ -20,6 +20,7 @@ from typing import Protocol
 import numpy as np
 
 from diagrams.hardware_link import HardwareLink, StationError, never
+from diagrams.runs.undisturbed import undisturbed
 from diagrams.scenario.scenario import Scenario
 from robots.description.model import RobotModel
 from robots.dynamics.compliant_kinematics import CompliantKinematics
@@ -81,6 +82,7 @@ class PathCorrectionRun:
         self._line = PathLine(make_path(scenario.reference))
         self._kinematics = CompliantKinematics(robot, scenario.station.payload)
 
+    @undisturbed()
     def run(
         self,
         client: CorrectedRobot,

@@ -1,8 +1,6 @@
 """A servo and a real station: the controller's message is the clock, one in, one tick, one out."""
 
-import gc
 import math
-import sys
 from collections.abc import Callable
 from functools import partial
 
@@ -20,6 +18,7 @@ from diagrams.runs.real_time_record import RealTimeRecord, fill_gaps, write_run_
 from diagrams.runs.simulation import guard_events, start_position
 from diagrams.runs.standstill import Standstill
 from diagrams.runs.tick_ahead import TickAhead
+from diagrams.runs.undisturbed import undisturbed
 from diagrams.scenario.scenario import Scenario, ScenarioError
 from diagrams.servo import Servo, calibrated, hear, law_name, learn, learnt
 from diagrams.tool_watch import ToolWatch
@@ -36,7 +35,6 @@ __all__ = ["REQUESTED", "RealTimeRecord", "RealTimeRun", "StationError"]
 _WARM_UP = 60  # ticks
 REQUESTED = "ended on request"  # why a run ended that somebody wanted to end
 _STOOD = 0.5  # s at rest by the guard, after which a run is over that nothing leads back
-_SWITCH = 5e-4  # s after which another thread, such as that of a progress bar, gives way
 
 
 class RealTimeRun:
@@ -116,6 +114,7 @@ class RealTimeRun:
         """Whether the run does not begin before the camera sees the tool."""
         return self.uses_camera or self.servo.traits.learns_from_camera
 
+    @undisturbed()
     def run(
         self,
         client: RobotLink,
@@ -143,12 +142,6 @@ class RealTimeRun:
             StationError: if there is no controller or camera, or its cycle is not the scenario's.
         """
         self._stream, self._is_acknowledged = record, is_acknowledged
-        collecting, switching = gc.isenabled(), sys.getswitchinterval()
-        # A full search for garbage takes tens of milliseconds with Drake loaded.
-        gc.collect()
-        gc.freeze()
-        gc.disable()
-        sys.setswitchinterval(_SWITCH)
         before = client.counters()
         watch = self._watch = self._live.start() if self._live else None
         try:
@@ -180,10 +173,6 @@ class RealTimeRun:
                 watch.end()
             if record is not None and not len(self._reports):
                 record.close(law=self.law, ended="before its path")
-            sys.setswitchinterval(switching)
-            gc.unfreeze()
-            if collecting:
-                gc.enable()
         counters = {name: number - before[name] for name, number in client.counters().items()}
         return self._record(counters, camera, wire, ended)
 

@@ -31,6 +31,7 @@ from typing import Any
 import numpy as np
 
 from diagrams.hardware_link import HardwareLink
+from diagrams.runs.undisturbed import undisturbed
 from diagrams.scenario.scenario import load_scenario
 from experiments.station.guided import compare_on_station
 from robots.description.model import NUM_JOINTS, load_robot
@@ -183,6 +184,7 @@ def _echo(kind: str) -> None:
     print(json.dumps([*(1e3 * np.percentile(times[20:], [50, 99])), overtaken_by]))
 
 
+@undisturbed()
 def _awake_echo() -> None:
     """As `_echo`, by the receive loop of the servo, which does not sleep when a message is due."""
     scenario = load_scenario("cell", ["station.kind=egm", *PATIENT])
