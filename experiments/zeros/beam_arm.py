@@ -13,9 +13,10 @@ from scipy.linalg import eig
 
 from experiments.zeros.end_path import EndPath
 from experiments.zeros.runge_kutta import march
-from robots.dynamics.flexible_body import beam_body
-from robots.dynamics.modal_arm import VARIANTS, ModalArm, ModalLink, Terms, beam_link, body_link
-from robots.dynamics.modal_beam import ModalBeam
+from robots.dynamics.modal.arm_equations import VARIANTS, Terms
+from robots.dynamics.modal.flexible_body import beam_body
+from robots.dynamics.modal.modal_arm import ModalArm, ModalLink, beam_link, body_link
+from robots.dynamics.modal.modal_beam import ModalBeam
 from systems.feedforward.sprung_deflection import SprungDeflection
 
 STEP = 1e-4  # s; the fastest pole of the plant is at some 1e4 1/s

@@ -5,10 +5,10 @@ from pathlib import Path
 import numpy as np
 
 from experiments.report.plot_page import Section, html_table
-from experiments.zeros.examples import Example
+from experiments.zeros.example import Example
 from experiments.zeros.plots import faster_zeros, plane_figure
 from experiments.zeros.study import one_json
-from robots.dynamics.sid_file import read_sid
+from robots.dynamics.modal.sid_file import read_sid
 
 
 def body_zeros(path: Path, load: float) -> Example:

@@ -10,7 +10,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.polynomial import Polynomial
 
-from robots.dynamics.modal_beam import ModalBeam
+from robots.dynamics.modal.modal_beam import ModalBeam
 
 STEP, PERIOD, START, DURATION = 1e-3, 16.384, 1.0, 0.5  # s; all has died away when the period begins again
 TIMES = STEP * np.arange(round(PERIOD / STEP))

@@ -2,7 +2,6 @@
 
 from collections.abc import Callable
 from dataclasses import replace
-from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -11,6 +10,7 @@ from experiments.zeros import beam_arm as elastic_arm
 from experiments.zeros import low_pass
 from experiments.zeros import two_beams as two_beam_arm
 from experiments.zeros.driven_beam import MODELS, TIMES, DrivenBeam, deviation
+from experiments.zeros.example import Example
 from experiments.zeros.linear_arm import (
     DISTANCE,
     LinearArm,
@@ -28,22 +28,15 @@ from experiments.zeros.plots import (
     plane_figure,
     time_figure,
 )
+from experiments.zeros.spatial_arm import spatial_arm
 from experiments.zeros.study import BEAM_MODES, one_json, two_joint_arm_limit, two_joint_arm_zeros
-from robots.dynamics.modal_arm import VARIANTS
-from robots.dynamics.modal_beam import BOUNDARIES, ModalBeam
+from robots.dynamics.modal.arm_equations import VARIANTS
+from robots.dynamics.modal.modal_beam import BOUNDARIES, ModalBeam
 from robots.dynamics.transmission_zeros import Zeros
 from systems.feedforward.inverse_observer import InverseObserver
 
 _BANDWIDTHS = (5.0, 10.0, 15.0, 20.0, 30.0, 40.0, 50.0)  # Hz
 _DRAWN = (15.0,)  # Hz
-
-
-class Example(NamedTuple):
-    """What there is to say of an example."""
-
-    numbers: dict[str, Any]  # for --json
-    verdict: str
-    sections: list[Section]
 
 
 def two_joint_arm() -> Example:
@@ -342,6 +335,7 @@ EXAMPLES: dict[str, Callable[[], Example]] = {
         two_beams,
         driven_beam,
         beam_arm,
+        spatial_arm,
         observer,
         virtual_output,
         prefilter,

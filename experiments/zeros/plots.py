@@ -7,7 +7,7 @@ import plotly.graph_objects as go
 
 from experiments.zeros import low_pass
 from experiments.zeros.study import ZeroStudy
-from robots.dynamics.modal_beam import ModalBeam
+from robots.dynamics.modal.modal_beam import ModalBeam
 from robots.dynamics.transmission_zeros import Zeros
 
 _WIDTH = 3.0  # of the plane that is shown, relative to its height

@@ -11,8 +11,8 @@ import numpy as np
 
 from experiments.zeros.end_path import EndPath
 from experiments.zeros.runge_kutta import march
-from robots.dynamics.modal_arm import ModalArm, beam_link
-from robots.dynamics.modal_beam import ModalBeam
+from robots.dynamics.modal.modal_arm import ModalArm, beam_link
+from robots.dynamics.modal.modal_beam import ModalBeam
 from robots.dynamics.transmission_zeros import Zeros, transmission_zeros
 
 STEP = 5e-4  # s

@@ -7,7 +7,7 @@ import pytest
 from experiments.zeros import beam_arm, two_beams
 from experiments.zeros.end_path import EndPath
 from experiments.zeros.runge_kutta import march
-from robots.dynamics.modal_arm import VARIANTS
+from robots.dynamics.modal.arm_equations import VARIANTS
 
 
 def test_the_step_is_of_fourth_order():

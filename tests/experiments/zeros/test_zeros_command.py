@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 from experiments.zeros.study import two_joint_arm_limit, two_joint_arm_zeros
-from robots.dynamics.flexible_body import beam_body
-from robots.dynamics.sid_file import sid_text
+from robots.dynamics.modal.flexible_body import beam_body
+from robots.dynamics.modal.sid_file import sid_text
 from tests.experiments.browser import open_page
 from tests.experiments.commands import files, refusal, truetip
 
@@ -69,6 +69,21 @@ def test_arms_with_beams_come_from_the_command(tmp_path: Path):
     assert [name for name, value in arm["variants_mm"].items() if value is None] == ["5"]
 
 
+@pytest.mark.slow
+def test_the_arm_in_space_comes_from_the_command(tmp_path: Path):
+    """Figures 3.16 to 3.18: C_t and C_r make the inverse unstable and weigh most, C_r's first order not."""
+    arm = json.loads(run(tmp_path, "--example=spatial_arm", "--json", "-").stdout)
+    assert arm["slowest_rhp"] > 100.0
+    assert arm["simplified"]["slowest_rhp"] is None
+    off = arm["load_off_mm"]
+    assert off["variant 5"] < 0.05 * off["variant 4"]
+    assert all(off[f"variant {n}"] == pytest.approx(off["variant 4"], rel=0.1) for n in (1, 2, 3))
+    assert 3.0 * off["variant 1"] < off["rigid"]
+    lowest = [row[0] for row in arm["frequencies_by_modes_hz"].values()]
+    assert lowest == sorted(lowest, reverse=True)  # more modes, less stiff
+    assert lowest[2] - lowest[3] < 0.5 * (lowest[1] - lowest[2])
+
+
 def test_the_page_opens(tmp_path: Path):
     assert run(tmp_path, "--robot=kr16", "--grid=3").exit_code == 0
     opened = open_page(tmp_path / "zeros.html")
@@ -105,8 +120,8 @@ REFUSED = {
     "robot": ("--robot=kr211", "robot 'kr211': no file"),
     "example": (
         "--example=bridge",
-        "must be one of two_joint_arm, beam, two_beams, driven_beam, beam_arm, observer, virtual_output, "
-        "prefilter, got 'bridge'",
+        "must be one of two_joint_arm, beam, two_beams, driven_beam, beam_arm, spatial_arm, observer, "
+        "virtual_output, prefilter, got 'bridge'",
     ),
     "rigid": ("--elasticity=rigid", "elasticity must be joints or structure"),
     "grid": ("--grid=1", "--grid must be at least 2, got 1"),

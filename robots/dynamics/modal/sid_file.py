@@ -10,7 +10,7 @@ from pathlib import Path
 
 import numpy as np
 
-from robots.dynamics.flexible_body import FlexibleBody
+from robots.dynamics.modal.flexible_body import FlexibleBody
 
 _ENTRY = re.compile(r"^(\w+)\s*(?:\(([\d\s,]*)\))?\s*=\s*(.*)$")
 _STRUCTURES = range(5)
@@ -54,7 +54,7 @@ class _Reader:
         nodes = [block for block in self._within(modal, "frame").blocks if block.name == "node"]
         if not nodes:
             raise self._error(modal.line, "there are no nodes")
-        for name in ("gr", "ge", "oe", "ksigma"):  # of first order here, but what is wrong is refused
+        for name in ("gr", "ge", "ksigma"):  # of first order here, but what is wrong is refused
             for block in modal.blocks:
                 if block.name == name:
                     self._matrix(block, None, None, n)
@@ -70,6 +70,7 @@ class _Reader:
             self._of(modal, "ke", n, n, n),
             self._of(modal, "de", n, n, n),
             self._turns(nodes, n),
+            self._of(modal, "oe", n, 6, n) if any(each.name == "oe" for each in modal.blocks) else None,
         )
 
     def _turns(self, nodes: list[_Block], n: int) -> np.ndarray | None:
@@ -127,6 +128,12 @@ class _Reader:
                     block.line, f"{block.name}: {key} must be 0 to {allowed[-1]}, got {found[key]}"
                 )
         shape = found["nrow"], found["ncol"]
+        if found["structure"] in (1, 2) and shape[0] != shape[1]:
+            raise self._error(
+                block.line,
+                f"{block.name}: structure {found['structure']} is for square matrices, got "
+                f"{shape[0]} x {shape[1]}",
+            )
         matrix = np.eye(*shape) if found["structure"] == 4 else np.zeros(shape)
         for (key, places), (text, line) in block.values.items():
             sizes = {"m0": shape, "m1": (shape[0], n, shape[1])}.get(key)
@@ -180,10 +187,11 @@ def sid_text(body: FlexibleBody) -> str:
         ("Ct", body.Ct),
         ("Cr", body.Cr),
         ("Me", body.Me),
+        ("Oe", body.Oe),
         ("Ke", body.Ke),
         ("De", body.De),
     ):
-        lines += _block(name, matrix, n)
+        lines += _block(name, matrix, n) if matrix is not None else []
     return "\n".join([*lines, "end modal", "end part", ""])
 
 

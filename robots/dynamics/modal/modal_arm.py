@@ -3,20 +3,25 @@
 Reiner (2010), section 2.4.2 and eqs. (3.72), (3.73), for bodies along x that bend across it. Drake's
 continuous MultibodyPlant has no such body, so the equations stand here, in casadi. What is of second order in
 the deformation (the end of a bent beam is nearer) is left out, so rates are to be far below the first mode.
+Gravity acts against y.
 """
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import NamedTuple
 
 import casadi as ca
 import numpy as np
 
-from robots.dynamics.flexible_body import FlexibleBody
-from robots.dynamics.modal_beam import ModalBeam
-
-GRAVITY = 9.81  # m/s^2, against y
-_NEWTON_STEPS = 8  # of a sag that is nearly linear
+from robots.dynamics.modal.arm_equations import (
+    GRAVITY,
+    NOMINAL,
+    ArmEquations,
+    Motion,
+    Terms,
+    motion_symbols,
+)
+from robots.dynamics.modal.flexible_body import FlexibleBody
+from robots.dynamics.modal.modal_beam import ModalBeam
 
 
 @dataclass(frozen=True)
@@ -77,7 +82,7 @@ def beam_link(beam: ModalBeam, damping: float = 0.0) -> ModalLink:
         De,
         beam.input_column()[1:, 0],
         beam.displacement(1.0)[1:],
-        beam.end_slope(),
+        beam.slope(1.0),
         beam.load,
     )
 
@@ -112,41 +117,13 @@ def body_link(body: FlexibleBody, load: float = 0.0) -> ModalLink:
     )
 
 
-class Terms(NamedTuple):
-    """Which terms of (3.72) a model has, each with what R's variants of section 3.7 leave out."""
-
-    coupling: bool = True  # C_t and C_r: what the motion of the frame does to the modes, and they to it
-    modal_weight: bool = True  # what gravity does to the modes by C_t, part of h_e
-    gyroscopic: bool = True  # G_r, and O_e of first order in the deformation
-    bent_inertia: bool = True  # inertia and centre of mass of the bent body
-
-
-# In a plane C_t, C_r and h_e have no part of first order, so that variant 5 is the nominal model.
-VARIANTS = {
-    "1": Terms(False, False, False, False),
-    "2": Terms(False, False, False),
-    "3": Terms(False, False),
-    "4": Terms(False),
-    "5": Terms(),
-}
-
-
-class ModalArm:
-    """Equations M(x) x'' + b(x, x') = B u of an arm; x has each joint's angle (rad), then its link's modes.
+class ModalArm(ArmEquations):
+    """An arm in a plane; x has each joint's angle (rad), then its link's modes.
 
     The angle is that of the link's frame against the end of the link before it; of the first, against x.
-
-    Attributes:
-        size: number of coordinates.
-        joints: which of them are angles.
-        modes: which belong to modes.
-        B: what the torques of the joints act on, shape (size, joints).
-        held: by which coordinates the modes change with the joints held, shape (size, modes).
     """
 
-    def __init__(
-        self, links: Sequence[ModalLink], terms: Terms = VARIANTS["5"], gravity: float = GRAVITY
-    ) -> None:
+    def __init__(self, links: Sequence[ModalLink], terms: Terms = NOMINAL, gravity: float = GRAVITY) -> None:
         """Derives the equations.
 
         Raises:
@@ -156,77 +133,40 @@ class ModalArm:
             raise ValueError("modal arm: needs at least one link")
         sizes = [1 + len(link.Ct) for link in links]
         starts = np.cumsum([0, *sizes[:-1]])
-        self.size, self.joints = sum(sizes), starts
-        self.modes = np.setdiff1d(np.arange(self.size), starts)
-        self.B = np.zeros((self.size, len(links)))
-        self.held = np.eye(self.size)[:, self.modes]
-        self._turns = np.eye(self.size)[:, self.joints]
-        x, v, a = (ca.SX.sym(name, self.size) for name in "xva")
+        motion = motion_symbols(sum(sizes))
+        x = motion.x
         p, angle, energy = ca.SX.zeros(2), ca.SX(0), ca.SX(0)
-        forces = ca.SX.zeros(self.size)
+        forces, root_turns = ca.SX.zeros(x.numel()), np.zeros((x.numel(), len(links)))
         for number, (link, start, size) in enumerate(zip(links, starts, sizes, strict=True)):
             own = slice(int(start) + 1, int(start) + size)
-            self.B[start, number], self.B[own, number] = 1.0, link.root_turn
-            self.held[start, np.isin(self.modes, range(own.start, own.stop))] = -link.root_turn
+            root_turns[own, number] = link.root_turn
             angle = angle + x[int(start)]
-            added, held = _body(link, terms, (x, v, a), own, (p, angle), gravity)
+            added, held = _body(link, terms, motion, own, (p, angle), gravity)
             forces, energy = forces + added, energy + held
             e1, e2 = _axes(angle)
             p = p + link.length * e1 + ca.dot(ca.DM(link.end_shift), x[own]) * e2
-            added, held = _point(link.load, (x, v, a), p, gravity)
+            added, held = _point(link.load, motion, p, gravity)
             forces, energy = forces + added, energy + held
             angle = angle + ca.dot(ca.DM(link.end_turn), x[own])
-        bias = ca.substitute(forces, a, ca.DM.zeros(self.size))
-        mass = ca.jacobian(forces, a)
-        J = ca.jacobian(p, x)
-        self.mass = ca.Function("mass", [x], [mass], {"cse": True})
-        self.bias = ca.Function("bias", [x, v], [bias], {"cse": True})
-        self.energy = ca.Function("energy", [x, v], [energy])
-        static = ca.substitute(bias, v, ca.DM.zeros(self.size))
-        self.tangent = ca.Function("tangent", [x], [ca.jacobian(static, x)], {"cse": True})
-        # Where the end is (m), its Jacobian, and how it accelerates at x'' = 0.
-        rate = ca.jtimes(p, x, v)
-        self.end = ca.Function("end", [x, v], [p, J, ca.jtimes(rate, x, v)])
-
-    def at_rest(self, angles: np.ndarray) -> np.ndarray:
-        """Coordinates with the joints held at angles in rad, shape (joints,), and what gravity bends."""
-        q, still = np.zeros(len(self.modes)), np.zeros(self.size)
-        for _ in range(_NEWTON_STEPS if len(q) else 0):
-            x = self._turns @ angles + self.held @ q
-            sag = self.held.T @ np.asarray(self.bias(x, still))[:, 0]
-            q = q - np.linalg.solve(self.held.T @ np.asarray(self.tangent(x)) @ self.held, sag)
-        return self._turns @ angles + self.held @ q
-
-    def torques(self, x: np.ndarray, v: np.ndarray, a: np.ndarray) -> np.ndarray:
-        """Of a motion, M a + b in all coordinates: x and its two derivatives of shape (k, size) each."""
-        M = np.asarray(self.mass.map(len(x))(x.T)).reshape(self.size, len(x), self.size)
-        return np.einsum("ikj,kj->ki", M, a) + np.asarray(self.bias.map(len(x))(x.T, v.T)).T
+        super().__init__(motion, forces, energy, p, starts, root_turns)
 
 
 def _axes(angle: ca.SX) -> tuple[ca.SX, ca.SX]:
     return ca.vertcat(ca.cos(angle), ca.sin(angle)), ca.vertcat(-ca.sin(angle), ca.cos(angle))
 
 
-def _motion(quantity: ca.SX, motion: tuple[ca.SX, ca.SX, ca.SX]) -> tuple[ca.SX, ca.SX]:
-    """The first two derivatives of what depends on x."""
-    x, v, a = motion
-    rate = ca.jtimes(quantity, x, v)
-    return rate, ca.jtimes(rate, x, v) + ca.jtimes(quantity, x, a)
-
-
-def _point(mass: float, motion: tuple[ca.SX, ca.SX, ca.SX], p: ca.SX, gravity: float) -> tuple[ca.SX, ca.SX]:
+def _point(mass: float, motion: Motion, p: ca.SX, gravity: float) -> tuple[ca.SX, ca.SX]:
     """Generalised inertia force and weight of a point mass, and its energy."""
-    x = motion[0]
-    rate, acceleration = _motion(p, motion)
-    lifted = acceleration + ca.vertcat(0.0, gravity)
+    rate = motion.rate(p)
+    lifted = motion.rate(rate) + ca.vertcat(0.0, gravity)
     energy = mass * (0.5 * ca.dot(rate, rate) + gravity * p[1])
-    return mass * ca.jacobian(p, x).T @ lifted, energy
+    return mass * ca.jacobian(p, motion.x).T @ lifted, energy
 
 
 def _body(
     link: ModalLink,
     terms: Terms,
-    motion: tuple[ca.SX, ca.SX, ca.SX],
+    motion: Motion,
     own: slice,
     frame: tuple[ca.SX, ca.SX],
     gravity: float,
@@ -235,7 +175,8 @@ def _body(
     (x, v, a), (p, angle) = motion, frame
     q, dq, ddq = x[own], v[own], a[own]
     e1, e2 = _axes(angle)
-    (v0, a0), (w, alpha) = _motion(p, motion), _motion(angle, motion)
+    v0, w = motion.rate(p), motion.rate(angle)
+    a0, alpha = motion.rate(v0), motion.rate(w)
     weight = ca.vertcat(0.0, gravity)
     lifted = a0 + weight
     Ct, Cr, Me, Ke, De = (ca.DM(each) for each in (link.Ct, link.Cr, link.Me, link.Ke, link.De))

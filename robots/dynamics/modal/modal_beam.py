@@ -72,23 +72,23 @@ class ModalBeam:
     def stiffness_matrix(self) -> np.ndarray:
         """K in N m / rad and N / m; shape (1 + n, 1 + n). The joint itself has none."""
         nodes, weights = _quadrature()
-        curvature = np.array([np.zeros_like(nodes), *(second(nodes) for _, second, _ in self._modes())]).T
+        curvature = np.array([np.zeros_like(nodes), *(second(nodes) for _, _, second in self._modes())]).T
         curvature = curvature / self.length**2
         return self.bending_stiffness * self.length * (curvature * weights[:, None]).T @ curvature
 
     def input_column(self) -> np.ndarray:
         """What the torque of the joint acts on: angle and slope of the modes at it; shape (1 + n, 1)."""
-        return np.array([[1.0], *([slope / self.length] for _, _, slope in self._modes())])
+        return np.concatenate([[1.0], self.slope(0.0)])[:, None]
 
     def displacement(self, xi: ArrayLike) -> np.ndarray:
         """Displacement across the beam by the coordinates x, at xi = 0 (joint) to 1 (end); (..., 1 + n)."""
         places = np.asarray(xi, dtype=float)
         return np.stack([self.length * places, *(shape(places) for shape, _, _ in self._modes())], axis=-1)
 
-    def end_slope(self) -> np.ndarray:
-        """How far the modes turn the free end in rad, shape (n,)."""
-        nodes, weights = _quadrature()
-        return np.array([slope + weights @ second(nodes) for _, second, slope in self._modes()]) / self.length
+    def slope(self, xi: ArrayLike) -> np.ndarray:
+        """How far the modes turn the beam at xi in rad, shape (..., n)."""
+        places = np.asarray(xi, dtype=float)
+        return np.stack([first(places) for _, first, _ in self._modes()], axis=-1) / self.length
 
     def frequencies(self) -> np.ndarray:
         """Natural frequencies with the joint held, in rad/s; shape (n,); meant for ``"clamped"``."""
@@ -148,8 +148,8 @@ class ModalBeam:
             stable, unstable = (middle, unstable) if zeros(middle).is_minimum_phase else (stable, middle)
         return float(stable)
 
-    def _modes(self) -> list[tuple[Field, Field, float]]:
-        """Shape, its second derivative by xi, and its slope by xi at the joint, of each mode."""
+    def _modes(self) -> list[tuple[Field, Field, Field]]:
+        """Shape of each mode and its first two derivatives by xi."""
         make = _clamped_mode if self.boundary == "clamped" else _supported_mode
         return [make(number) for number in range(1, self.num_modes + 1)]
 
@@ -161,7 +161,7 @@ def _quadrature() -> tuple[np.ndarray, np.ndarray]:
 
 
 @cache
-def _clamped_mode(number: int) -> tuple[Field, Field, float]:
+def _clamped_mode(number: int) -> tuple[Field, Field, Field]:
     """cos(b) cosh(b) = -1."""
     about = (number - 0.5) * np.pi
     b = root_scalar(lambda b: np.cos(b) + 1.0 / np.cosh(b), bracket=(about - 0.6, about + 0.6)).root
@@ -170,14 +170,17 @@ def _clamped_mode(number: int) -> tuple[Field, Field, float]:
     def shape(x: np.ndarray) -> np.ndarray:
         return np.cosh(b * x) - np.cos(b * x) - s * (np.sinh(b * x) - np.sin(b * x))
 
+    def first(x: np.ndarray) -> np.ndarray:
+        return b * (np.sinh(b * x) + np.sin(b * x) - s * (np.cosh(b * x) - np.cos(b * x)))
+
     def second(x: np.ndarray) -> np.ndarray:
         return b**2 * (np.cosh(b * x) + np.cos(b * x) - s * (np.sinh(b * x) + np.sin(b * x)))
 
-    return shape, second, 0.0
+    return shape, first, second
 
 
 @cache
-def _supported_mode(number: int) -> tuple[Field, Field, float]:
+def _supported_mode(number: int) -> tuple[Field, Field, Field]:
     """tan(b) = tanh(b)."""
     about = (number + 0.25) * np.pi
     b = root_scalar(lambda b: np.tan(b) - np.tanh(b), bracket=(about - 0.3, about + 0.3)).root
@@ -186,7 +189,10 @@ def _supported_mode(number: int) -> tuple[Field, Field, float]:
     def shape(x: np.ndarray) -> np.ndarray:
         return np.sin(b * x) + s * np.sinh(b * x)
 
+    def first(x: np.ndarray) -> np.ndarray:
+        return b * (np.cos(b * x) + s * np.cosh(b * x))
+
     def second(x: np.ndarray) -> np.ndarray:
         return b**2 * (-np.sin(b * x) + s * np.sinh(b * x))
 
-    return shape, second, float(b * (1.0 + s))
+    return shape, first, second

@@ -28,6 +28,8 @@ class FlexibleBody:
         Ke: stiffness, shape (n, n).
         De: damping, shape (n, n).
         turns: how far the modes turn the nodes in rad, shape (k, 3, n); None where a file does not say.
+        Oe: what turning the frame does to the modes, by the products xx, yy, zz, xy, yz, xz of its rates,
+            shape (n, 6); None likewise.
     """
 
     mass: float
@@ -41,6 +43,7 @@ class FlexibleBody:
     Ke: np.ndarray
     De: np.ndarray
     turns: np.ndarray | None = None
+    Oe: np.ndarray | None = None
 
     def frequencies(self) -> np.ndarray:
         """Natural frequencies with the frame held, in rad/s; shape (n,)."""
@@ -120,6 +123,8 @@ def beam_body(
     push[::2], turn[::2], turn[1::2] = 1.0, x, 1.0
     Ct, Cr = np.zeros((2, modes, 3))
     Ct[:, 1], Cr[:, 2] = push @ M @ full, turn @ M @ full
+    Oe = np.zeros((modes, 6))
+    Oe[:, 3] = Cr[:, 2]  # of x phi over the mass, as C_r
     moved, turned = np.zeros((2, elements + 1, 3, modes))
     moved[:, 1], turned[:, 2] = full[::2], full[1::2]
     about = mass * length**2 / 3.0
@@ -135,4 +140,5 @@ def beam_body(
         np.diag(squares),
         np.diag(2.0 * damping * np.sqrt(squares)),
         turned,
+        Oe,
     )

@@ -15,9 +15,10 @@ from pydrake.multibody.tree import (
     UnitInertia,
 )
 
-from robots.dynamics.flexible_body import beam_body
-from robots.dynamics.modal_arm import VARIANTS, ModalArm, beam_link, body_link
-from robots.dynamics.modal_beam import BOUNDARIES, ModalBeam
+from robots.dynamics.modal.arm_equations import VARIANTS
+from robots.dynamics.modal.flexible_body import beam_body
+from robots.dynamics.modal.modal_arm import ModalArm, beam_link, body_link
+from robots.dynamics.modal.modal_beam import BOUNDARIES, ModalBeam
 
 LENGTH, MASS, EI, LOAD = 1.2, 3.0, 400.0, 0.7
 BODY = beam_body(LENGTH, MASS, EI, elements=16, modes=3, damping=0.01)

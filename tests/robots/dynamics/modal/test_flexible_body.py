@@ -1,14 +1,15 @@
 """Flexible bodies: a mesh converges to the analytic beam, files come back, broken ones are refused."""
 
+import re
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from robots.dynamics.flexible_body import FlexibleBody, beam_body
-from robots.dynamics.modal_beam import ModalBeam
-from robots.dynamics.sid_file import SidFileError, read_sid, sid_text
+from robots.dynamics.modal.flexible_body import FlexibleBody, beam_body
+from robots.dynamics.modal.modal_beam import ModalBeam
+from robots.dynamics.modal.sid_file import SidFileError, read_sid, sid_text
 
 BEAM = beam_body(length=2.0, mass=3.0, bending_stiffness=500.0, elements=10, modes=3, damping=0.01)
 FIELDS = tuple(FlexibleBody.__dataclass_fields__)
@@ -87,6 +88,9 @@ BROKEN = {
     "missing": (TEXT.replace("\nKe\n", "\nKx\n").replace("end Ke", "end Kx"), "'modal' has no 'ke'"),
     "nested": (TEXT.replace("end refmod", "end frame"), "'end frame' does not end 'refmod'"),
     "empty": ("", "'file' has no 'part'"),
+    "columns": (TEXT.replace("nrow = 3\nncol = 6", "nrow = 3\nncol = 5"), "oe: ncol must be 6, got 5"),
+    "square": (re.sub(r"(?s)(Oe\n.*?)structure = 3", r"\1structure = 2", TEXT, count=1),
+               "oe: structure 2 is for square matrices, got 3 x 6"),
     "structure": (TEXT.replace("structure = 3", "structure = 7"), "structure must be 0 to 4, got 7"),
 }  # fmt: skip
 

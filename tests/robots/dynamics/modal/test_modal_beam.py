@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.optimize import root_scalar
 
-from robots.dynamics.modal_beam import ModalBeam
+from robots.dynamics.modal.modal_beam import ModalBeam
 
 
 def test_a_clamped_beam_without_load_has_the_analytic_frequencies():
