@@ -27,13 +27,20 @@ class HardwareStation(LeafSystem):
     and, where another process looks for people:
         out ``person_sample``     PersonSample
         out ``acknowledge``       vector 1: 1 while somebody lets the robot go on after a stop, else 0
+    and, where what the controller can do is obeyed:
+        out ``speed_share``       vector 1: the share of the planned speed that it can do
 
     It touches no socket. Whoever holds the wire puts in what was received with `receive` and takes out what
     is to be sent with `command`.
     """
 
-    def __init__(self, has_people: bool = False) -> None:
-        """``has_people``: whether somebody looks for people."""
+    def __init__(self, has_people: bool = False, has_share: bool = False) -> None:
+        """Makes the station.
+
+        Args:
+            has_people: whether somebody looks for people.
+            has_share: whether the controller's performance is obeyed.
+        """
         super().__init__()
         self._commands = [
             self.DeclareVectorInputPort(name, NUM_JOINTS) for name in ("position_command", "velocity_command")
@@ -54,9 +61,19 @@ class HardwareStation(LeafSystem):
                 {self.abstract_parameter_ticket(index)},
             )
         if has_people:
-            self._acknowledged = NumericParameterIndex(self.DeclareNumericParameter(BasicVector(np.zeros(1))))
-            ticket = self.numeric_parameter_ticket(self._acknowledged)
-            self.DeclareVectorOutputPort("acknowledge", 1, self._calc_acknowledge, {ticket})
+            self._acknowledged = self._declare_told("acknowledge", 0.0)
+        if has_share:
+            self._share = self._declare_told("speed_share", 1.0)
+
+    def _declare_told(self, name: str, begin: float) -> NumericParameterIndex:
+        """An output port with one number that is told from outside."""
+        index = NumericParameterIndex(self.DeclareNumericParameter(BasicVector([begin])))
+
+        def calc(context: Context, output: BasicVector) -> None:
+            output.set_value(context.get_numeric_parameter(index).value())
+
+        self.DeclareVectorOutputPort(name, 1, calc, {self.numeric_parameter_ticket(index)})
+        return index
 
     def receive(
         self,
@@ -74,8 +91,10 @@ class HardwareStation(LeafSystem):
         context = self.GetMyMutableContextFromRoot(root_context)
         context.get_mutable_numeric_parameter(self._acknowledged).set_value([float(is_acknowledged)])
 
-    def _calc_acknowledge(self, context: Context, output: BasicVector) -> None:
-        output.set_value(context.get_numeric_parameter(self._acknowledged).value())
+    def slow(self, root_context: Context, share: float) -> None:
+        """The share of the planned speed that the controller can do; only where that is obeyed."""
+        context = self.GetMyMutableContextFromRoot(root_context)
+        context.get_mutable_numeric_parameter(self._share).set_value([share])
 
     def command(self, root_context: Context) -> tuple[np.ndarray, np.ndarray]:
         """The position (6,) in rad and velocity (6,) in rad/s that the servo commands now."""

@@ -124,6 +124,11 @@ class HardwareLink:
         return self._client.velocity
 
     @property
+    def utilization(self) -> float:
+        """How much of its performance the robot needs at the newest report, 1 for all of it."""
+        return self._client.utilization
+
+    @property
     def effort(self) -> np.ndarray:
         """Torques at the newest report, (6,) in N m."""
         return self._client.effort

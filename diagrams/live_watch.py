@@ -21,6 +21,7 @@ from systems.vision.camera_rig import load_cell
 from systems.vision.people.camera_streams import CameraStreams
 from systems.vision.people.people_follower import Mind, PeopleFollower
 from systems.vision.people.shared_watch import SharedWatch
+from systems.vision.people.watch_diary import WatchDiary
 from systems.vision.people.watch_process import Lookout, WatchProcess
 
 DRAWN = "drawn"  # in place of the address of video streams
@@ -134,7 +135,8 @@ def lookout(scenario: Scenario, robot: RobotModel, shared: SharedWatch) -> Looko
         source = CameraStreams(
             overview.source, names, watched.size, overview.period, overview.delay, steady_time
         )
-        return Lookout(PeopleFollower(watched.detector, config.tracks, config.lasting), source)
+        follower = PeopleFollower(watched.detector, config.tracks, config.lasting)
+        return Lookout(follower, source, diary=WatchDiary(watched.detector.arm))
     bare = watched_cell(scenario, robot, Blind())
     pictures = FlatPictures(bare.detector.cameras, bare.size)
     watched = replace(bare, pictures=pictures)
@@ -142,7 +144,8 @@ def lookout(scenario: Scenario, robot: RobotModel, shared: SharedWatch) -> Looko
     joints = joints_along(scenario, believed, make_path(scenario.reference))[1]
     memory = watched.detector.learn(*empty_cell(scenario, watched, joints))
     drawn = DrawnImages(overview, pictures, watched.detector.arm, watched.people, shared, steady_time)
-    return Lookout(PeopleFollower(watched.detector, config.tracks, config.lasting), drawn, Mind(memory))
+    follower = PeopleFollower(watched.detector, config.tracks, config.lasting)
+    return Lookout(follower, drawn, Mind(memory), WatchDiary(watched.detector.arm))
 
 
 class Blind:

@@ -46,6 +46,8 @@ class Servo(Diagram):
                                 with ``acknowledge`` as of `SeparationMonitor`
         out ``person_sample``, ``speed_share``, ``stop``, ``separation``  as of `PeopleWatcher` and
                                   `SeparationMonitor`
+    and on a real station with `servo.guard.obey_utilization`:
+        in  ``speed_share_controller``  vector 1: the share of the planned speed that the controller can do
     and to look at:
         out ``X_WE_desired``      RigidTransform
         out ``path_time``         vector 2: the time on the path in s and its rate
@@ -60,6 +62,7 @@ class Servo(Diagram):
         has_torque: whether there is a torque to feed forward.
         guard: the system of the guard.
         tick_clock: of the law's updates, if the servo has made the law.
+        obeys_controller: whether it slows the path for a controller that cannot do it.
     """
 
     def __init__(
@@ -96,6 +99,8 @@ class Servo(Diagram):
         builder = DiagramBuilder()
         slowed_by = ["law"] if self.law.HasOutputPort("speed_share") else []
         slowed_by += ["separation"] if watch else []
+        self.obeys_controller = scenario.servo.guard.obey_utilization and scenario.station.kind != "simulated"
+        slowed_by += ["controller"] if self.obeys_controller else []
         self.reference = builder.AddNamedSystem(
             "reference", Reference(scenario.reference, self.model.period, slowed_by)
         )
@@ -119,6 +124,10 @@ class Servo(Diagram):
             ahead = builder.AddNamedSystem("feedforward", self._feedforward(scenario))
             builder.ConnectInput(joints, ahead.GetInputPort("joint_sample"))
             self._add_feedforward(builder, ahead, commands)
+        if self.obeys_controller:
+            builder.ExportInput(
+                self.reference.GetInputPort("speed_share_controller"), "speed_share_controller"
+            )
         for name, port in commands.items():
             builder.Connect(port, guard.GetInputPort(name))
         for name in ("position_command", "velocity_command", "torque_feedforward", "guard_status"):
@@ -207,6 +216,10 @@ class Servo(Diagram):
         if not self.reference.is_slowed:
             return root_context.get_time()
         return float(self.GetOutputPort("path_time").Eval(self.GetMyContextFromRoot(root_context))[0])
+
+    def path_rate(self, root_context: Context) -> float:
+        """How fast the time on the path runs, 1 as planned."""
+        return float(self.GetOutputPort("path_time").Eval(self.GetMyContextFromRoot(root_context))[1])
 
     def _connect_camera(self, builder: DiagramBuilder) -> dict[str, OutputPort]:
         """The camera to the law; what the law says of it and of its correction, or what stands for that."""

@@ -53,7 +53,8 @@ def watched_cell(scenario: Scenario, robot: RobotModel, pictures: Pictures | Non
     if pictures is None:
         figures = [person.figure for person in people]
         rest = detector.arm.at(np.deg2rad(scenario.home_deg))
-        pictures = CellPictures(cameras, size, surroundings, rest, figures, COLORS)
+        meshes = [each.mesh for each in overview.people]
+        pictures = CellPictures(cameras, size, surroundings, rest, figures, COLORS, meshes)
     return WatchedCell(detector, pictures, people, reaction_time(scenario), size)
 
 

@@ -60,6 +60,7 @@ class CellLoop:
         with_log: bool = True,
         peer: str = "",
         tell: Callable[[str], None] = lambda text: None,
+        note_joints: Callable[[float, np.ndarray], None] | None = None,
     ) -> None:
         """Builds the cell and opens its sockets.
 
@@ -73,6 +74,7 @@ class CellLoop:
             with_log: whether the truth will be asked for.
             peer: address of the only machine that is obeyed; empty for the first that sends a command.
             tell: is called with who is obeyed, in words.
+            note_joints: is told in every cycle the steady time in s and the joint positions (6,) in rad.
 
         Raises:
             ValueError: if a part refuses its configuration or the address cannot be used.
@@ -101,7 +103,7 @@ class CellLoop:
         self._target, self._signal_target, self._camera = target, signal_target, camera
         self._channel = UdpChannel(0, address, Buffering.NEWEST)
         self._stranger = UdpChannel(0, address)
-        self._peer, self._tell = peer, tell
+        self._peer, self._tell, self._note_joints = peer, tell, note_joints
         self._obeyed: Address | None = None
         self._obeyed_at = 0.0  # s of the cell's time, when the last command of it came
         self._order = itertools.count()
@@ -198,6 +200,8 @@ class CellLoop:
         """Puts the robot's message of the cell's time on its way."""
         now, joints = self.cell.time, self.cell.joints
         stamp = self.cell.stamp
+        if self._note_joints is not None:
+            self._note_joints(steady_time(), joints.position)
         report = self.controller.report(stamp, joints.position, self.cell.planned, joints.effort)
         for delivery in self._links["to client"].pass_on(now, report) if report is not None else ():
             channel = self._stranger if delivery.is_foreign else self._channel

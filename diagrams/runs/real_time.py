@@ -24,6 +24,7 @@ from diagrams.servo import Servo, calibrated, hear, law_name, learn, learnt
 from diagrams.tool_watch import ToolWatch
 from robots.description.model import NUM_JOINTS, RobotModel, load_robot
 from systems.guard.guard import KINDS
+from systems.guard.performance_share import PerformanceShare
 from systems.link.clock import steady_time
 from systems.link.protocols import PoseSource, RobotLink, RobotReport
 from systems.reference.paths import CartesianPath
@@ -67,8 +68,9 @@ class RealTimeRun:
         builder = DiagramBuilder()
         self._live = watch or live_watch(scenario, self.robot)
         self._watch: WatchProcess | None = None  # while it runs
-        self.station = builder.AddNamedSystem("station", HardwareStation(has_people=self._live is not None))
         self.servo = builder.AddNamedSystem("servo", Servo(self.robot, scenario, law, self._live))
+        station = HardwareStation(self._live is not None, self.servo.obeys_controller)
+        self.station = builder.AddNamedSystem("station", station)
         self.servo.tick_clock.stop()  # what is timed is how long an answer takes
         self._is_speed_only = self.servo.drive == "velocity"
         for name in ("position_command", "velocity_command"):
@@ -79,6 +81,9 @@ class RealTimeRun:
             *(("person_sample", "acknowledge") if self._live else ()),
         ):
             builder.Connect(self.station.GetOutputPort(name), self.servo.GetInputPort(name))
+        if self.servo.obeys_controller:
+            port = self.servo.GetInputPort("speed_share_controller")
+            builder.Connect(self.station.GetOutputPort("speed_share"), port)
         ports = ["position_command", "velocity_command", "correction", "guard_status"]
         if self.servo.reference.is_slowed:
             ports.append("path_time")
@@ -103,6 +108,7 @@ class RealTimeRun:
         self._is_acknowledged: Callable[[], bool] = never
         self._standstill = Standstill(self.servo)
         self._stops = StopEvents()
+        self._performance = PerformanceShare() if self.servo.obeys_controller else None
 
     @property
     def uses_camera(self) -> bool:
@@ -254,6 +260,9 @@ class RealTimeRun:
         is_acknowledged = self._watch is not None and self._is_acknowledged()
         if self._watch:
             self.station.acknowledge(self._context, is_acknowledged)
+        if self._performance:
+            rate = self.servo.path_rate(self._context)
+            self.station.slow(self._context, self._performance.after(wire.utilization, rate, wire.passed))
         if not len(self._reports):
             self._note_ports()  # here, where the log finds samples to begin with
         if known is None:
@@ -311,7 +320,8 @@ class RealTimeRun:
     def _prepare(self, wire: HardwareLink) -> None:
         """Does before the message comes what can be done: all of the tick, if the law needs no joints."""
         last, sample = self._joints, wire.poses.coming
-        is_free = last.running and not (self._live or self.servo.traits.awaits_joints)
+        is_asked = self._live or self._performance  # for a share of the speed, at every tick
+        is_free = last.running and not (is_asked or self.servo.traits.awaits_joints)
         if is_free and sample is not None:
             self._ahead.work_out(self._context, last, sample)
         else:

@@ -1,9 +1,10 @@
 """``truetip accept robot``: the test cycle of ISO 9283 with loads and speeds, and a table to print."""
 
+from collections.abc import Callable
 from contextlib import ExitStack
 from dataclasses import replace
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated
 
 import numpy as np
 import typer
@@ -11,6 +12,9 @@ from rich import box
 from rich.markup import escape
 from rich.table import Table
 
+from diagrams.record.log import RunLog
+from diagrams.scenario.scenario import Scenario
+from experiments.accept.on_station import guided_log
 from experiments.accept.robot_cycle import (
     Cycle,
     cube_poses,
@@ -25,22 +29,27 @@ from experiments.cli.console import print_files, progress_bar, refusing
 from experiments.cli.json_output import human_console, json_output
 from experiments.cli.option_limits import at_least, positive
 from experiments.cli.options import (
+    AnyScenarioOption,
     JsonOption,
     LawOption,
     PictureOption,
     RobotOption,
-    ScenarioOption,
     SetOption,
+    StationOption,
+    WithCellOption,
+    YesOption,
 )
-from experiments.cli.prepare import Prepared, prepare, simulated_only
+from experiments.cli.prepare import Prepared, prepare
 from experiments.cli.staging import PAGE, staged_file
 from experiments.comparison.compare import RunJob, run_job
 from experiments.report.style import law_title
+from experiments.station.guided_command import ask_before_moving, on_station
 from robots.dynamics.newton_inverse import inverse_kinematics
+from systems.link.udp_channel import ChannelError
 
 
 def accept_robot_command(
-    scenario: ScenarioOption = "misaligned",
+    scenario: AnyScenarioOption = None,
     settings: SetOption = None,
     robot: RobotOption = None,
     law: LawOption = None,
@@ -56,24 +65,34 @@ def accept_robot_command(
     band: Annotated[
         float, typer.Option(metavar="MM", help="Distance within which a pose counts as stable.")
     ] = 0.1,
+    station: StationOption = None,
+    with_cell: WithCellOption = False,
+    yes: YesOption = False,
     out: PictureOption = Path("out/accept-robot.html"),
     json_file: JsonOption = None,
 ) -> None:
-    """Run the test cycle of ISO 9283 and print its table of poses, distances, path, corners and velocity."""
+    """Run the test cycle of ISO 9283 and print its table of poses, distances, path, corners and velocity.
+
+    Errors are those of the true tip of a simulated station; on hardware they are what its camera measures.
+    """
     human = human_console(json_file)
-    with json_output(json_file) as output, refusing(ValueError, OSError), ExitStack() as stack:
+    with json_output(json_file) as output, refusing(ValueError, OSError, ChannelError), ExitStack() as stack:
         at_least("--cycles", 2, cycles)
         for name, value in (("--cube", cube), ("--dwell", dwell), ("--band", band)):
             positive(name, value)
         if dwell < 0.2:
             raise ValueError(f"--dwell must be at least 0.2 s, got {dwell:g}")
-        prepared = prepare(scenario, settings or [], robot)
-        simulated_only(prepared, "accept robot", "leave out --station")
+        name, changes = on_station(scenario, settings or [], station, with_cell)
+        prepared = prepare(name, changes, robot)
+        is_simulated = prepared.scenario.station.kind == "simulated"
         chosen = law or prepared.scenario.law
         masses = _numbers("--loads", loads, 0.0, 1000.0) or [prepared.scenario.station.payload]
         shares = _numbers("--speeds", speeds, 1.0, 100.0)
         cycle = Cycle(cube_poses(prepared.scenario, 1e-3 * cube), dwell, 1e-3 * band)
         _check_reach(prepared, cycle, cube)
+        if not is_simulated:
+            _refuse_on_station(prepared, masses)
+            ask_before_moving(human, prepared, with_cell or yes)
         page = stack.enter_context(staged_file(out, *PAGE))
         stack.enter_context(output.staged())
         rows: list[Row] = []
@@ -83,7 +102,7 @@ def accept_robot_command(
                 for share in shares:
                     done = 2.0 * len(rows)
                     rows.append(
-                        _row(prepared, chosen, cycle, cycles, mass, 0.01 * share,
+                        _row(prepared, chosen, cycle, cycles, mass, 0.01 * share, with_cell,
                              lambda x, done=done: progress((done + x) / work))
                     )  # fmt: skip
         title = f"ISO 9283, {prepared.robot.name}, {law_title(chosen)}"
@@ -103,15 +122,42 @@ def accept_robot_command(
 
 
 def _row(
-    prepared: Prepared, law: str, cycle: Cycle, cycles: int, mass: float, speed: float, progress: Any
+    prepared: Prepared,
+    law: str,
+    cycle: Cycle,
+    cycles: int,
+    mass: float,
+    speed: float,
+    with_cell: bool,
+    progress: Callable[[float], None],
 ) -> Row:
     scenario = prepared.scenario
     scenario = replace(scenario, station=replace(scenario.station, payload=mass))
     poses, square = (make(scenario, cycle, cycles, speed) for make in (pose_scenario, path_scenario))
-    visited = run_job(RunJob(poses, prepared.robot, law, scenario.seed), progress)
-    run = run_job(RunJob(square, prepared.robot, law, scenario.seed), lambda x: progress(1.0 + x))
+
+    def ran(scenario: Scenario, progress: Callable[[float], None]) -> RunLog:
+        if scenario.station.kind == "simulated":
+            return run_job(RunJob(scenario, prepared.robot, law, scenario.seed), progress)
+        return guided_log(scenario, prepared.robot, law, with_cell, progress)
+
+    visited = ran(poses, progress)
+    run = ran(square, lambda x: progress(1.0 + x))
     found, along = visits(visited, poses, cycle, cycles), path_results(run, square, cycle)
     return Row(mass, 100.0 * speed, pose_results(found, cycle) | along.results, found, along)
+
+
+def _refuse_on_station(prepared: Prepared, masses: list[float]) -> None:
+    """Refuses what a station of hardware cannot do. Raises ValueError."""
+    station = prepared.scenario.station
+    if masses != [station.payload]:
+        raise ValueError("--loads is of a simulated station: set station.payload, and run it for each load")
+    if not station.link.has_camera:
+        raise ValueError("accept robot needs a camera: station.link.has_camera is false")
+    if station.overview.enabled:
+        raise ValueError(
+            "accept robot needs the planned speed: add --set station.overview.enabled=false, and see that "
+            "nobody is near"
+        )
 
 
 def _check_reach(prepared: Prepared, cycle: Cycle, cube: float) -> None:

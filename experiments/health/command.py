@@ -1,5 +1,6 @@
 """``truetip health``: a daily check that names what has changed: a camera, a joint or the tool."""
 
+import time
 from contextlib import ExitStack
 from pathlib import Path
 from typing import Annotated, Any
@@ -12,21 +13,41 @@ from rich.markup import escape
 from experiments.cli.console import count, print_files, progress_bar, refusing
 from experiments.cli.json_output import human_console, json_output
 from experiments.cli.option_limits import at_least
-from experiments.cli.options import JsonOption, PictureOption, RobotOption, ScenarioOption, SetOption
-from experiments.cli.prepare import prepare, simulated_only
+from experiments.cli.options import (
+    JsonOption,
+    PictureOption,
+    RobotOption,
+    SetOption,
+    StationOption,
+    WithCellOption,
+    YesOption,
+)
+from experiments.cli.prepare import Prepared, prepare
 from experiments.cli.staging import PAGE, staged_file
 from experiments.health.history import History, read_history, write_history
+from experiments.health.station import check_on_station
 from experiments.health.study import DAY, NOISE, HealthStudy, Injected, deviations
 from experiments.report.plot_page import Section, html_table, write_plot_page
+from experiments.station.guided_command import ask_before_moving, on_station
 from robots.description.model import RobotModel
 from robots.metrology.daily_check import TOOL, sizes_alone
+from systems.link.makers import LINK_NAMES
+from systems.link.udp_channel import ChannelError
 
 _HISTORY = (".parquet",)
 _AID = "An aid, not a safety function."
 
 
 def health_command(
-    scenario: ScenarioOption = "nominal",
+    scenario: Annotated[
+        str | None,
+        typer.Option(
+            "--scenario",
+            metavar="NAME|FILE",
+            help="A shipped scenario or a YAML file.",
+            show_default="nominal; on a station cell",
+        ),
+    ] = None,
     settings: SetOption = None,
     robot: RobotOption = None,
     history: Annotated[
@@ -51,17 +72,30 @@ def health_command(
         ),
     ] = None,
     cell: Annotated[str, typer.Option(metavar="NAME|FILE", help="The cameras.")] = "probst",
+    station: StationOption = None,
+    with_cell: WithCellOption = False,
+    yes: YesOption = False,
     out: PictureOption = Path("out/health.html"),
     json_file: JsonOption = None,
 ) -> None:
-    """Check cameras, joints and tool of a station, and name what has changed since the first check."""
+    """Check cameras, joints and tool of a station, and name what has changed since the first check.
+
+    On a station of hardware the robot is guided to the six poses, and its joints and tool are checked.
+    """
     human = human_console(json_file)
-    with json_output(json_file) as output, refusing(ValueError, OSError), ExitStack() as stack:
+    with json_output(json_file) as output, refusing(ValueError, OSError, ChannelError), ExitStack() as stack:
         at_least("--checks", 1, checks)
-        prepared = prepare(scenario, settings or [], robot, needs_path=False)
-        simulated_only(prepared, "health", "leave out --station")
+        is_guided = with_cell or station in LINK_NAMES
+        name, changes = on_station(
+            scenario or ("cell" if is_guided else "nominal"), settings or [], station, with_cell
+        )
+        prepared = prepare(name, changes, robot, needs_path=False)
+        is_simulated = prepared.scenario.station.kind == "simulated"
+        if not is_simulated:
+            _refuse_on_station(prepared, checks, change)
         study = HealthStudy(prepared.scenario, prepared.robot, cell)
         before = read_history(history) if history.exists() else study.begun()
+        study.refuse(before, is_simulated)
         injected = Injected.parse(change, study.names) if change else None
         if change_at is not None and injected is None:
             raise ValueError("--change-at needs --change")
@@ -70,8 +104,14 @@ def health_command(
         page = stack.enter_context(staged_file(out, *PAGE))
         table = stack.enter_context(staged_file(history, *_HISTORY))
         stack.enter_context(output.staged())
+        if not is_simulated:
+            ask_before_moving(human, prepared, with_cell or yes)
         with progress_bar(count(checks, "check")) as progress:
-            after = study.continued(before, checks, injected, first, progress)
+            if is_simulated:
+                after = study.continued(before, checks, injected, first, progress)
+            else:
+                X_WE = check_on_station(prepared, study.q, with_cell, progress)
+                after = study.measured(before, X_WE, time.time())
         alarms = study.alarms(after)
         write_history(table, after)
         verdict = _verdict(after, alarms)
@@ -79,6 +119,22 @@ def health_command(
         output.write({"alarms": alarms, "history": str(history), "checks": len(after.time)})
     human.print(escape(verdict))
     print_files(human, out, history)
+
+
+def _refuse_on_station(prepared: Prepared, checks: int, change: str | None) -> None:
+    """Refuses what a station of hardware cannot do. Raises ValueError."""
+    station = prepared.scenario.station
+    if change is not None:
+        raise ValueError("--change changes a simulated station; leave it out")
+    if checks != 1:
+        raise ValueError(f"--checks is of a simulated station, this one is checked once, got {checks}")
+    if not station.link.has_camera:
+        raise ValueError("health needs a camera: station.link.has_camera is false")
+    if station.overview.enabled:
+        raise ValueError(
+            "health does not watch for people: add --set station.overview.enabled=false, and see that nobody "
+            "is near"
+        )
 
 
 def _verdict(history: History, alarms: list[dict[str, Any]]) -> str:
@@ -111,7 +167,7 @@ def _shown(size: float, kind: str) -> tuple[float, str]:
 def _write_page(
     path: Path, title: str, verdict: str, history: History, robot: RobotModel, alarms: list[dict[str, Any]]
 ) -> None:
-    day = history.time / DAY
+    day = (history.time - history.time[0]) / DAY
     sizes = sizes_alone(robot, history.q, deviations(history), NOISE)
     joints, tool, cameras = go.Figure(), go.Figure(), go.Figure()
     for name, values in sizes.items():
@@ -131,8 +187,10 @@ def _write_page(
             "Zeros of the joints", "How large each change would be if it were the only one.", joints, 380
         ),
         Section("Tool", "Likewise its shift from the first check.", tool, 300),
-        Section("Cameras", "By how much they have turned since they were calibrated.", cameras, 380),
     ]
+    if np.isfinite(history.rotations).any():
+        turned = "By how much they have turned since they were calibrated."
+        sections.append(Section("Cameras", turned, cameras, 380))
     if rows:
         sections.insert(0, Section("Alarms", "", html_table(("kind", "what"), rows)))
     write_plot_page(path, title, verdict, sections)

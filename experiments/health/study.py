@@ -32,6 +32,7 @@ from systems.vision.reference_markers import SHIPPED, ReferenceMarkers
 
 DAY = 86400.0  # s
 NOISE = CheckNoise(position=30e-6, rotation=np.deg2rad(0.005))  # of a pose at rest; assumed
+_CLOCK = 1e9  # s: later times are those of a clock and not of a simulation
 _MISFIT = 8.0  # standard deviations, from which residuals of the body are no noise
 _SUGGESTIONS = {
     "camera": "recalibrate the camera",
@@ -125,13 +126,7 @@ class HealthStudy:
         Raises:
             ValueError: if the history is that of another robot, cell or set of poses.
         """
-        if (history.robot, history.cameras) != (self._robot.name, self.names):
-            raise ValueError(
-                f"the history is of {history.robot} with {len(history.cameras)} cameras, not of "
-                f"{self._robot.name} with {len(self.names)}"
-            )
-        if not np.allclose(history.q, self._q, atol=1e-6):
-            raise ValueError("the history has other poses than this robot would be checked in")
+        self.refuse(history, is_simulated=True)
         for k in range(checks):
             number = len(history.time) + 1
             has_changed = injected is not None and number >= change_at
@@ -147,6 +142,48 @@ class HealthStudy:
             history = history.appended(time, check.X_WE, check.rotations.mean(axis=0), alarms)
         return history
 
+    @property
+    def q(self) -> np.ndarray:
+        """The configurations of a check in rad, (6, 6)."""
+        return self._q
+
+    def refuse(self, history: History, is_simulated: bool) -> None:
+        """Refuses a history that cannot be continued.
+
+        Args:
+            history: so far.
+            is_simulated: whether the next check is.
+
+        Raises:
+            ValueError: if it is that of another robot, cell or set of poses, or of a station of another kind.
+        """
+        if (history.robot, history.cameras) != (self._robot.name, self.names):
+            raise ValueError(
+                f"the history is of {history.robot} with {len(history.cameras)} cameras, not of "
+                f"{self._robot.name} with {len(self.names)}"
+            )
+        if not np.allclose(history.q, self._q, atol=1e-6):
+            raise ValueError("the history has other poses than this robot would be checked in")
+        if len(history.time) and (history.time[0] < _CLOCK) != is_simulated:
+            raise ValueError(
+                "a history of simulated checks cannot be continued on a station, nor the other way round: "
+                "name another file with --history"
+            )
+
+    def measured(self, history: History, X_WE: np.ndarray, time: float) -> History:
+        """The history after a check on a station, which says nothing of single cameras.
+
+        Args:
+            history: so far.
+            X_WE: of the poses, (6, 4, 4).
+            time: of the clock in s.
+
+        Raises:
+            ValueError: if it cannot be continued so.
+        """
+        self.refuse(history, is_simulated=False)
+        return history.appended(time, X_WE, np.full((len(self.names), 3), np.nan), [])
+
     def alarms(self, history: History) -> list[dict[str, Any]]:
         """What has changed: cameras by their first alarm, and the cause of deviations of the poses."""
         found: dict[str, dict[str, Any]] = {}
@@ -156,7 +193,7 @@ class HealthStudy:
         drift = find_drift(self._robot, history.q, deviations(history), NOISE)
         if drift is not None:
             kind = TOOL if drift.what == TOOL else "joint zero"
-            onset = float(history.time[drift.onset])
+            onset = float(history.time[drift.onset] - history.time[0])
             found[drift.what] = _alarm(kind, drift.what, onset, drift.size, drift.sigma)
         return list(found.values())
 

@@ -15,6 +15,7 @@ import typer
 from rich.console import Console
 
 from diagrams.runs.cell_loop import CellLoop, CellStatistics
+from diagrams.runs.shown_cell import ShownCell
 from experiments.cli.console import count, refusing
 from experiments.cli.options import RobotOption, ScenarioOption, SetOption, json_option
 from experiments.cli.prepare import prepare
@@ -53,6 +54,14 @@ def cell_command(
     address: Annotated[
         str, typer.Option(metavar="ADDRESS", help="Of this machine, to hear commands on.")
     ] = "127.0.0.1",
+    images: Annotated[
+        int | None,
+        typer.Option(
+            "--images",
+            metavar="PORT",
+            help="Show what the cameras of station.overview see, http://127.0.0.1:PORT/CAMERA for each.",
+        ),
+    ] = None,
     announce: Annotated[
         bool, typer.Option("--announce", help="Print the ports as one line of JSON first, for scripts.")
     ] = False,
@@ -74,6 +83,12 @@ def cell_command(
             for name, suffix in ((truth, ".npz"), (json_file, ".json"))
         ]
         link = prepared.scenario.station.link
+        shown = None
+        if images is not None:
+            if not prepared.scenario.station.overview.enabled:
+                raise ValueError("--images needs cameras of the whole cell: --scenario cell-watched")
+            shown = ShownCell(prepared.scenario, prepared.nominal_robot, images)
+            stack.callback(shown.close)
         camera = stack.enter_context(link.camera.virtual_server(prepared.scenario.station.camera.period))
         loop = CellLoop(
             prepared.scenario,
@@ -85,16 +100,22 @@ def cell_command(
             with_log=truth is not None,
             peer=peer,
             tell=human.print,
+            note_joints=shown.note_joints if shown else None,
         )
         stack.callback(loop.close)
         stop = _Stop(duration, until_eof)
         if announce:
-            sys.stdout.write(json.dumps({"camera_port": camera.port}) + "\n")
+            ports = {"camera_port": camera.port} | ({"image_port": shown.port} if shown else {})
+            sys.stdout.write(json.dumps(ports) + "\n")
             sys.stdout.flush()
         human.print(
             f"{prepared.nominal_robot.name}: speaks {link.title} to UDP {link.address}:{link.port} every "
             f"{1e3 * prepared.scenario.station.period:g} ms; its camera listens on {camera.place}"
         )
+        if shown:
+            human.print(
+                f"what its cameras see is at http://127.0.0.1:{shown.port}/{{camera}}", highlight=False
+            )
         if duration is None and not announce:
             human.print("Ctrl-C ends it")
         statistics = loop.run(stop.is_reached)

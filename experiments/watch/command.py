@@ -8,21 +8,36 @@ from typing import Annotated
 import typer
 from rich.markup import escape
 
-from experiments.cli.console import print_files, progress_bar, refusing
+from diagrams.scenario.scenario import load_scenario
+from diagrams.scenario.scenario_file import OptionSetting
+from experiments.cli.console import BROKEN_OFF, fail, print_files, progress_bar, refusing
 from experiments.cli.json_output import human_console, json_output
 from experiments.cli.option_limits import at_least, positive
-from experiments.cli.options import JsonOption, PictureOption, RobotOption, ScenarioOption, SetOption
-from experiments.cli.prepare import prepare, simulated_only
+from experiments.cli.options import JsonOption, PictureOption, RobotOption, SetOption, WithCellOption
+from experiments.cli.prepare import prepare
 from experiments.cli.staging import PAGE, staged_file
+from experiments.station.guided_command import on_station
+from experiments.watch.data_rates import data_rates
+from experiments.watch.live_command import watch_station
 from experiments.watch.page import AID, run_verdict, study_verdict, write_run_page, write_study_page
 from experiments.watch.run import seen_by_network, watch_recorded, watch_simulated
 from experiments.watch.study import study_watch
+from systems.link.makers import LINK_NAMES
+from systems.link.udp_channel import ChannelError
 from systems.vision.people.person_networks import PersonNetwork
 from systems.vision.people.surroundings import load_surroundings
 
 
 def watch_command(
-    scenario: ScenarioOption = "watched",
+    scenario: Annotated[
+        str | None,
+        typer.Option(
+            "--scenario",
+            metavar="NAME|FILE",
+            help="A shipped scenario or a YAML file.",
+            show_default="watched; on a station cell-watched",
+        ),
+    ] = None,
     settings: SetOption = None,
     robot: RobotOption = None,
     images: Annotated[
@@ -54,19 +69,33 @@ def watch_command(
             ".cfg of a tiny YOLO v3 with .weights beside it.",
         ),
     ] = None,
+    station: Annotated[
+        str | None,
+        typer.Option(
+            "--station",
+            metavar="NAME",
+            help="A running cell: egm or rsi, whose controller says where its robot is.",
+        ),
+    ] = None,
+    with_cell: WithCellOption = False,
+    duration: Annotated[
+        float | None, typer.Option(metavar="S", help="Of a running cell; by default until Ctrl-C.")
+    ] = None,
     out: PictureOption = Path("out/watch.html"),
     json_file: JsonOption = None,
 ) -> None:
-    """Watch for people and slow the robot for them; an aid, not a safety function.
+    """Watch for people, simulated, recorded or in a running cell; an aid, not a safety function.
 
-    In a simulation or on recorded images. A running cell is watched by the run that guides its robot: truetip
-    run --scenario cell-watched --station egm, or --with-cell to try it.
+    In a simulation the robot is slowed and stopped for them. In a running cell, whose robot somebody else
+    moves, it is said what would be allowed; the run that guides a robot watches for itself: truetip run
+    --scenario cell-watched --station egm.
     """
     human = human_console(json_file)
-    with json_output(json_file) as output, refusing(ValueError, OSError), ExitStack() as stack:
+    with json_output(json_file) as output, refusing(ValueError, OSError, ChannelError), ExitStack() as stack:
         at_least("--places", 1, places)
         at_least("--empty", 1, empty)
         positive("--every", every)
+        positive("--duration", duration)
         if minutes < 0.0:
             raise ValueError(f"--minutes must not be negative, got {minutes:g}")
         if study and images:
@@ -74,12 +103,17 @@ def watch_command(
         if study and network:
             raise ValueError("--study is of the hull alone; leave out --network")
         people = PersonNetwork(network) if network else None
-        prepared = prepare(scenario, settings or [], robot)
-        simulated_only(prepared, "watch", "give recorded images with --images")
+        if (station or with_cell) and (study or images):
+            raise ValueError("--station and --with-cell watch a running cell; leave out --study and --images")
+        prepared = prepare(*_on_station(scenario, settings or [], station, with_cell), robot)
+        is_live = prepared.scenario.station.kind != "simulated" and not (study or images)
+        if duration is not None and not is_live:
+            raise ValueError("--duration is of a running cell: add --station egm, or --with-cell")
         chosen, ground = prepared.scenario, load_surroundings(prepared.scenario.station.overview.surroundings)
         page = stack.enter_context(staged_file(out, *PAGE))
         stack.enter_context(output.staged())
         title = f"Watch, {prepared.title}"
+        problem = ""
         if study:
             with progress_bar(f"{places} places, {minutes:g} minutes of the empty cell") as progress:
                 found = study_watch(chosen, prepared.robot, places, minutes, every, progress)
@@ -87,17 +121,42 @@ def watch_command(
             write_study_page(page, title, found)
             output.write(found.as_dict())
         else:
-            with progress_bar("recorded images" if images else "images are drawn and searched") as progress:
-                run = (
-                    watch_recorded(chosen, prepared.robot, images, empty, progress)
-                    if images
-                    else watch_simulated(chosen, prepared.robot, chosen.law, progress)
-                )
+            if is_live:
+                run, problem = watch_station(human, prepared, with_cell, empty, duration)
+            else:
+                with progress_bar(
+                    "recorded images" if images else "images are drawn and searched"
+                ) as progress:
+                    run = (
+                        watch_recorded(chosen, prepared.robot, images, empty, progress)
+                        if images
+                        else watch_simulated(chosen, prepared.robot, chosen.law, progress)
+                    )
             if people is not None and run.snapshot is not None:
                 run = replace(run, boxes=seen_by_network(people, run))
             verdict = run_verdict(run)
-            write_run_page(page, title, run, run.cell.detector.cameras, ground)
-            output.write(run.as_dict())
+            rates = data_rates(chosen)
+            write_run_page(page, title, run, run.cell.detector.cameras, ground, rates)
+            output.write({**run.as_dict(), "data_rates_gbit_s": rates})
     human.print(escape(verdict))
     human.print(f"[yellow]{AID}[/yellow]")
     print_files(human, out)
+    if problem:
+        fail(problem, BROKEN_OFF)
+
+
+def _on_station(
+    scenario: str | None, settings: list[str], station: str | None, with_cell: bool
+) -> tuple[str, list[str]]:
+    """The scenario and its settings; the controller of a virtual cell moves its robot itself.
+
+    Raises:
+        ValueError: if a virtual cell is wanted for a simulated station, or the scenario is refused.
+    """
+    is_live = with_cell or station in LINK_NAMES
+    name, changes = on_station(
+        scenario or ("cell-watched" if is_live else "watched"), settings, station, with_cell
+    )
+    if with_cell and load_scenario(name, changes).station.link.kind == "egm":
+        changes = [*changes, OptionSetting("station.link.run.streams", "true", "--with-cell")]
+    return name, changes

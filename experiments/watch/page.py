@@ -17,13 +17,19 @@ from systems.vision.people.visual_hull import Body
 
 AID = "An aid, not a safety function: it must not replace fences, light curtains or a rated controller."
 _SHOWN = 4  # cameras
+_MOST_SHOWN = 6000  # times of a timeline: two minutes of a running cell with every decision
 _STOP, _SLOW, _THINGS = "#d55e00", "#8a6d00", "#8a95a5"
 _AT_THE_ROBOT = 0.01  # m: what is nearer is not told apart
 _HULL, _BOX, _NETWORK = (60, 60, 230), (0, 200, 255), (80, 220, 80)  # blue, green, red
 
 
 def write_run_page(
-    path: str | Path, title: str, run: WatchRun, cameras: Cameras, ground: Surroundings
+    path: str | Path,
+    title: str,
+    run: WatchRun,
+    cameras: Cameras,
+    ground: Surroundings,
+    rates: dict[str, float],
 ) -> None:
     """Writes the page of a run.
 
@@ -33,12 +39,13 @@ def write_run_page(
         run: what happened.
         cameras: of the pictures.
         ground: what stands in the cell.
+        rates: of data in Gbit/s, of `data_rates`.
     """
     sections = [
         Section(
             "Distance and speed",
-            "Distances are held from image to image; the speed is that of the path. The robot slows down "
-            "where the measured distance is below the protective one.",
+            "Distances are held from image to image; the speed is that of the path, or in a running cell the "
+            "one allowed. The robot slows down where the measured distance is below the protective one.",
             _timeline(run),
             520,
         ),
@@ -49,6 +56,14 @@ def write_run_page(
             620,
         ),
         Section("Protective distance", "Terms of ISO/TS 15066 at full speed.", _terms(run)),
+        Section(
+            "Data rates",
+            "Of all cameras together without compression, and what a fibre link carries (Probst 2024, 8.1).",
+            html_table(
+                ("images", "rate"),
+                [[name.replace("_", " "), f"{value:g} Gbit/s"] for name, value in rates.items()],
+            ),
+        ),
     ]
     if run.snapshot is not None:
         note = f"At {run.snapshot.time:.2f} s: dots are the middles of the cubes of the hull."
@@ -152,7 +167,7 @@ def study_verdict(study: WatchStudy) -> str:
 
 
 def _timeline(run: WatchRun) -> go.Figure:
-    line = run.timeline
+    line = run.timeline.thinned(_MOST_SHOWN)
     figure = go.Figure()
     for name, values in (
         ("distance, measured", line.distance),
@@ -210,7 +225,7 @@ def _plan(run: WatchRun, ground: Surroundings) -> go.Figure:
             go.Scatter(x=radius * np.cos(angle), y=radius * np.sin(angle), mode="lines", name=name,
                        line={"dash": "dash", "color": colour})
         )  # fmt: skip
-    line = run.timeline
+    line = run.timeline.thinned(_MOST_SHOWN)
     figure.add_trace(
         go.Scatter(x=line.place[:, 0], y=line.place[:, 1], mode="markers", name="person",
                    marker={"color": line.rate, "colorscale": "RdYlGn", "cmin": 0, "cmax": 1, "size": 6,

@@ -7,9 +7,11 @@ from typing import Any
 
 import numpy as np
 
+from diagrams.live_watch import Blind
 from diagrams.runs.simulation import Experiment
 from diagrams.scenario.scenario import Scenario
 from diagrams.watching import WatchedCell, fastest, watched_cell
+from experiments.cli.console import count
 from experiments.watch.recording import Recording
 from robots.description.model import NUM_JOINTS, RobotModel
 from systems.cell.overview.overview_camera import recorded
@@ -17,15 +19,12 @@ from systems.cell.overview.person import gap
 from systems.guard.separation.protective_distance import ReactionTime, protective_distance
 from systems.guard.separation.separation_monitor import STATUS
 from systems.reference.paths import make_path
+from systems.samples import ImageSample
 from systems.vision.camera_rig import load_cell
-from systems.vision.people.lasting_changes import (
-    LastingChange,
-    Standing,
-    lasting_changes,
-    standing_still,
-)
+from systems.vision.people.lasting_changes import LastingChange
+from systems.vision.people.people_follower import Mind, PeopleFollower
 from systems.vision.people.person_networks import PersonNetwork
-from systems.vision.people.visual_hull import Body
+from systems.vision.people.watch_diary import Seen, Snapshot, WatchDiary
 
 _EVERY = 0.02  # s, between two times of a timeline
 _NOBODY = 100.0  # m, a distance beyond it is that of nobody
@@ -45,15 +44,12 @@ class Timeline:
     stopped: np.ndarray  # bool
     place: np.ndarray  # x, y of the nearest person in m, (n, 2)
 
-
-@dataclass(frozen=True)
-class Snapshot:
-    """The images in which somebody was nearest."""
-
-    time: float  # s
-    images: np.ndarray  # (n, h, w, 3) of uint8
-    bodies: list[Body]
-    q: np.ndarray  # joints in them in rad, (6,)
+    def thinned(self, most: int) -> "Timeline":
+        """Every so many times that at most so many are left, and all at which stops begin or end."""
+        step = -(-len(self.time) // most)
+        changes = np.flatnonzero(np.diff(self.stopped.astype(int)))
+        kept = np.unique(np.concatenate([np.arange(0, len(self.time), step), changes, changes + 1]))
+        return Timeline(*(getattr(self, each.name)[kept] for each in fields(self)))
 
 
 @dataclass(frozen=True)
@@ -79,7 +75,7 @@ class WatchRun:
         line = self.timeline
         known = np.isfinite(line.distance) & np.isfinite(line.true)
         error = (line.distance - line.true)[known]
-        step = float(np.median(np.diff(line.time)))
+        step = float(np.median(np.diff(line.time))) if len(line.time) > 1 else 0.0
         return {
             "duration_s": round(float(line.time[-1]), 3),
             "smallest_distance_m": _number(line.distance),
@@ -170,7 +166,7 @@ def watch_simulated(scenario: Scenario, robot: RobotModel, law: str, progress: P
     snapshot = _snapshot(scenario, watch.cell, line, joints)
     context = watch.watcher.GetMyContextFromRoot(experiment.simulator.get_context())
     changes = watch.watcher.changes(context)
-    return WatchRun(line, watch.cell, snapshot, _terms(scenario, watch.cell), [], changes)
+    return WatchRun(line, watch.cell, snapshot, terms_at_full_speed(scenario, watch.cell), [], changes)
 
 
 def watch_recorded(
@@ -188,7 +184,7 @@ def watch_recorded(
     Raises:
         ValueError: if the recording cannot be read or is too short.
     """
-    cell = watched_cell(scenario, robot)
+    cell = watched_cell(scenario, robot, Blind())
     names = [camera.name for camera in load_cell(scenario.station.overview.cell).cameras]
     recording = Recording(folder, names, cell.size)
     if not 0 < empty < len(recording):
@@ -197,50 +193,41 @@ def watch_recorded(
         )
     sets, detector = recording.sets(), cell.detector
     memory = detector.learn([next(sets) for _ in range(empty)], list(recording.joints[:empty]))
-    terms = _terms(scenario, cell)
-    reach = 0.5 * np.sqrt(3.0) * scenario.servo.people.hull.edge
-    distances, places, trusted, best = [], [], [], None
-    standing: tuple[Standing, ...] = ()
-    changes: tuple[LastingChange, ...] = ()
-    config = scenario.servo.people
+    people = scenario.servo.people
+    follower, diary = PeopleFollower(detector, people.tracks, people.lasting), WatchDiary(detector.arm)
+    mind = Mind(memory)
     for number, images in enumerate(sets, empty):
-        q = recording.joints[number]
-        found, memory = detector.detect(memory, images, q)
-        time = float(recording.times[number])
-        standing = standing_still(standing, time, found.bodies, config.hull.edge)
-        changes = lasting_changes(changes, standing, time, images, config.lasting, config.hull.edge)
-        arm = detector.arm.at(q)
-        gaps = [float(arm.distances(body.points).min()) - reach for body in found.bodies]
-        distances.append(min(gaps, default=np.nan))
-        places.append(
-            found.bodies[int(np.argmin(gaps))].points.mean(axis=0)[:2] if gaps else (np.nan, np.nan)
-        )
-        trusted.append(found.trusted)
-        if gaps and (best is None or min(gaps) <= np.nanmin(distances)):
-            best = Snapshot(float(recording.times[number]), images, found.bodies, q)
+        sample, q = ImageSample(float(recording.times[number]), images), recording.joints[number]
+        mind = follower.after(mind, sample, q)
+        diary.note(mind, sample, q)
         progress((number + 1 - empty) / (len(recording) - empty))
-    distance, needed = np.array(distances), terms["total"]
-    nothing = np.full(len(distance), np.nan)
-    stopped = (np.nan_to_num(distance, nan=np.inf) < needed) | ~np.array(trusted)
+    seen, terms = diary.seen(), terms_at_full_speed(scenario, cell)
+    stopped = (np.nan_to_num(seen.distance, nan=np.inf) < terms["total"]) | ~seen.trusted
     line = Timeline(
-        recording.times[empty:],
-        distance,
-        nothing,
-        np.full(len(distance), needed),
+        seen.time,
+        seen.distance,
+        np.full(len(seen.time), np.nan),
+        np.full(len(seen.time), terms["total"]),
         np.where(stopped, 0.0, 1.0),
         stopped,
-        np.array(places),
+        seen.place,
     )
     notes = [f"camera {name} ended after {number} sets" for name, number in recording.ended.items()]
-    notes += [f"{np.count_nonzero(~np.array(trusted))} sets are not trusted"] if not all(trusted) else []
-    return WatchRun(line, cell, best, terms, notes, changes)
+    notes += untrusted_note(seen)
+    return WatchRun(line, cell, seen.nearest, terms, notes, seen.changes)
+
+
+def untrusted_note(seen: Seen) -> list[str]:
+    """How many sets of images were not trusted, in words; nothing if all were."""
+    number = int(np.count_nonzero(~seen.trusted))
+    return [f"{count(number, 'set')} {'is' if number == 1 else 'are'} not trusted"] if number else []
 
 
 def _number(values: np.ndarray) -> float | None:
     return round(float(np.nanmin(values)), 4) if np.isfinite(values).any() else None
 
 
-def _terms(scenario: Scenario, cell: WatchedCell) -> dict[str, float]:
+def terms_at_full_speed(scenario: Scenario, cell: WatchedCell) -> dict[str, float]:
     """The terms of the protective distance with the path at full speed in m."""
     config, speed = scenario.servo.separation, fastest(make_path(scenario.reference))
     found = protective_distance(config, cell.reaction, speed, scenario.reference.slowing, config.human_speed)

@@ -29,6 +29,9 @@ class GuardConfig:
     resume: bool = False
     resume_time: float = quantity(1.0, 1e-3, 60.0, "s")  # at least, from rest back to the law's command
     speed_share: float = quantity(1.0, 0.0, 1.0, is_open=True)  # of the robot's largest joint speeds
+    # On a real station: whether the path is slowed where the controller reports that it would need more than
+    # all of its performance (utilisation rate of EGM)
+    obey_utilization: bool = False
     # What becomes of a law that corrects by more than its limit
     on_correction_limit: str = choice("limit", ("limit", "stop"))
     # From the path: a sample further away is taken for a false detection

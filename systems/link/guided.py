@@ -30,6 +30,11 @@ class GuidedRobot(Generic[Report]):
         return self._client.session.epoch
 
     @property
+    def utilization(self) -> float:
+        """How much of its performance the robot needs; 0 where it does not say so."""
+        return 0.0
+
+    @property
     def heard(self) -> float:
         """Steady time at which anything last came from the controller, in s."""
         return self._client.session.heard

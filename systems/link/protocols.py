@@ -73,6 +73,11 @@ class RobotLink(Protocol):
         ...
 
     @property
+    def utilization(self) -> float:
+        """How much of its performance the robot needs, 1 for all of it; 0 if that is not reported."""
+        ...
+
+    @property
     def heard(self) -> float:
         """Steady time at which anything last came from the controller, also what was refused, in s."""
         ...

@@ -7,6 +7,7 @@ pendulums, once in two steps; knees bend while a leg comes forward. Where the wa
 from dataclasses import dataclass, field
 
 import numpy as np
+from pydrake.math import RigidTransform, RotationMatrix
 
 from robots.configuration.quantity import quantity, vector
 from robots.kinematics.arm_capsules import Capsules
@@ -17,6 +18,7 @@ _ALONG = np.linspace(0.0, 1.0, 50)[:, None]  # the axis of a limb
 _STRIDE = 1.4  # m, two steps
 _SWING, _KNEE, _ELBOW = 0.42, 0.7, 0.35  # rad, largest angles of hip and shoulder, knee and elbow
 _HIP, _KNEE_LENGTH, _SHANK = 0.92, 0.43, 0.42  # m, height and lengths
+_TRUNK, _SHOULDERS = 1, 2  # of the capsules
 _NECK, _ARM, _FOREARM = np.array([0.0, 0.0, 1.39]), 0.29, 0.33
 
 
@@ -36,6 +38,9 @@ class PersonConfig:
     speed: float = quantity(1.2, 0.0, 5.0, "m/s", is_open=True)  # of walking from point to point
     start: float = quantity(0.0, 0.0, unit="s")  # when it enters the cell at the first point
     facing_deg: float = quantity(0.0, unit="deg")  # where it looks at a single point
+    # A file (.obj, .gltf, .glb; m, z upwards, looking along x, feet about the origin) that is drawn in its
+    # place; the figure's distance still counts, and a virtual cell in real time draws the figure
+    mesh: str = ""
 
 
 class WalkingPerson:
@@ -75,6 +80,13 @@ class WalkingPerson:
         is_walking = 0.0 < walked < self._legs[leg]
         yaw = float(np.arctan2(ahead[1], ahead[0]))
         return figure(self._points[leg] + walked * ahead, yaw, self._floor, phase, float(is_walking))
+
+
+def standing(person: Capsules, floor: float) -> RigidTransform:
+    """The frame of a figure: on the floor below its trunk, x where it looks."""
+    across = person.end[_SHOULDERS] - person.start[_SHOULDERS]
+    yaw = float(np.arctan2(-across[0], across[1]))
+    return RigidTransform(RotationMatrix.MakeZRotation(yaw), [*person.start[_TRUNK, :2], floor])
 
 
 def figure(place: np.ndarray, yaw: float, floor: float, phase: float = 0.0, swing: float = 0.0) -> Capsules:

@@ -1,6 +1,7 @@
 """Pictures of a simulated cell with Drake's VTK renderer: still things, the robot and people."""
 
 from collections.abc import Sequence
+from pathlib import Path
 
 import cv2
 import numpy as np
@@ -16,6 +17,8 @@ from pydrake.geometry import (
     GeometryInstance,
     LightParameter,
     MakeRenderEngineVtk,
+    Mesh,
+    MeshSource,
     PerceptionProperties,
     RenderCameraCore,
     RenderEngineVtkParams,
@@ -28,6 +31,7 @@ from pydrake.math import RigidTransform, RotationMatrix
 from pydrake.systems.sensors import CameraInfo
 
 from robots.kinematics.arm_capsules import Capsules
+from systems.cell.overview.person import standing
 from systems.vision.camera_model import Cameras
 from systems.vision.people.surroundings import Surroundings
 
@@ -43,6 +47,7 @@ _LAMPS = (
 _AWAY = RigidTransform([0.0, 0.0, -100.0])  # where nobody is seen
 _ENGINE, _FLOOR_EDGE, _FLOOR_DEPTH = "cell", 14.0, 0.02  # m
 _CLIPPING = ClippingRange(0.1, 40.0)  # m
+_MESHES, _TRUNK = (".obj", ".gltf", ".glb"), 1  # whose clothes a mesh without colours of its own has
 _SHORTEST = 1e-4  # m, of a capsule
 
 
@@ -57,6 +62,7 @@ class CellPictures:
         robot: Capsules,
         people: Sequence[Capsules] = (),
         colors: Sequence[tuple[float, float, float]] = (),
+        meshes: Sequence[str] = (),
     ) -> None:
         """Builds the scene.
 
@@ -67,7 +73,12 @@ class CellPictures:
             robot: its capsules at any joint positions; their lengths and radii stay.
             people: the figure of each, likewise.
             colors: of the capsules of a figure, red, green and blue.
+            meshes: files that are drawn in place of the figures, empty for a figure; none for figures alone.
+
+        Raises:
+            ValueError: if there is no such file.
         """
+        self._floor = surroundings.floor
         self._scene = SceneGraph()
         lamps = [
             LightParameter(type="directional", frame="world", direction=list(way), intensity=intensity)
@@ -82,7 +93,11 @@ class CellPictures:
             name = f"furniture {number}"
             self._still(name, Box(each.size), each.placement.pose(), tuple(each.color))
         self._robot = self._moving("robot", robot, [_ROBOT] * len(robot.radius))
-        self._people = [self._moving(f"person {k}", each, colors) for k, each in enumerate(people)]
+        self._meshes = list(meshes) or [""] * len(people)
+        self._people = [
+            self._mesh(f"person {k}", mesh, colors) if mesh else self._moving(f"person {k}", each, colors)
+            for k, (each, mesh) in enumerate(zip(people, self._meshes, strict=True))
+        ]
         self._context = self._scene.CreateDefaultContext()
         self._lenses = [_Lens(cameras.subset([i]), size) for i in range(len(cameras))]
 
@@ -97,9 +112,15 @@ class CellPictures:
             (n, height, width, 3) of uint8: blue, green, red, as OpenCV has them.
         """
         poses = FramePoseVector()
-        for frames, capsules in zip([self._robot, *self._people], [robot, *people], strict=True):
+        drawn = zip([self._robot, *self._people], [robot, *people], ["", *self._meshes], strict=True)
+        for frames, capsules, mesh in drawn:
             for k, frame in enumerate(frames):
-                X = _AWAY if capsules is None else _placed(capsules.start[k], capsules.end[k])
+                if capsules is None:
+                    X = _AWAY
+                elif mesh:
+                    X = standing(capsules, self._floor)
+                else:
+                    X = _placed(capsules.start[k], capsules.end[k])
                 poses.set_value(frame, X)
         self._scene.get_source_pose_port(self._source).FixValue(self._context, Value(poses))
         query = self._scene.get_query_output_port().Eval(self._context)
@@ -113,6 +134,18 @@ class CellPictures:
 
     def _still(self, name: str, shape: Shape, X: RigidTransform, color: tuple[float, ...]) -> None:
         self._scene.RegisterAnchoredGeometry(self._source, _painted(name, shape, X, color))
+
+    def _mesh(self, name: str, file: str, colors: Sequence[tuple[float, ...]]) -> list[FrameId]:
+        path = Path(file)
+        if path.suffix.lower() not in _MESHES or not path.is_file():
+            raise ValueError(f"person: no mesh {file}; it must be a file that ends in {', '.join(_MESHES)}")
+        frame = self._scene.RegisterFrame(self._source, GeometryFrame(name))
+        painted = _painted(name, Mesh(MeshSource(path.resolve())), RigidTransform(), colors[_TRUNK])
+        try:
+            self._scene.RegisterGeometry(self._source, frame, painted)
+        except RuntimeError as error:  # it has no normals, for example
+            raise ValueError(f"person: the mesh {file} cannot be drawn: {error}") from error
+        return [frame]
 
     def _moving(self, name: str, capsules: Capsules, colors: Sequence[tuple[float, ...]]) -> list[FrameId]:
         frames = []

@@ -43,6 +43,10 @@ class EgmRunConfig:
     # Whether the program runs the path itself (EGMMoveL) and takes path corrections alone
     path_correction: bool = False
     correction_lag: float = quantity(0.05, 0.0, 10.0, "s")  # with which these are taken up (assumed)
+    # Of the largest joint speeds, beyond which the reported utilisation rate is above 100 % (assumed)
+    performance: float = quantity(1.0, 0.01, 10.0)
+    # Whether the program runs the path itself, again and again, and only says where it is (EGMStreamStart)
+    streams: bool = False
 
 
 class RunState(Enum):
@@ -84,6 +88,8 @@ class VirtualController:
         self._codec = SignalCodec(signals or SignalLayout())
         self._lower, self._upper = robot.lower - _BEYOND, robot.upper + _BEYOND
         self._kinematics, self._inverse = Kinematics(robot), inverse_kinematics(robot)
+        self._fastest = config.performance * robot.speed
+        self._planned: tuple[float, np.ndarray] | None = None  # of the last report, time in s and rad
         self._seqno = 0
         self._began: float | None = None
         self._ended = self._heard = self._unconverged = -math.inf
@@ -95,7 +101,7 @@ class VirtualController:
     @property
     def is_running(self) -> bool:
         """Whether commands are followed."""
-        return self.state is RunState.RUNNING and self.motors_on
+        return self.state is RunState.RUNNING and self.motors_on and not self._config.streams
 
     @property
     def references(self) -> tuple[np.ndarray, np.ndarray]:
@@ -169,6 +175,7 @@ class VirtualController:
             self.state, self._began = RunState.RUNNING, None
             self.restarts += 1
             self._seqno, self._last_command, self._commanded = 0, None, False
+            self._program_began = math.nan
         if self.state is not RunState.RUNNING:
             return
         if self._began is None:
@@ -186,13 +193,17 @@ class VirtualController:
             self.stop(time)
 
     def _run_program(self, program: PathProgram, time: float, planned: np.ndarray) -> None:
-        """The path begins with the first correction and ends for good."""
-        if not self._commanded:
+        """The path begins with the first correction and ends for good; one that streams waits for nobody."""
+        streams = self._config.streams
+        if not (self._commanded or streams):
             return
         if math.isnan(self._program_began):
             self._program_began = time
+            program.begin()
         self._reference, self._speed, is_over = program.at(time - self._program_began, planned)
-        if is_over:
+        if is_over and streams:
+            self._program_began = math.nan
+        elif is_over:
             self.stop(time, for_good=True)
 
     def report(
@@ -223,7 +234,10 @@ class VirtualController:
         message.mciConvergenceMet = self._commanded and self._is_converged(planned)
         message.rapidExecState.state = RAPID_RUNNING
         message.torqueRef.joints.extend(torque.tolist())
-        message.utilizationRate = 0.0
+        if self._planned is not None and time > self._planned[0]:
+            speed = np.abs(planned - self._planned[1]) / (time - self._planned[0])
+            message.utilizationRate = 100.0 * float((speed / self._fastest).max())
+        self._planned = time, planned.copy()
         if self.has_collided:
             message.CollisionInfo.collsionTriggered = True
         return message.SerializeToString()

@@ -27,8 +27,10 @@ class EgmSettings:
     signals: SignalLayout = field(default_factory=SignalLayout)
 
     def check(self) -> None:
-        """Refuses a layout of test signals that cannot be. Raises ValueError."""
+        """Refuses a layout of test signals and a program that cannot be. Raises ValueError."""
         SignalCodec(self.signals)
+        if self.run.streams and self.run.path_correction:
+            raise ValueError("a program that streams takes no corrections: run.path_correction must be false")
 
     def planner(self, period: float, takes_position: bool) -> EgmMotion:
         """What plans between commands and drives, as the controller does."""
@@ -41,11 +43,12 @@ class EgmSettings:
 
         Args:
             robot: as the controller knows it.
-            path: that its program runs where `EgmRunConfig.path_correction` says so.
+            path: that its program runs where `EgmRunConfig.path_correction` or ``streams`` says so.
             home: joint positions (6,) in rad near which the path begins.
         """
         program = None
-        if self.run.path_correction and path is not None and home is not None:
+        has_program = self.run.path_correction or self.run.streams
+        if has_program and path is not None and home is not None:
             program = PathProgram(robot, path, home, self.run.correction_lag)
         return VirtualController(robot, self.run, self.signals, program)
 

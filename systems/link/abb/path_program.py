@@ -53,6 +53,11 @@ class PathProgram:
         """Takes a correction (3,) in m in the frame of the path; what lies along the path is ignored."""
         self._asked_P = np.array([0.0, *shift_P[1:]])
 
+    def begin(self) -> None:
+        """The program begins, or begins anew, from wherever the robot is then."""
+        self._from = None
+        self._index, self._time = 0, 0.0
+
     def at(self, time: float, planned: np.ndarray) -> tuple[np.ndarray, np.ndarray, bool]:
         """Reference (6,) in rad, its speed in rad/s, and whether the path is over.
 

@@ -30,6 +30,11 @@ class AbbRobotLink(GuidedRobot[RobotReport]):
         return self._client.channel.address[1], self._signals.channel.address[1] if self._signals else 0
 
     @property
+    def utilization(self) -> float:
+        """How much of its performance the robot needs, by the newest report."""
+        return self._last.utilization if self._last is not None else 0.0
+
+    @property
     def trouble(self) -> str:
         """Why the newest messages are refused, or that the robot has hit something; else empty."""
         return _COLLISION if self._client.session.egm.has_collided else super().trouble

@@ -9,6 +9,9 @@ import numpy as np
 
 from systems.samples import ImageSample
 
+# ms, after which a stream that does not begin, or is silent, counts as ended
+_LIMITS = [cv2.CAP_PROP_OPEN_TIMEOUT_MSEC, 10_000, cv2.CAP_PROP_READ_TIMEOUT_MSEC, 5_000]
+
 
 class CameraStreams:
     """Reads every stream in a thread of its own and keeps only its newest frame.
@@ -42,25 +45,30 @@ class CameraStreams:
         self._size, self._period, self._delay, self._now = size, period, delay, now
         self._names, self._given, self._is_closed = list(cameras), -np.inf, False
         self._frames: list[tuple[float, np.ndarray] | None] = [None] * len(self._names)
-        self._problem = ""
-        videos = []
-        for name in self._names:
-            place = address.replace("{camera}", name)
-            videos.append((place, cv2.VideoCapture(place)))
-            if not videos[-1][1].isOpened():
-                for _, video in videos:
-                    video.release()
-                raise ValueError(f"station.overview.source: {place}: no video that can be read")
+        self._problem, self._unopened = "", []
+        places = [address.replace("{camera}", name) for name in self._names]
+        opened = [threading.Event() for _ in places]
         self._threads = [
-            threading.Thread(target=self._read, args=(number, place, video), daemon=True)
-            for number, (place, video) in enumerate(videos)
+            threading.Thread(target=self._read, args=(number, place, event), daemon=True)
+            for number, (place, event) in enumerate(zip(places, opened, strict=True))
         ]
         for thread in self._threads:
             thread.start()
+        for each in opened:
+            each.wait()
+        if self._unopened:
+            self.close()
+            raise ValueError(f"station.overview.source: {self._unopened[0]}: no video that can be read")
 
-    def _read(self, number: int, place: str, video: cv2.VideoCapture) -> None:
+    def _read(self, number: int, place: str, opened: threading.Event) -> None:
+        # Opened here, all at once: a stream may take seconds, in which the frames of the others would wait.
+        is_live = "://" in place
+        video = cv2.VideoCapture(place, cv2.CAP_FFMPEG, _LIMITS) if is_live else cv2.VideoCapture(place)
+        if not video.isOpened():
+            self._unopened.append(place)
+        opened.set()
         # A file has no clock of its own, a live stream waits for the next frame anyway.
-        pause = self._period if "://" not in place else 0.0
+        pause = 0.0 if is_live else self._period
         while not self._is_closed:
             is_there, image = video.read()
             if not is_there:

@@ -7,6 +7,7 @@ import time
 from collections.abc import Callable
 from dataclasses import dataclass
 from multiprocessing import get_context, parent_process
+from multiprocessing.connection import Connection
 from multiprocessing.context import SpawnProcess
 from typing import Protocol
 
@@ -16,6 +17,7 @@ import numpy as np
 from systems.samples import ImageSample
 from systems.vision.people.people_follower import Mind, PeopleFollower
 from systems.vision.people.shared_watch import SharedWatch
+from systems.vision.people.watch_diary import Seen, WatchDiary
 
 _NICE = 5  # what answers a controller comes first
 _PAUSE = 2e-3  # s between two looks for new images
@@ -44,6 +46,7 @@ class Lookout:
     follower: PeopleFollower
     source: ImageSource
     mind: Mind | None = None  # with the empty cell; None to learn it from the first images
+    diary: WatchDiary | None = None  # for whom a report is wanted
 
 
 Make = Callable[[SharedWatch], Lookout]
@@ -59,11 +62,14 @@ class WatchProcess:
             make: makes what it looks with, in the new process; it can be pickled.
         """
         self.shared = SharedWatch()
+        self.seen: Seen | None = None  # everything, once it has ended, where a diary was kept
         context = get_context("spawn")
+        self._receiver, sender = context.Pipe(duplex=False)
         self._process: SpawnProcess = context.Process(
-            target=_watch, args=(make, self.shared), name="people watch", daemon=True
+            target=_watch, args=(make, self.shared, sender), name="people watch", daemon=True
         )
         self._process.start()
+        sender.close()
 
     @property
     def pid(self) -> int | None:
@@ -78,20 +84,24 @@ class WatchProcess:
     @property
     def problem(self) -> str:
         """Why nobody looks for people any more; empty as long as somebody does."""
-        if self._process.is_alive():
-            return ""
-        return self.shared.problem or f"the process ended with code {self._process.exitcode}"
+        if self.shared.problem or self._process.is_alive():
+            return self.shared.problem
+        return f"the process ended with code {self._process.exitcode}"
 
     def end(self) -> None:
         """Ends the process; it is gone when this returns."""
         self.shared.end()
+        with contextlib.suppress(EOFError, OSError):  # it has nothing to say, or is gone
+            if self._receiver.poll(_ENDING):
+                self.seen = self._receiver.recv()
+        self._receiver.close()
         self._process.join(_ENDING)
         if self._process.is_alive():
             self._process.kill()
             self._process.join()
 
 
-def _watch(make: Make, shared: SharedWatch) -> None:
+def _watch(make: Make, shared: SharedWatch, sender: Connection) -> None:
     """The whole life of the process."""
     # Ctrl-C is for the one that has started it, which ends it when the robot stands.
     signal.signal(signal.SIGINT, signal.SIG_IGN)
@@ -110,6 +120,9 @@ def _watch(make: Make, shared: SharedWatch) -> None:
         shared.say(str(error))
         raise SystemExit(1) from None
     finally:
+        if lookout.diary is not None:
+            with contextlib.suppress(OSError):  # nobody listens any more
+                sender.send(lookout.diary.seen())
         lookout.source.close()
 
 
@@ -142,3 +155,5 @@ def look_until_ended(lookout: Lookout, shared: SharedWatch) -> None:
         assert mind is not None
         mind = lookout.follower.after(mind, images, q)
         shared.publish(mind.sample, time.process_time() - began)
+        if lookout.diary is not None:
+            lookout.diary.note(mind, images, q)

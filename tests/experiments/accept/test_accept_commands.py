@@ -54,6 +54,22 @@ def test_the_table_of_a_robot_has_a_column_for_each_speed(tmp_path: Path):
     assert slow["AT_mm"] <= fast["AT_mm"]
 
 
+@pytest.mark.slow
+@pytest.mark.real_time
+def test_a_guided_robot_is_judged_by_what_its_camera_measures(tmp_path: Path):
+    """Over UDP against a virtual cell: numerical IK takes the tip to its poses, to the camera's noise."""
+    result = truetip(
+        "accept", "robot", "--with-cell", "--law", "numerical_ik", "--cycles", "2", "--dwell", "0.5",
+        "--set=reference.acceleration=4", "--set=station.link.run.timeout=5",
+        "--set=station.link.break_after=5",
+        "--report", tmp_path / "r.html", "--json", tmp_path / "r.json",
+    )  # fmt: skip
+    assert result.exit_code == 0, result.output
+    (row,) = json.loads((tmp_path / "r.json").read_text())["rows"]
+    assert row["AP_mm"] < 0.5  # the open loop is off by 20 mm
+    assert row["AT_mm"] > row["AP_mm"]
+
+
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
@@ -61,7 +77,9 @@ def test_the_table_of_a_robot_has_a_column_for_each_speed(tmp_path: Path):
         (["robot", "--speeds", "fast"], "--speeds must be numbers such as 0,7, got 'fast'"),
         (["robot", "--loads", "-1"], "--loads must be between 0 and 1000, got -1"),
         (["robot", "--cube", "0"], "--cube must be positive"),
-        (["robot", "--set", "station.kind=egm"], "accept robot does not drive a real station"),
+        (["robot", "--with-cell", "--loads", "0,7"], "--loads is of a simulated station"),
+        (["robot", "--with-cell", "--set", "station.link.has_camera=false"], "accept robot needs a camera"),
+        (["robot", "--with-cell", "--scenario", "cell-watched"], "accept robot needs the planned speed"),
         (["cameras", "--count", "4"], "--count must be at least 5, got 4"),
         (["cameras", "--cube", "1e5"], "a ball is not seen by two cameras"),
         (["cameras", "--lengths", "none.csv"], "none.csv"),

@@ -3,9 +3,11 @@
 import json
 from pathlib import Path
 
+import numpy as np
 import pyarrow.parquet as pq
 import pytest
 
+from diagrams.scenario.scenario import load_scenario
 from tests.experiments.commands import files, refusal, truetip
 
 STILL = ["--set=station.elasticity=rigid", "--set=initial_error_mm=[0,0,0]",
@@ -57,7 +59,13 @@ def test_a_history_goes_on_and_a_joint_that_drifts_is_named(tmp_path: Path):
         (["--change", "joint:7:1"], "--change must be joint:N:MDEG, tool:MM, camera:NAME:MICRORADIANS"),
         (["--change", "camera:99:1"], "the cameras are 01, 02"),
         (["--change-at", "2"], "--change-at needs --change"),
-        (["--set", "station.kind=egm"], "health does not drive a real station"),
+        (["--with-cell", "--change", "joint:3:40"], "--change changes a simulated station"),
+        (
+            ["--with-cell", "--checks", "2"],
+            "--checks is of a simulated station, this one is checked once, got 2",
+        ),
+        (["--with-cell", "--set", "station.link.has_camera=false"], "health needs a camera"),
+        (["--with-cell", "--scenario", "cell-watched"], "health does not watch for people"),
         (["--history", "h.csv"], "h.csv"),
     ],
 )
@@ -67,6 +75,27 @@ def test_wrong_arguments_are_refused_in_one_line(
     monkeypatch.chdir(tmp_path)
     assert message in refusal(truetip("health", *STILL, *arguments))
     assert files(tmp_path) == set()
+
+
+@pytest.mark.slow
+@pytest.mark.real_time
+def test_a_joint_of_a_guided_robot_that_drifts_is_named_and_its_history_is_not_one_of_simulations(
+    tmp_path: Path,
+):
+    """The virtual cell stands for hardware; its joint 3 is off by 40 mdeg from the second check on."""
+    patient = ["station.link.run.timeout=5", "station.link.break_after=5"]
+    guided = ["--with-cell", *(f"--set={setting}" for setting in patient)]
+    assert health(tmp_path, *guided)["alarms"] == []
+    page = (tmp_path / "h.html").read_text()
+    assert "Zeros of the joints" in page
+    assert "By how much they have turned" not in page
+    offset = load_scenario("cell").station.errors.joint_offset_deg + np.array([0, 0, 0.04, 0, 0, 0])
+    (alarm,) = health(tmp_path, *guided, f"--set=station.errors.joint_offset_deg={offset.tolist()}")["alarms"]
+    assert (alarm["kind"], alarm["what"]) == ("joint zero", "joint 3")
+    assert abs(np.rad2deg(alarm["size"])) == pytest.approx(0.04, abs=5e-3)
+    assert 0.0 < alarm["onset_s"] < 86400.0
+    told = refusal(truetip("health", *STILL, "--history", tmp_path / "h.parquet"))
+    assert "simulated checks cannot be continued on a station, nor the other way round" in told
 
 
 @pytest.mark.slow

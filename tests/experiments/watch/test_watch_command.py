@@ -123,7 +123,6 @@ def test_what_is_wrong_with_a_recording_is_said_in_one_line(recording: Path, tmp
         (["--study", "--images", "x"], "--study draws its own images"),
         (["--images", "none"], "--images none: must be a folder with joints.csv"),
         (["--minutes", "-1"], "--minutes must not be negative, got -1"),
-        (["--set", "station.kind=egm"], "give recorded images with --images"),
         (["--scenario", "nominal"], "takes images of the whole cell; use --scenario watched"),
     ],
 )

@@ -7,10 +7,13 @@ import numpy as np
 import pytest
 from pydrake.math import RotationMatrix
 
+from diagrams.scenario.scenario import load_scenario
 from robots.description.model import load_robot
 from robots.kinematics.forward import Kinematics
 from systems.link.abb.controller import EgmRunConfig, RunState, VirtualController
 from systems.link.abb.messages import Command, Mode, Pose, decode_report, encode_command
+from systems.link.abb.path_program import PathProgram
+from systems.reference.paths import make_path
 
 ROBOT = load_robot("irb1200")
 HOME = np.deg2rad([10.0, 20.0, -10.0, 30.0, 50.0, -40.0])
@@ -134,3 +137,32 @@ def test_with_motors_off_nothing_is_followed():
 def test_times_that_are_not_positive_are_refused(name: str):
     with pytest.raises(ValueError, match=f"{name} must be positive"):
         VirtualController(ROBOT, EgmRunConfig(**{name: 0.0}))
+
+
+def test_a_program_that_streams_runs_its_path_again_and_again_whatever_it_is_told():
+    """Its references go on without a jump from the end of a lap to the beginning of the next."""
+    path = make_path(load_scenario("cell", ["reference.path=circle", "reference.acceleration=6"]).reference)
+    home = np.deg2rad(load_scenario("cell").home_deg)
+    config = EgmRunConfig(streams=True)
+    made = VirtualController(ROBOT, config, program=PathProgram(ROBOT, path, home, config.correction_lag))
+    period, planned, told = 0.02, home, []
+    for tick in range(round((2.2 * path.duration + 10.0) / period)):
+        time = tick * period
+        tell(made, Mode.JOINT, Command(HOME), seqno=tick, time=time)
+        made.cycle(time, planned)
+        planned = made.references[0]
+        told.append(planned)
+    assert made.ignored == len(told)
+    assert not decode_report(made.report(1.0, planned, planned, np.zeros(6))).is_ready
+    steps = np.abs(np.diff(told, axis=0))
+    assert (steps <= 1.01 * ROBOT.speed * period).all()
+    # It comes by the farthest place of its path in every lap.
+    far = np.linalg.norm(np.array(told) - told[0], axis=1)
+    visits = np.count_nonzero(np.diff((far > 0.9 * far[200:].max()).astype(int)) > 0)
+    assert visits >= 2
+
+
+def test_a_program_cannot_stream_and_be_corrected():
+    both = [f"station.link.run.{name}=true" for name in ("streams", "path_correction")]
+    with pytest.raises(ValueError, match=r"station\.link: a program that streams takes no corrections"):
+        load_scenario("cell", both)
