@@ -13,7 +13,7 @@ from experiments.cli.workers import Executor
 from experiments.comparison.compare import compare as run_laws
 from experiments.comparison.compare import compared_laws
 from experiments.identify.cases import MotionCases, default_cases
-from experiments.identify.recording_file import Recording
+from experiments.identify.recording_map import Recording
 from experiments.identify.simulated import simulated_recording
 from experiments.identify.slow import identify_slow_motions
 from experiments.identify.study import IdentifyStudy, study_recording

@@ -18,11 +18,23 @@ from experiments.cli.prepare import noted_robot
 from experiments.cli.staging import PAGE, TABLE, YAML, staged_file
 from experiments.feedforward.command import realistic_robot
 from experiments.identify.cases import MotionCases, default_cases, load_cases
+from experiments.identify.excitation import (
+    designed_slow_motion,
+    excitation_json,
+    told_of,
+    write_excitation,
+)
 from experiments.identify.plots import table_head, table_rows, verdict, write_identify_page
-from experiments.identify.recording_file import Recording, read_recording, write_recording
+from experiments.identify.recording_file import RECORDINGS, read_recording, write_recording
+from experiments.identify.recording_map import Recording
 from experiments.identify.simulated import simulated_recording
 from experiments.identify.slow import identify_slow_recording
-from experiments.identify.study import IdentifyStudy, identify_json, study_recording, with_rectangle
+from experiments.identify.study import (
+    IdentifyStudy,
+    identify_json,
+    study_recording,
+    with_rectangle,
+)
 from experiments.report.files import write_text
 from robots.description.model import RobotFileError, RobotModel, load_robot
 from robots.description.robot_file import robot_text
@@ -41,7 +53,9 @@ def identify_command(
     ] = None,
     recording: Annotated[
         Path | None,
-        typer.Option(metavar="FILE", help="A recorded table (CSV).", show_default="simulated"),
+        typer.Option(
+            metavar="FILE", help="A recorded table (CSV, Parquet) or MCAP file.", show_default="simulated"
+        ),
     ] = None,
     columns: Annotated[
         Path | None,
@@ -49,7 +63,17 @@ def identify_command(
     ] = None,
     slow: Annotated[
         Path | None,
-        typer.Option(metavar="FILE", help="Slow motions with torques (CSV), for load and friction."),
+        typer.Option(
+            metavar="FILE",
+            help="Slow motions with torques, for load and friction: a table or the MCAP of a run.",
+        ),
+    ] = None,
+    excite: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="FILE.csv",
+            help="Only design a slow motion, to be recorded for --slow, and write it.",
+        ),
     ] = None,
     plant: Annotated[
         str | None,
@@ -74,7 +98,9 @@ def identify_command(
     write_table: Annotated[
         Path | None,
         typer.Option(
-            "--write-recording", metavar="FILE.csv", help="Keep what was simulated, for --recording."
+            "--write-recording",
+            metavar="FILE",
+            help="Keep what was simulated, for --recording: .csv, .parquet, .mcap.",
         ),
     ] = None,
     report: PictureOption = Path("out/identify.html"),
@@ -90,15 +116,27 @@ def identify_command(
             raise ValueError(
                 "--recording is what was recorded: no --motions and no --write-recording go with it"
             )
+        if excite is not None and any((recording, cases, slow, write, write_table)):
+            raise ValueError(
+                "--excite only designs a motion: no recording, no motions and no --write go with it"
+            )
         if recording is None and slow is not None:
             raise ValueError("--slow says more of what was recorded, and there is no --recording")
         if recording is None and columns is not None:
             raise ValueError("--columns says what a --recording has, and there is none")
         model = noted_robot(human, robot)
+        if excite is not None:
+            slow_table = stack.enter_context(staged_file(excite, *TABLE))
+            stack.enter_context(output.staged())
+            excitation = designed_slow_motion(model, seed)
+            write_excitation(slow_table, excitation)
+            output.write(excitation_json(excitation))
+            human.print(escape(told_of(excitation)))
+            return
         truth = _plant(robot, plant, recording is not None)
         page = stack.enter_context(staged_file(report, *PAGE))
         robot_file = stack.enter_context(staged_file(write, *YAML)) if write else None
-        table = stack.enter_context(staged_file(write_table, *TABLE)) if write_table else None
+        table = stack.enter_context(staged_file(write_table, *RECORDINGS)) if write_table else None
         stack.enter_context(output.staged())
         if recording is not None:
             recorded = read_recording(recording, columns)
@@ -144,10 +182,15 @@ def _simulated(
 
 
 def _print(human: Console, study: IdentifyStudy) -> None:
-    table = Table(box=box.SIMPLE_HEAD, padding=(0, 1, 0, 0))
-    for name in table_head(study):
-        table.add_column(name, justify="left" if name in ("parameter", "unit") else "right", no_wrap=True)
-    for row in table_rows(study):
-        table.add_row(*map(escape, row))
-    human.print(table)
+    human.print(_table(table_head(study), table_rows(study)))
     human.print(escape(verdict(study)))
+
+
+def _table(head: list[str], rows: list[list[str]]) -> Table:
+    table = Table(box=box.SIMPLE_HEAD, padding=(0, 1, 0, 0))
+    for name in head:
+        left = name in ("parameter", "unit")
+        table.add_column(name, justify="left" if left else "right", no_wrap=True)
+    for row in rows:
+        table.add_row(*map(escape, row))
+    return table

@@ -14,7 +14,7 @@ from diagrams.station import SimulatedStation
 from experiments.cli.workers import Progress, SimulationError, in_processes
 from experiments.feedforward.trial import CommandPlayer, Trial, commands
 from experiments.identify.cases import MotionCases
-from experiments.identify.recording_file import Recording
+from experiments.identify.recording_map import Recording
 from robots.description.model import NUM_JOINTS, RobotModel
 from robots.identification.motion import SensorPlace
 from robots.identification.recording import RecordedCase

@@ -7,7 +7,8 @@ from typing import Any
 import numpy as np
 from scipy.interpolate import CubicSpline
 
-from experiments.identify.recording_file import Recording, read_recording
+from experiments.identify.recording_file import read_recording
+from experiments.identify.recording_map import Recording
 from robots.description.model import RobotModel
 from robots.identification.recording import RecordingError
 from robots.identification.slow_motion import SlowIdentification, SlowMotion, identify_slow_motion

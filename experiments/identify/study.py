@@ -9,7 +9,7 @@ import numpy as np
 
 from experiments.cli.workers import Progress, SimulationError, in_processes
 from experiments.feedforward.rectangle import RectangleTrial
-from experiments.identify.recording_file import Recording
+from experiments.identify.recording_map import Recording
 from experiments.identify.slow import slow_json, with_slow_motion
 from robots.description.model import RobotModel
 from robots.identification.arm_identification import ArmIdentification, identify_arm

@@ -91,7 +91,7 @@ def identify_slow_motion(robot: RobotModel, payload: float, motion: SlowMotion) 
     friction = _friction_columns(motion.rate, knots)
     believed, mass, sigma, of_load = robot, payload, np.zeros(0), 0
     for _ in range(_ROUNDS):
-        known, load = _torques_and_load(believed, mass, motion)
+        known, load = _torques(believed, mass, motion), load_columns(believed, mass, motion.theta)
         Y = np.concatenate([load, friction], axis=2)[moving]
         scale = np.linalg.norm(Y, axis=0)
         used = scale > 0.0
@@ -107,8 +107,7 @@ def identify_slow_motion(robot: RobotModel, payload: float, motion: SlowMotion) 
         variance = float(left @ left) / max(len(left) - int(used.sum()), 1)
         sigma = np.zeros(len(used))
         sigma[used] = np.sqrt(variance * np.diagonal(np.linalg.inv(Y[:, used].T @ Y[:, used])))
-    known, _ = _torques_and_load(believed, mass, motion)
-    lost = motion.torque - known
+    lost = motion.torque - _torques(believed, mass, motion)
     frictions = [
         fit_frictions(motion.rate[rows, joint], lost[rows, joint]) if len(knots[joint]) else []
         for joint, rows in enumerate(moving.T)
@@ -144,11 +143,41 @@ def _friction_columns(rate: np.ndarray, knots: list[np.ndarray]) -> np.ndarray:
     return columns
 
 
-def _torques_and_load(robot: RobotModel, payload: float, motion: SlowMotion) -> tuple[np.ndarray, np.ndarray]:
-    """What a rigid robot needs without friction, (n, 6) in N m, and its derivatives by the load.
+def load_columns(robot: RobotModel, payload: float, theta: np.ndarray) -> np.ndarray:
+    """Derivatives of the torques at rest by the load.
 
-    The load is the mass at the flange, its first moments, and stiffness and preload of a counterbalance.
+    Args:
+        robot: whose geometry is right.
+        payload: mass at the flange in kg.
+        theta: positions in rad, (n, 6).
+
+    Returns:
+        In N m by the mass at the flange in kg, its first moments in kg m, and stiffness (N/m) and preload (N)
+        of a counterbalance, (n, 6, 4 or 6).
     """
+    plant = MultibodyPlant(0.0)
+    add_robot(plant, robot, "rigid", payload)
+    plant.Finalize()
+    context = plant.CreateDefaultContext()
+    gravity, world = plant.gravity_field().gravity_vector(), plant.world_frame()
+    flange = plant.GetBodyByName("link_6").body_frame()
+    springs = _spring_columns(robot, theta[:, 1])
+    points = np.vstack([np.zeros(3), np.eye(3)]).T
+    load = np.zeros((len(theta), NUM_JOINTS, 4 + springs.shape[1]))
+    for row, q in enumerate(theta):
+        plant.SetPositions(context, q)
+        J = plant.CalcJacobianTranslationalVelocity(
+            context, JacobianWrtVariable.kV, flange, points, world, world
+        ).reshape(4, 3, NUM_JOINTS)
+        pulls = -np.einsum("pkj,k->pj", J, gravity)
+        load[row, :, 0] = pulls[0]
+        load[row, :, 1:4] = (pulls[1:] - pulls[0]).T
+    load[:, 1, 4:] = springs
+    return load
+
+
+def _torques(robot: RobotModel, payload: float, motion: SlowMotion) -> np.ndarray:
+    """What a rigid robot needs without friction, (n, 6) in N m."""
     frictionless = replace(
         robot,
         joints=[replace(j, drive_train=replace(j.drive_train, viscous_friction=0.0)) for j in robot.joints],
@@ -157,24 +186,12 @@ def _torques_and_load(robot: RobotModel, payload: float, motion: SlowMotion) -> 
     add_robot(plant, frictionless, "rigid", payload)
     plant.Finalize()
     context, forces = plant.CreateDefaultContext(), MultibodyForces(plant)
-    gravity, world = plant.gravity_field().gravity_vector(), plant.world_frame()
-    flange = plant.GetBodyByName("link_6").body_frame()
-    springs = _spring_columns(robot, motion.theta[:, 1])
-    points = np.vstack([np.zeros(3), np.eye(3)]).T
     torques = np.empty_like(motion.torque)
-    load = np.zeros((len(torques), NUM_JOINTS, 4 + springs.shape[1]))
     for row, q in enumerate(motion.theta):
         plant.SetPositionsAndVelocities(context, np.concatenate([q, motion.rate[row]]))
         plant.CalcForceElementsContribution(context, forces)
         torques[row] = plant.CalcInverseDynamics(context, motion.acceleration[row], forces)
-        J = plant.CalcJacobianTranslationalVelocity(
-            context, JacobianWrtVariable.kV, flange, points, world, world
-        ).reshape(4, 3, NUM_JOINTS)
-        pulls = -np.einsum("pkj,k->pj", J, gravity)
-        load[row, :, 0] = pulls[0]
-        load[row, :, 1:4] = (pulls[1:] - pulls[0]).T
-    load[:, 1, 4:] = springs
-    return torques, load
+    return torques
 
 
 def _spring_columns(robot: RobotModel, q: np.ndarray) -> np.ndarray:

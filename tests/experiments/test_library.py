@@ -8,7 +8,7 @@ import pytest
 
 from diagrams.scenario.scenario import load_scenario
 from experiments.identify.cases import default_cases
-from experiments.identify.recording_file import Recording
+from experiments.identify.recording_map import Recording
 from experiments.library import calibrate, compare, design, identify, record_motions, simulate
 from experiments.metrics.run_metrics import error_metrics
 from robots.calibration.error_model import ErrorModel

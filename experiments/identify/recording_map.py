@@ -1,0 +1,155 @@
+"""What a recording of motions is, and the map that says what the columns of its table are."""
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+
+from robots.configuration.nodes import Node
+from robots.configuration.quantity import choice, numbers, positive, quantity
+from robots.description.model import NUM_JOINTS
+from robots.identification.motion import KINDS, SensorPlace
+from robots.identification.recording import RecordedCase, RecordingError
+from robots.pose import rotation_from_zyx, zyx_from_rotation
+
+_UNEVEN = 0.01  # of the period, by which samples of the robot may be off an even grid
+_LEAST = 50  # samples of a case
+
+
+@dataclass
+class RecordedSensor:
+    """A sensor and its three columns."""
+
+    name: str = ""
+    kind: str = choice("gyro", KINDS)
+    body: str = ""
+    position: list[float] = numbers((0.0, 0.0, 0.0), (3,), unit="m")
+    zyx_deg: list[float] = numbers((0.0, 0.0, 0.0), (3,), unit="deg")
+    bandwidth: float = positive(200.0, "Hz")
+    noise_sigma: float = positive(2e-3)  # rad/s or m/s^2
+    columns: list[str] = field(default_factory=list)
+    factor: float = 1.0  # from the unit of the columns to rad/s or m/s^2
+
+
+@dataclass
+class RecordingMap:
+    """What the columns of a recording are."""
+
+    payload: float | None = quantity(None, 0.0, unit="kg")  # at the flange; None for the largest
+    case: str = "case"  # column with the name of the motion; empty where there is only one
+    time: str = "time"  # column, s by the robot's clock
+    stamp: str = ""  # column, s by the clock of the sensors; empty for that of the robot
+    angle_factor: float = 1.0  # from the unit of positions and speeds to rad and rad/s
+    position: list[str] = field(default_factory=list)  # six columns, motors on the side of the links
+    speed: list[str] = field(default_factory=list)  # six columns; empty: differentiated
+    torque: list[str] = field(default_factory=list)  # six columns, N m on the side of the links; may be empty
+    sensors: list[RecordedSensor] = field(default_factory=list)
+
+
+@dataclass(frozen=True)
+class Recording:
+    """Motions with the sensors that watched them."""
+
+    payload: float | None  # kg
+    cases: list[RecordedCase]
+    sensors: list[SensorPlace]
+
+
+def map_of(recording: Recording, has_torque: bool) -> RecordingMap:
+    """The map of a table of a recording, with names for all columns."""
+    joints = range(1, NUM_JOINTS + 1)
+    return RecordingMap(
+        recording.payload,
+        stamp="stamp",
+        position=[f"position_{i}" for i in joints],
+        speed=[f"speed_{i}" for i in joints],
+        torque=[f"torque_{i}" for i in joints] if has_torque else [],
+        sensors=[
+            RecordedSensor(
+                place.name,
+                place.kind,
+                place.body,
+                place.position.tolist(),
+                np.rad2deg(zyx_from_rotation(place.rotation)).tolist(),
+                place.bandwidth,
+                place.sigma,
+                [f"{place.name}_{axis}" for axis in "xyz"],
+            )
+            for place in recording.sensors
+        ],
+    )
+
+
+def places(plan: RecordingMap) -> list[SensorPlace]:
+    """The sensors of a map."""
+    return [
+        SensorPlace(
+            sensor.name,
+            sensor.kind,
+            sensor.body,
+            np.array(sensor.position, dtype=float),
+            rotation_from_zyx(np.deg2rad(sensor.zyx_deg)),
+            sensor.bandwidth,
+            sensor.noise_sigma,
+        )
+        for sensor in plan.sensors
+    ]
+
+
+def check_map(plan: RecordingMap, node: Node, needs_sensors: bool) -> None:
+    """Refuses a map that lacks columns.
+
+    Raises:
+        ConfigurationError: that names the place.
+    """
+    for name, wanted in (
+        ("position", (NUM_JOINTS,)),
+        ("speed", (0, NUM_JOINTS)),
+        ("torque", (0, NUM_JOINTS)),
+    ):
+        columns = getattr(plan, name)
+        if len(columns) not in wanted:
+            raise node.at([name]).refuse(f"{name} must be {NUM_JOINTS} columns, got {len(columns)}")
+    if not plan.sensors and needs_sensors:
+        raise node.refuse("sensors: needs one or more, each with name, kind, body and three columns")
+    for i, sensor in enumerate(plan.sensors):
+        if len(sensor.columns) != 3:
+            place = node.at(["sensors", i])
+            raise place.refuse(f"sensor '{sensor.name}': columns must be 3, got {len(sensor.columns)}")
+
+
+def check_times(where: Callable[[int], str], time: np.ndarray, stamps: np.ndarray) -> None:
+    """Refuses a motion that is too short, goes back in time or was sampled unevenly.
+
+    Args:
+        where: the place of a row of the motion, for messages.
+        time: by the clock of the robot in s.
+        stamps: by the clock of the sensors in s.
+
+    Raises:
+        RecordingError: that names the place.
+    """
+    if len(time) < _LEAST:
+        raise RecordingError(f"{where(0)}: a case needs {_LEAST} rows or more, got {len(time)}")
+    for name, values in (("time", time), ("stamp", stamps)):
+        steps = np.diff(values)
+        if not steps.min() > 0.0:
+            raise RecordingError(f"{where(int(np.argmin(steps)) + 1)}: the {name} does not go on")
+    steps = np.diff(time)
+    period = float(np.median(steps))
+    off = np.abs(steps - period)
+    if off.max() > _UNEVEN * period:
+        raise RecordingError(
+            f"{where(int(np.argmax(off)) + 1)}: samples of the robot must be evenly spaced, got "
+            f"{steps.max():g} s after {period:g} s"
+        )
+
+
+def check_periods(path: Path, cases: list[RecordedCase]) -> None:
+    """Refuses motions that were sampled at different rates. Raises RecordingError."""
+    periods = [case.period for case in cases]
+    if max(periods) > (1.0 + _UNEVEN) * min(periods):
+        raise RecordingError(
+            f"{path}: all cases must have one period, got {min(periods):g} to {max(periods):g} s"
+        )
