@@ -1,5 +1,6 @@
 """Fits the unknowns of an elastic arm to recorded motions, and says how well each of them is known."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -8,6 +9,7 @@ from scipy.optimize import least_squares
 from robots.identification.arm_response import ArmResponse, Response
 from robots.identification.elastic_parameters import ElasticParameters
 
+_SHIFT = 1.0  # samples, by which the times of robot and sensors may still be apart
 _ROBUST = 3.0  # in units of the spread: larger residuals, as where teeth meet, count less and less
 _MAD = 1.4826  # of a normal distribution, standard deviation over median of the absolute value
 
@@ -18,7 +20,7 @@ class ArmFit:
 
     parameters: ElasticParameters
     values: np.ndarray  # (n,)
-    covariance: np.ndarray  # (n, n), with what cases and sensors disagree
+    covariance: np.ndarray  # (n, n), with what cases, sensors and phases of the motions disagree
     noise_covariance: np.ndarray  # (n, n), what it would be if nothing but noise were wrong
     spread: np.ndarray  # (channels,) of the residuals in rad/s or m/s^2
     evaluations: int
@@ -33,10 +35,28 @@ class ArmFit:
 class ArmProblem:
     """Residuals of a model of all cases, weighted, with priors as further residuals."""
 
-    def __init__(self, response: ArmResponse, measured: np.ndarray, parameters: ElasticParameters) -> None:
-        """Takes readings (m, cases, channels) at the samples of the response, NaN where there are none."""
+    def __init__(
+        self,
+        response: ArmResponse,
+        measured: np.ndarray,
+        parameters: ElasticParameters,
+        has_own_clock: bool = True,
+    ) -> None:
+        """Takes readings.
+
+        Args:
+            response: of the model.
+            measured: (m, cases, channels) at the samples of the response, NaN where there are none.
+            parameters: the unknowns.
+            has_own_clock: whether the readings may be off in time, each case by some other lag.
+        """
+        self._clocks = measured.shape[1] if has_own_clock else 0
         self.response, self.parameters = response, parameters
         self.measured, self._known = measured, np.isfinite(measured)
+        # By one sample more of lag the readings of a case change by as much.
+        filled = np.where(self._known, measured, 0.0)
+        around = self._known & np.roll(self._known, 1, axis=0) & np.roll(self._known, -1, axis=0)
+        self._by_shift = np.where(around, np.gradient(filled, axis=0), 0.0) / response.step
         self.evaluations = 0
         self._last: tuple[np.ndarray, Response] | None = None
 
@@ -78,25 +98,45 @@ class ArmProblem:
         assert sensitivity is not None
         return sensitivity * self._known[..., None]
 
-    def solve(self, p: np.ndarray, spread: np.ndarray, loss: str, steps: int, tolerance: float) -> np.ndarray:
-        """The best unknowns from a start, by scipy's trust-region Levenberg-Marquardt with bounds."""
-        prior = self.parameters
+    def solve(
+        self, p: np.ndarray, spread: np.ndarray, steps: int, tolerance: float
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """The best unknowns from a start, by scipy's trust-region Levenberg-Marquardt with bounds.
 
-        def residuals(p: np.ndarray) -> np.ndarray:
-            return np.concatenate(
-                [(self.residuals(p) / spread).ravel(), (p - prior.start) / prior.prior_sigma]
-            )
+        How far the times of the sensors are off in each case is found with them: a lag of a tenth of a
+        millisecond looks like a damper.
 
-        def jacobian(p: np.ndarray) -> np.ndarray:
-            whitened = (self.jacobian(p) / spread[:, None]).reshape(-1, len(p))
-            return np.concatenate([whitened, np.diag(1.0 / prior.prior_sigma)])
+        Returns:
+            The unknowns, and the lags that are missing, in samples of the cases, (cases,), or (0,) without
+            a clock of their own.
+        """
+        prior, n, cases = self.parameters, len(p), self._clocks
+        # scipy's first step and its last ones are shares of the length of its vector: with ones for the robot
+        # that is believed they are shares of a spring, whatever logarithms the dampers have.
+        origin = np.append(prior.start, np.zeros(cases)) - 1.0
+        sigma = np.append(prior.prior_sigma, np.full(cases, _SHIFT))
+        by_shift = self._shift_columns(spread).reshape(self.measured.size, cases)
 
+        def residuals(x: np.ndarray) -> np.ndarray:
+            at = x + origin
+            left = self._shifted(at[:n], at[n:]) / spread
+            return np.concatenate([left.ravel(), (x - 1.0) / sigma])
+
+        def jacobian(x: np.ndarray) -> np.ndarray:
+            whitened = (self.jacobian((x + origin)[:n]) / spread[:, None]).reshape(-1, n)
+            return np.vstack([np.hstack([whitened, by_shift]), np.diag(1.0 / sigma)])
+
+        lower, upper = (
+            np.append(limit, np.full(cases, sign * np.inf))
+            for limit, sign in ((prior.lower, -1.0), (prior.upper, 1.0))
+        )
+        start = np.append(np.clip(p, prior.lower + 1e-9, prior.upper - 1e-9), np.zeros(cases))
         found = least_squares(
             residuals,
-            np.clip(p, prior.lower + 1e-9, prior.upper - 1e-9),
+            start - origin,
             jacobian,  # pyright: ignore[reportArgumentType]  # its stub knows names alone
-            bounds=(prior.lower, prior.upper),
-            loss=loss,
+            bounds=(lower - origin, upper - origin),
+            loss="soft_l1",
             f_scale=_ROBUST,
             max_nfev=steps,
             xtol=tolerance,
@@ -104,48 +144,81 @@ class ArmProblem:
             gtol=1e-12,
             x_scale="jac",
         )
-        return found.x
+        values = found.x + origin
+        return values[:n], values[n:]
 
-    def fit(self, p: np.ndarray, spread: np.ndarray, evaluations: int) -> ArmFit:
-        """What is known of the unknowns p where `solve` has ended."""
-        prior = np.diag(1.0 / self.parameters.prior_sigma**2)
-        residuals, J = self.residuals(p) / spread, self.jacobian(p) / spread[:, None]
+    def _shifted(self, p: np.ndarray, shift: np.ndarray) -> np.ndarray:
+        """Residuals, with readings of each case later by a shift in samples."""
+        left = self.residuals(p)
+        return left - shift[:, None] * self._by_shift if len(shift) else left
+
+    def _shift_columns(self, spread: np.ndarray) -> np.ndarray:
+        """Derivatives of the weighted residuals by the missing lags, (m, cases, channels, cases or 0)."""
+        cases = self._clocks
+        columns = np.zeros((*self.measured.shape, cases))
+        each = np.arange(cases)
+        columns[:, each, :, each] = -np.moveaxis(self._by_shift / spread, 1, 0)[:cases]
+        return columns
+
+    def fit(
+        self, p: np.ndarray, shift: np.ndarray, spread: np.ndarray, phases: np.ndarray, evaluations: int
+    ) -> ArmFit:
+        """What is known of the unknowns p and the lags where `solve` has ended.
+
+        Args:
+            p: the unknowns.
+            shift: the missing lags in samples, (cases,).
+            spread: of the channels.
+            phases: of the motions, a number from zero for each reading, -1 for none, (m, cases).
+            evaluations: that were needed before.
+        """
+        n = len(p)
+        sigma = np.append(self.parameters.prior_sigma, np.full(len(shift), _SHIFT))
+        residuals = self._shifted(p, shift) / spread
+        J = np.concatenate([self.jacobian(p) / spread[:, None], self._shift_columns(spread)], axis=3)
         # As soft_l1 weighs them.
         weight = 1.0 / np.sqrt(1.0 + np.square(residuals / _ROBUST))
         # By case and sensor, whose three channels belong together.
-        m, cases, channels, n = J.shape
-        J = J.reshape(m, cases, channels // 3, 3, n)
+        m, cases, channels, columns = J.shape
+        J = J.reshape(m, cases, channels // 3, 3, columns)
         weight = weight.reshape(J.shape[:-1])
-        gradient = np.einsum("mcsk,mcskn->csn", weight * residuals.reshape(weight.shape), J)
-        flat = J.reshape(-1, n)
+        pull = np.einsum("mcsk,mcskn->mcsn", weight * residuals.reshape(weight.shape), J)
+        flat = J.reshape(-1, columns)
         information = (flat * weight.reshape(-1, 1)).T @ flat
-        covariance = np.linalg.inv(information + prior)
-        scatter = _scatter(gradient, covariance)
-        sigma = self.parameters.prior_sigma
-        singular = np.linalg.svd(information * np.outer(sigma, sigma), compute_uv=False)
+        covariance = np.linalg.inv(information + np.diag(1.0 / sigma**2))
+        of_phases = [pull[phases == k].sum(axis=(0, 1)) for k in range(phases.max() + 1)]
+        groups = [pull.sum(axis=(0, 2)), pull.sum(axis=(0, 1)), np.array(of_phases)]
+        whole = covariance + _scatter(groups, covariance)
+        of_unknowns = information[:n, :n] * np.outer(sigma[:n], sigma[:n])
+        singular = np.linalg.svd(of_unknowns, compute_uv=False)
         condition = float(np.sqrt(singular[0] / max(singular[-1], 1e-300)))
         return ArmFit(
             self.parameters,
             p,
-            covariance + scatter,
-            covariance,
+            whole[:n, :n],
+            covariance[:n, :n],
             spread,
             evaluations + self.evaluations,
             condition,
         )
 
 
-def _scatter(gradient: np.ndarray, covariance: np.ndarray) -> np.ndarray:
-    """How far cases and sensors pull the unknowns apart: the sandwich covariance with two ways of clusters.
+def _scatter(groups: Sequence[np.ndarray], covariance: np.ndarray) -> np.ndarray:
+    """How far parts of the data pull the unknowns apart: the sandwich covariance, clustered in several ways.
 
-    What the model lacks is another thing in each case and to each sensor. At the solution their gradients add
-    up to zero, but none of them is zero; how large they are says how much they disagree. Cameron, Gelbach and
-    Miller (2011), without the term that they subtract, which is on the safe side. What is wrong alike for all
-    cases and sensors is not in it.
+    What the model lacks is another thing in each case, to each sensor, and in each phase of the motions:
+    while the robot speeds up, slows down, and as the ringing dies away. At the solution the gradients of the
+    parts add up to zero, but none of them is zero; how large they are says how much the parts disagree.
+    Cameron, Gelbach and Miller (2011), without the terms that they subtract, which is on the safe side. What
+    is wrong alike for all of them is not in it.
 
     Args:
-        gradient: of each case and sensor, (c, s, n).
+        groups: gradients of the parts, (parts, n) each.
         covariance: of noise alone, the inverse of the information, (n, n).
     """
-    of_cases, of_sensors = gradient.sum(1), gradient.sum(0)
-    return covariance @ (of_cases.T @ of_cases + of_sensors.T @ of_sensors) @ covariance
+    total = np.zeros_like(covariance)
+    for of_parts in groups:
+        parts = len(of_parts)
+        if parts > 1:
+            total += parts / (parts - 1.0) * of_parts.T @ of_parts
+    return covariance @ total @ covariance

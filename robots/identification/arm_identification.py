@@ -6,18 +6,29 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from robots.description.model import NUM_JOINTS, RobotModel
+from robots.description.variation import varied
 from robots.identification.arm_along_motion import ArmAlongMotion, ElasticArm
 from robots.identification.arm_fit import ArmFit, ArmProblem
-from robots.identification.arm_response import ArmResponse, Grid
+from robots.identification.arm_response import Grid
 from robots.identification.elastic_parameters import ElasticParameters
+from robots.identification.first_stage import (
+    COARSE,
+    NEAR,
+    arm_problem,
+    few,
+    moving,
+    sensor_floor,
+    solve_from_afar,
+)
 from robots.identification.motion import MotionCase, SensorPlace
 from robots.identification.recording import RecordedCase, check_axes, check_excitation, lag_of
 
-_FEW = 6  # cases of the first stages, where the unknowns are still far away
-_NEAR = 1e-3  # relative, at which a stage is left for the next one
+_FAR = 0.3  # of the logarithm of a spring, from which on the arm is linearised again where it then sags
+_PHASES = 4  # of a motion
+_PHASE = 0.1  # s, of the ringing
 _PLACES = (-1.0, -0.5, 0.0, 0.5, 1.0)  # within the play of a gear, tried
-# The first stages need no more; at the end the rule errs by a two-hundredth in a frequency of 80 Hz.
-_COARSE, _FINE = Grid(1, 2, 4), Grid(2, 1, 2)
+# At the end the rule errs by a two-hundredth in a frequency of 80 Hz; the first stages need less.
+_FINE = Grid(2, 1, 2)
 
 Progress = Callable[[float], None]
 
@@ -47,14 +58,20 @@ class _Data:
         sensors: list[SensorPlace],
         progress: Progress,
     ) -> None:
-        self.recorded, self.sensors, self._arm = recorded, sensors, arm
+        self.recorded, self.sensors = recorded, sensors
         self.motions: list[ArmAlongMotion] = []
-        for case in recorded:
-            self.motions.append(arm.along(case.at_lag(0.0)))
-            progress(len(self.motions) / len(recorded))
+        self.linearise(arm, progress)
         self.lags = np.zeros(len(recorded))
         self.rests = np.zeros((len(recorded), NUM_JOINTS))  # within the play, see `ArmResponse`
         self.cases: list[MotionCase] = []
+        self._offsets: list[np.ndarray] = []  # of the sensors at rest, (sensors, 3)
+
+    def linearise(self, arm: ElasticArm, progress: Progress) -> None:
+        """Takes an arm whose springs let it sag as it does."""
+        self._arm, self.motions = arm, []
+        for case in self.recorded:
+            self.motions.append(arm.along(case.at_lag(0.0)))
+            progress(len(self.motions) / len(self.recorded))
 
     def align(self, modelled: Sequence[np.ndarray]) -> None:
         """Brings the sensors to the robot's time, and takes their bias from the rest before the motion.
@@ -62,37 +79,42 @@ class _Data:
         Args:
             modelled: what sensors should show at the samples of the cases, (n, sensors, 3) each.
         """
-        self.cases = []
+        self.cases, self._offsets = [], []
         for i, (case, shown) in enumerate(zip(self.recorded, modelled, strict=True)):
             self.lags[i] = lag_of(case, shown, self.sensors, float(self.lags[i]))
             aligned = case.at_lag(float(self.lags[i]))
             resting = _resting(aligned)
             bias = np.nanmean(aligned.readings[resting] - shown[resting], axis=0)
+            self._offsets.append(bias)
             self.cases.append(replace(aligned, readings=aligned.readings - bias))
+
+    def shift(self, chosen: Sequence[int], samples: np.ndarray) -> None:
+        """Moves the sensors of some cases in time, by samples of the robot."""
+        for i, by in zip(chosen, samples, strict=True):
+            self.lags[i] += float(by) * self.recorded[i].period
+            offset = self._offsets[i]
+            aligned = self.recorded[i].at_lag(float(self.lags[i]))
+            self.cases[i] = replace(aligned, readings=aligned.readings - offset)
 
     def problem(
         self,
         parameters: ElasticParameters,
         ratio: np.ndarray,
         chosen: Sequence[int],
-        grid: Grid = _COARSE,
+        grid: Grid = COARSE,
+        horizon: float = np.inf,
     ) -> ArmProblem:
-        """Of some cases."""
-        cases = [self.cases[i] for i in chosen]
-        response = ArmResponse(
+        """Of some cases, up to a time in s after their motions."""
+        return arm_problem(
             [self.motions[i] for i in chosen],
-            cases,
+            [self.cases[i] for i in chosen],
             self.sensors,
             parameters,
             ratio,
             grid,
             self.rests[list(chosen)],
+            horizon,
         )
-        measured = np.full((len(response.kept), len(cases), 3 * len(self.sensors)), np.nan)
-        for column, case in enumerate(cases):
-            kept = response.kept[response.kept < len(case.theta)]
-            measured[: len(kept), column] = case.readings[kept].reshape(len(kept), -1)
-        return ArmProblem(response, measured, parameters)
 
     def bring_near(
         self, parameters: ElasticParameters, ratio: np.ndarray, p: np.ndarray, chosen: Sequence[int]
@@ -141,10 +163,20 @@ class _Data:
         return problem.evaluations
 
 
+def _phases(cases: Sequence[MotionCase], kept: np.ndarray) -> np.ndarray:
+    """To which part of a motion or of the ringing after it readings belong, (m, cases); -1 before it."""
+    found = np.empty((len(kept), len(cases)), dtype=int)
+    for column, case in enumerate(cases):
+        begin, end = moving(case)
+        within = np.floor(_PHASES * (kept - begin) / (end - begin))
+        after = _PHASES + np.floor((kept - end) * case.period / _PHASE)
+        found[:, column] = np.where(kept < end, np.maximum(within, -1), after)
+    return found
+
+
 def _resting(case: MotionCase) -> np.ndarray:
     """Samples before the motion at which the sensors were read, (n,) bool."""
-    speed = np.abs(case.rate).max(1)
-    begins = int(np.argmax(speed > 1e-3 * max(speed.max(), 1e-12)))
+    begins, _ = moving(case)
     resting = np.asarray(np.isfinite(case.readings).all((1, 2)))
     resting[max(begins, 1) :] = False
     if not resting.any():
@@ -188,38 +220,45 @@ def identify_arm(
     check_excitation([case.at_lag(0.0) for case in recorded], rigid, sensors)
     data.align(rigid)
     check_axes(data.cases, rigid, sensors)
-    floor = np.repeat([max(sensor.sigma, 1e-9) for sensor in sensors], 3)
-    few = list(range(0, len(recorded), max(1, len(recorded) // _FEW)))
+    floor, some = sensor_floor(sensors), few(len(recorded))
     everything = list(range(len(recorded)))
-    evaluations = 0
 
     # Linear gears first: where the springs are far off, play only makes valleys to be lost in.
     plain = ElasticParameters(arm, gear_parts=False)
-    p = plain.start.copy()
-    for steps in (8, 5):
-        problem = data.problem(plain, robot.gear_ratio, few)
-        p = problem.solve(p, problem.spread(p, floor), "soft_l1", steps, 5.0 * _NEAR)
-        evaluations += problem.evaluations + data.align_to(plain, robot.gear_ratio, p)
-    data.bring_near(plain, robot.gear_ratio, p, few)
+    problems: list[ArmProblem] = []
+
+    def until(horizon: float) -> ArmProblem:
+        problems.append(data.problem(plain, robot.gear_ratio, some, horizon=horizon))
+        return problems[-1]
+
+    p = solve_from_afar(until, plain.start.copy(), floor, lambda shift: data.shift(some, shift))
+    evaluations = sum(problem.evaluations for problem in problems)
+    evaluations += data.align_to(plain, robot.gear_ratio, p)
+    if np.abs(p[plain.of_kind("stiffness")]).max() > _FAR:
+        sagging = ElasticArm(varied(robot, plain.factors(p)), payload, sensors)
+        data.linearise(sagging, lambda share: tell(0.3 + 0.1 * share))
+    data.bring_near(plain, robot.gear_ratio, p, some)
     tell(0.4)
 
     parameters = ElasticParameters(arm, gear_parts, _turning(data.cases, robot.gear_ratio))
     found = parameters.start.copy()
     found[: len(p)] = p
-    for chosen, steps in ((few, 6), (everything, 3)):
+    for chosen, steps in ((some, 6), (everything, 3)):
         problem = data.problem(parameters, robot.gear_ratio, chosen)
-        found = problem.solve(found, problem.spread(found, floor), "soft_l1", steps, _NEAR)
+        found, _ = problem.solve(found, problem.spread(found, floor), steps, NEAR)
         spread = problem.spread(found, floor)
         evaluations += problem.evaluations + data.align_to(parameters, robot.gear_ratio, found)
         if gear_parts:
             evaluations += data.find_rests(parameters, robot.gear_ratio, found, spread)
         data.bring_near(parameters, robot.gear_ratio, found, everything)
-        tell(0.7 if chosen is few else 0.85)
+        tell(0.7 if chosen is some else 0.85)
     problem = data.problem(parameters, robot.gear_ratio, everything, _FINE)
-    found = problem.solve(found, problem.spread(found, floor), "soft_l1", 4, _NEAR)
+    found, shift = problem.solve(found, problem.spread(found, floor), 4, NEAR)
     tell(0.95)
     before = problem.readings(parameters.start)
-    fit = problem.fit(found, problem.spread(found, floor), evaluations)
+    phases = _phases(data.cases, problem.response.kept)
+    fit = problem.fit(found, shift, problem.spread(found, floor), phases, evaluations)
     after = problem.readings(found)
     times = problem.response.kept * recorded[0].period
-    return ArmIdentification(arm, data.cases, sensors, data.lags, fit, times, problem.measured, before, after)
+    lags = data.lags + shift * recorded[0].period
+    return ArmIdentification(arm, data.cases, sensors, lags, fit, times, problem.measured, before, after)

@@ -75,6 +75,7 @@ class ArmResponse:
         self._parameters, self._grid = parameters, grid
         self.samples = max(len(case.theta) for case in cases)
         self.kept = np.arange(0, self.samples, grid.kept)  # samples of the readings
+        self.step = grid.kept  # samples from one reading to the next
         period = cases[0].period
         self._h = period / grid.steps
         corner = np.pi * period * grid.filtered * np.repeat([sensor.bandwidth for sensor in sensors], 3)

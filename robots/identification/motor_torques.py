@@ -85,11 +85,11 @@ def springs_from_torques(
     ]
     motion = arm.along(case, base_step=1)
     response = ArmResponse([motion], [case], channels, parameters, robot.gear_ratio)
-    problem = ArmProblem(response, shown[response.kept][:, None], parameters)
+    problem = ArmProblem(response, shown[response.kept][:, None], parameters, has_own_clock=False)
     floor = np.maximum(_FLOOR * np.abs(shown).max(axis=0), 1e-9)
     p = parameters.start.copy()
     for steps in _STEPS:
-        p = problem.solve(p, _ALIKE * problem.spread(p, floor), "soft_l1", steps, _TOLERANCE)
+        p, _ = problem.solve(p, _ALIKE * problem.spread(p, floor), steps, _TOLERANCE)
     return varied(robot, parameters.factors(p))
 
 
