@@ -9,7 +9,7 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
-from robots.identification.arm_along_motion import ArmAlongMotion, ElasticArm
+from robots.identification.arm_along_motion import ArmAlongMotion
 from robots.identification.arm_fit import ArmProblem
 from robots.identification.arm_response import ArmResponse, Grid
 from robots.identification.elastic_parameters import ElasticParameters
@@ -21,67 +21,6 @@ _FEW = 6  # cases
 # s after the motions up to which readings count, and the largest number of steps.
 _HORIZONS = ((0.05, 15), (0.1, 10), (0.2, 10), (0.4, 8), (np.inf, 8))
 _MOVES = 1e-2  # of the largest speed of a case
-
-
-class FirstStage:
-    """The problem of the first stage with the times of the sensors as they were found, for any search."""
-
-    def __init__(
-        self,
-        arm: ElasticArm,
-        cases: Sequence[MotionCase],
-        sensors: list[SensorPlace],
-        ratio: np.ndarray,
-        known: np.ndarray,
-    ) -> None:
-        """Takes cases on the robot's time, and unknowns that are good enough to weigh the readings by.
-
-        Args:
-            arm: as it is believed to be.
-            cases: all of them.
-            sensors: in the order of their readings.
-            ratio: of the gears, (6,).
-            known: springs and times, the first of them are used.
-        """
-        self.parameters = ElasticParameters(arm, gear_parts=False)
-        chosen = few(len(cases))
-        self._cases = [cases[i] for i in chosen]
-        self._motions = [arm.along(case) for case in self._cases]
-        self._sensors, self._ratio = sensors, ratio
-        self._floor = sensor_floor(sensors)
-        self._problem = self._until(np.inf)
-        self._spread = self._problem.spread(known[: len(self.parameters)], self._floor)
-        speeds = np.array([np.abs(case.rate).max() for case in self._cases])
-        self._fast = speeds > np.median(speeds)
-        self.evaluations = 0
-
-    def solve(self, start: np.ndarray) -> np.ndarray:
-        """The unknowns by the gradient, from a start."""
-
-        def build(horizon: float) -> ArmProblem:
-            problem = self._until(horizon)
-            problems.append(problem)
-            return problem
-
-        problems: list[ArmProblem] = []
-        found = solve_from_afar(build, start, self._floor, lambda shift: None)
-        self.evaluations += sum(problem.evaluations for problem in problems)
-        return found
-
-    def costs(self, p: np.ndarray) -> np.ndarray:
-        """Of the slower and of the faster motions, (2,); see `ArmProblem.cost`."""
-        self.evaluations += 1
-        each = self._problem.cost(p, self._spread)
-        return np.array([each[~self._fast].sum(), each[self._fast].sum()])
-
-    def cost(self, p: np.ndarray) -> float:
-        """Of all motions."""
-        return float(self.costs(p).sum())
-
-    def _until(self, horizon: float) -> ArmProblem:
-        return arm_problem(
-            self._motions, self._cases, self._sensors, self.parameters, self._ratio, horizon=horizon
-        )
 
 
 def solve_from_afar(
