@@ -43,7 +43,7 @@ from experiments.cli.prepare import Prepared, prepare
 from experiments.cli.staging import PAGE, staged_file
 from experiments.comparison.compare import RunJob, run_job
 from experiments.report.style import law_title
-from experiments.station.guided_command import ask_before_moving, on_station
+from experiments.station.guided_command import ask_before_moving, check_measures_alone, on_station
 from robots.dynamics.newton_inverse import inverse_kinematics
 from systems.link.udp_channel import ChannelError
 
@@ -151,13 +151,7 @@ def _refuse_on_station(prepared: Prepared, masses: list[float]) -> None:
     station = prepared.scenario.station
     if masses != [station.payload]:
         raise ValueError("--loads is of a simulated station: set station.payload, and run it for each load")
-    if not station.link.has_camera:
-        raise ValueError("accept robot needs a camera: station.link.has_camera is false")
-    if station.overview.enabled:
-        raise ValueError(
-            "accept robot needs the planned speed: add --set station.overview.enabled=false, and see that "
-            "nobody is near"
-        )
+    check_measures_alone("accept robot", station)
 
 
 def _check_reach(prepared: Prepared, cycle: Cycle, cube: float) -> None:

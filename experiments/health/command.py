@@ -28,7 +28,7 @@ from experiments.health.history import History, read_history, write_history
 from experiments.health.station import check_on_station
 from experiments.health.study import DAY, NOISE, HealthStudy, Injected, deviations
 from experiments.report.plot_page import Section, html_table, write_plot_page
-from experiments.station.guided_command import ask_before_moving, on_station
+from experiments.station.guided_command import ask_before_moving, check_measures_alone, on_station
 from robots.description.model import RobotModel
 from robots.metrology.daily_check import TOOL, sizes_alone
 from systems.link.makers import LINK_NAMES
@@ -128,13 +128,7 @@ def _refuse_on_station(prepared: Prepared, checks: int, change: str | None) -> N
         raise ValueError("--change changes a simulated station; leave it out")
     if checks != 1:
         raise ValueError(f"--checks is of a simulated station, this one is checked once, got {checks}")
-    if not station.link.has_camera:
-        raise ValueError("health needs a camera: station.link.has_camera is false")
-    if station.overview.enabled:
-        raise ValueError(
-            "health does not watch for people: add --set station.overview.enabled=false, and see that nobody "
-            "is near"
-        )
+    check_measures_alone("health", station)
 
 
 def _verdict(history: History, alarms: list[dict[str, Any]]) -> str:

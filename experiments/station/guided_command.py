@@ -15,7 +15,7 @@ from diagrams.record.foxglove_server import FoxgloveServer
 from diagrams.record.log import RunLog
 from diagrams.record.run_record import RunRecord
 from diagrams.runs.real_time import RealTimeRecord
-from diagrams.scenario.scenario import load_scenario, scenario_text
+from diagrams.scenario.scenario import StationConfig, load_scenario, scenario_text
 from diagrams.scenario.scenario_file import OptionSetting
 from experiments.cli.console import BROKEN_OFF, count, progress_bar, refusing
 from experiments.cli.ending import asking
@@ -47,6 +47,25 @@ def on_station(
     name = scenario or (_CELLS.get(station or "", "cell") if is_guided else "misaligned")
     kind = station or (load_scenario(name, settings).station.link.kind if with_cell else None)
     return name, [*settings, *([OptionSetting("station.kind", kind, "--station")] if kind else [])]
+
+
+def check_measures_alone(who: str, station: StationConfig) -> None:
+    """Refuses a station where a measurement sees nothing, or would not stop for people that are watched for.
+
+    Args:
+        who: what measures, for the message.
+        station: of hardware.
+
+    Raises:
+        ValueError: if so.
+    """
+    if not station.link.has_camera:
+        raise ValueError(f"{who} needs a camera: station.link.has_camera is false")
+    if station.overview.enabled:
+        raise ValueError(
+            f"{who} does not watch for people: add --set station.overview.enabled=false, and see that nobody "
+            "is near"
+        )
 
 
 def ask_before_moving(console: Console, prepared: Prepared, is_agreed: bool) -> None:

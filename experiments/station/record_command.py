@@ -20,7 +20,7 @@ from experiments.cli.options import JsonOption, ScenarioOption, SetOption, WithC
 from experiments.cli.prepare import Prepared, prepare
 from experiments.cli.staging import TABLE, check_suffix
 from experiments.station.clients import station_clients
-from experiments.station.guided_command import ask_before_moving, on_station
+from experiments.station.guided_command import ask_before_moving, check_measures_alone, on_station
 from experiments.station.measured_table import MeasuredTable, read_configurations
 from robots.calibration.dwells import DwellRule
 from robots.measurement_design.clear_ways import ClearWays
@@ -67,13 +67,7 @@ def record_command(
         q = read_configurations(design)
         station = load_scenario(scenario, settings).station
         link = station.link
-        if station.overview.enabled:
-            raise ValueError(
-                "record does not watch for people: add --set station.overview.enabled=false, and see that "
-                "nobody is near"
-            )
-        if not link.has_camera:
-            raise ValueError("record needs a camera: station.link.has_camera is false")
+        check_measures_alone("record", station)
         name, changes = on_station(scenario, list(settings or []), link.kind, with_cell)
         prepared = prepare(name, changes, needs_path=False)
         run = GuidedMeasurement(prepared.scenario, prepared.robot, rule, speed)

@@ -79,7 +79,7 @@ def test_a_guided_robot_is_judged_by_what_its_camera_measures(tmp_path: Path):
         (["robot", "--cube", "0"], "--cube must be positive"),
         (["robot", "--with-cell", "--loads", "0,7"], "--loads is of a simulated station"),
         (["robot", "--with-cell", "--set", "station.link.has_camera=false"], "accept robot needs a camera"),
-        (["robot", "--with-cell", "--scenario", "cell-watched"], "accept robot needs the planned speed"),
+        (["robot", "--with-cell", "--scenario", "cell-watched"], "accept robot does not watch for people"),
         (["cameras", "--count", "4"], "--count must be at least 5, got 4"),
         (["cameras", "--cube", "1e5"], "a ball is not seen by two cameras"),
         (["cameras", "--lengths", "none.csv"], "none.csv"),
