@@ -1,14 +1,16 @@
 """How late this machine itself was: a run that ends early may have ended for want of a processor."""
 
 import os
+import time
 from pathlib import Path
 
 _LATE = 1e-3  # s, above what a wake-up takes
 _WORTH_SAYING = 0.01  # s by which this machine was late
+_CROWDED = 0.5  # share of the time with processes that wait, above which others may be late, too
 _SCHEDULED = Path("/proc/self/schedstat")  # ns on a processor, ns of waiting for one; Linux
-_STAT = Path(
-    "/proc/stat"
-)  # its first line: ticks of all processors by use, the eighth stolen by other guests
+_PRESSURE = Path("/proc/pressure/cpu")  # its first line ends with us in which some process waited; Linux
+# Its first line: ticks of all processors by use, the eighth stolen by other guests.
+_STAT = Path("/proc/stat")
 
 
 class HostLateness:
@@ -19,7 +21,8 @@ class HostLateness:
         self.messages = self.late = 0
         self.worst = self.worst_at = 0.0  # s
         self._since_message = 0.0  # s, the worst since the last message
-        self._waited, self._stolen = _waited(), _stolen()
+        self._waited, self._stolen, self._crowded = _waited(), _stolen(), _crowded()
+        self._began = time.monotonic()
 
     def note(self, late: float, at: float, is_message: bool = False) -> None:
         """Counts a message, or a delay.
@@ -55,9 +58,22 @@ class HostLateness:
             f"processor, {self.stolen:.1f} s stolen by other machines)"
         )
 
+    @property
+    def crowding(self) -> float:
+        """Share of the time since the start in which some process of this machine waited for a processor.
+
+        The other end of a wire that runs here, too, may be what waits. 0 where nobody counts.
+        """
+        passed = time.monotonic() - self._began
+        return min(1.0, (_crowded() - self._crowded) / passed) if passed > 0.0 else 0.0
+
     def reason(self, began: float) -> str:
         """What follows why a run ended, with times since ``began`` in s; empty if it was hardly late."""
-        return f"; {self.sentence(began)}" if self.worst > _WORTH_SAYING else ""
+        own = f"; {self.sentence(began)}" if self.worst > _WORTH_SAYING else ""
+        share = self.crowding
+        if share < _CROWDED:
+            return own
+        return f"{own}; processes of this machine waited for a processor {100.0 * share:.0f} % of the time"
 
 
 def _stolen() -> float:
@@ -71,4 +87,11 @@ def _waited() -> float:
     try:
         return 1e-9 * float(_SCHEDULED.read_text().split()[1])
     except (OSError, ValueError, IndexError):
+        return 0.0
+
+
+def _crowded() -> float:
+    try:
+        return 1e-6 * float(_PRESSURE.read_text().split("\n", 1)[0].rpartition("=")[2])
+    except (OSError, ValueError):
         return 0.0

@@ -1,6 +1,5 @@
 """Runs a virtual cell in real time behind the sockets of a controller and a camera."""
 
-import gc
 import heapq
 import itertools
 import time
@@ -10,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from diagrams.runs.undisturbed import undisturbed
 from diagrams.runs.virtual_cell import Exposure, VirtualCell
 from diagrams.scenario.scenario import Scenario
 from robots.description.model import RobotModel
@@ -112,17 +112,10 @@ class CellLoop:
         self._is_stopped = False
         self._frame = 0
 
+    @undisturbed()
     def run(self, until: Callable[[float], bool]) -> CellStatistics:
         """Runs in real time until ``until``, which is given the cell's time in s every cycle, says so."""
-        # A full search for garbage takes tens of milliseconds with Drake loaded.
-        gc.collect()
-        gc.freeze()
-        gc.disable()
-        try:
-            self._run(until)
-        finally:
-            gc.enable()
-            gc.unfreeze()
+        self._run(until)
         for name, link in self._links.items():
             self.statistics.faults[name] = dict(link.counts)
         self.statistics.controller = self.controller.counters()

@@ -29,6 +29,7 @@ class OwnLink:
     """The robot of a cell, without bytes: a report a cycle; a command is heard at the next one."""
 
     place, ports, epoch, trouble = "the next room", (0, 0), 1, ""
+    utilization = 0.0
 
     def __init__(self, scenario: Scenario) -> None:
         self.cell = VirtualCell(scenario, load_robot(scenario.robot))

@@ -61,7 +61,7 @@ def test_a_guided_robot_is_judged_by_what_its_camera_measures(tmp_path: Path):
     result = truetip(
         "accept", "robot", "--with-cell", "--law", "numerical_ik", "--cycles", "2", "--dwell", "0.5",
         "--set=reference.acceleration=4", "--set=station.link.run.timeout=5",
-        "--set=station.link.break_after=5",
+        "--set=station.link.break_after=5", "--set=servo.guard.stop_after=5",
         "--report", tmp_path / "r.html", "--json", tmp_path / "r.json",
     )  # fmt: skip
     assert result.exit_code == 0, result.output

@@ -39,14 +39,12 @@ def yielding(true: MatrixRobot) -> RobotModel:
 
 
 def loaded(true: MatrixRobot, theta: np.ndarray, mass: float) -> np.ndarray:
-    return kinematics(id(true), true, mass).forward(theta)
+    return kinematics(true, mass).forward(theta)
 
 
-_KEPT: dict[tuple[int, float], CompliantKinematics] = {}
-
-
-def kinematics(key: int, true: MatrixRobot, mass: float) -> CompliantKinematics:
-    return _KEPT.setdefault((key, mass), CompliantKinematics(yielding(true), mass))
+@cache
+def kinematics(true: MatrixRobot, mass: float) -> CompliantKinematics:
+    return CompliantKinematics(yielding(true), mass)
 
 
 @cache
