@@ -108,7 +108,7 @@ class HardwareLink:
         self.passed = self._period  # s from the report before the newest one to it, on the slower clock
         self.gap = 0.0  # s, the same without an upper limit
         self.clock_step = 0.0  # s by which the stamp of the newest report ran ahead of its arrival
-        self.host = HostLateness()
+        self.host = HostLateness(now is steady_time)
         self._ahead = _LATEST  # s, before the next report is due, at which to prepare for it
         self._heard = self._stamp = 0.0  # s of the steady clock and the controller's, of the newest message
         self._has_rested = True  # whether the robot has stood still since it was commanded, whatever was sent

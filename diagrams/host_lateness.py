@@ -1,5 +1,6 @@
 """How late this machine itself was: a run that ends early may have ended for want of a processor."""
 
+import math
 import os
 import time
 from pathlib import Path
@@ -16,13 +17,13 @@ _STAT = Path("/proc/stat")
 class HostLateness:
     """Counts the messages for which this process was late, and remembers the worst."""
 
-    def __init__(self) -> None:
-        """Starts to count."""
+    def __init__(self, keeps_time: bool = True) -> None:
+        """Starts to count; who waits does not matter to a run that does not keep the time of the clock."""
         self.messages = self.late = 0
         self.worst = self.worst_at = 0.0  # s
         self._since_message = 0.0  # s, the worst since the last message
         self._waited, self._stolen, self._crowded = _waited(), _stolen(), _crowded()
-        self._began = time.monotonic()
+        self._began = time.monotonic() if keeps_time else math.inf
 
     def note(self, late: float, at: float, is_message: bool = False) -> None:
         """Counts a message, or a delay.

@@ -33,6 +33,7 @@ def test_whoever_else_waited_for_a_processor_is_named(tmp_path, monkeypatch):
     assert host.reason(0.0) == ""
     (tmp_path / "cpu").write_text("some avg10=0.00 avg60=0.00 avg300=0.00 total=5005000\n")
     assert host.reason(0.0) == "; processes of this machine waited for a processor 100 % of the time"
+    assert HostLateness(keeps_time=False).reason(0.0) == ""
 
 
 def test_waiting_for_a_processor_is_counted_from_the_start():
