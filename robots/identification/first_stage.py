@@ -6,6 +6,7 @@ start, so that readings soon after the motions count first.
 """
 
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -56,13 +57,27 @@ def arm_problem(
     horizon: float = np.inf,
 ) -> ArmProblem:
     """The problem of some cases, with readings up to a time in s after the motions; see `ArmResponse`."""
+    ends = [_end(case, horizon) for case in cases]
+    cases = [
+        replace(case, theta=case.theta[:end], rate=case.rate[:end], readings=case.readings[:end])
+        for case, end in zip(cases, ends, strict=True)
+    ]
+    motions = [
+        replace(motion, load=motion.load[:end], readings=motion.readings[:end])
+        for motion, end in zip(motions, ends, strict=True)
+    ]
     response = ArmResponse(motions, cases, sensors, parameters, ratio, grid, rests)
     measured = np.full((len(response.kept), len(cases), 3 * len(sensors)), np.nan)
     for column, case in enumerate(cases):
-        end = min(len(case.theta), moving(case)[1] + horizon / case.period)
-        kept = response.kept[response.kept < end]
+        kept = response.kept[response.kept < len(case.theta)]
         measured[: len(kept), column] = case.readings[kept].reshape(len(kept), -1)
     return ArmProblem(response, measured, parameters)
+
+
+def _end(case: MotionCase, horizon: float) -> int:
+    """How many samples there are up to a time in s after the motion."""
+    samples = len(case.theta)
+    return samples if np.isinf(horizon) else min(samples, moving(case)[1] + round(horizon / case.period))
 
 
 def moving(case: MotionCase) -> tuple[int, int]:
