@@ -126,8 +126,13 @@ def write_tracker_page(path: Path, title: str, verdict: str, second: Fit, share:
         "wrong in their own way. The target is known only where the tool turns by more than 0.2 rad."
     )
     sections = [
-        Section("Along the motion", "In the world, after the adjustment.", along),
-        Section("How large", "", spread, 300),
+        Section(
+            "Along the motion",
+            "In the world, after the adjustment. Noise about zero is left where both see the same; a wave is "
+            "something that one of them sees and the other does not.",
+            along,
+        ),
+        Section("How large", "How many samples are how far apart.", spread, 300),
         Section("What was adjusted", note, html_table(("what", "value"), _rows(second, share))),
     ]
     write_plot_page(path, f"Second instrument, {title}", verdict, sections)

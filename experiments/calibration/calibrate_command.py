@@ -31,7 +31,7 @@ from experiments.calibration.report import calibration_json, print_calibration
 from experiments.calibration.urdf_option import urdf_robot, urdf_sag
 from experiments.cli.console import print_files, print_note, progress_bar, refusing
 from experiments.cli.json_output import human_console, json_output
-from experiments.cli.option_limits import at_least
+from experiments.cli.option_limits import at_least, one_of
 from experiments.cli.options import JsonOption, OutOption, RobotOption, ScenarioOption, SetOption
 from experiments.cli.prepare import Prepared, check, prepare, simulated_only
 from experiments.cli.staging import YAML, staged_file, staged_folder
@@ -235,8 +235,8 @@ class _Wanted:
                         f"{option} is for simulated measurements; with "
                         f"{'--measurements' if self.measurements else '--recording'} it has no effect"
                     )
-        if self.count is not None:
-            at_least("--count", 5, self.count)
+        one_of("--criterion", NAMES, self.criterion)
+        at_least("--count", 5, self.count)
         noise_option(self.noise, has_rotation=False)  # what was measured is not known yet
         names_of(self.joint_errors)
 

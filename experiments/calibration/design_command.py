@@ -15,6 +15,7 @@ from rich.markup import escape
 from experiments.calibration.design_program import ProgramFiles
 from experiments.cli.console import print_files, progress_bar, refusing
 from experiments.cli.json_output import human_console, json_output
+from experiments.cli.option_limits import one_of
 from experiments.cli.options import JsonOption, PictureOption
 from experiments.cli.prepare import noted_robot
 from experiments.cli.staging import PAGE, TABLE, staged_file
@@ -104,6 +105,7 @@ def design_command(
     """Choose the measurement configurations that determine the robot's errors best."""
     human = human_console(json_file)
     with json_output(json_file) as output, refusing(ValueError, OSError), ExitStack() as stack:
+        one_of("--criterion", NAMES, criterion)
         run = ProgramFiles(program, out, settle, trigger)
         page = stack.enter_context(staged_file(report, *PAGE))
         run_stage = run.staged(stack)

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
+from experiments.cli.option_limits import one_of
 from experiments.cli.staging import staged_folder
 from experiments.report.files import write_text
 from robots.programs.measurement_run import RUNS, MeasurementRun, table_to_fill
@@ -32,8 +33,7 @@ class ProgramFiles:
         """
         if language is None and (settle is not None or trigger):
             raise ValueError("--settle and --trigger need --program")
-        if language is not None and language not in RUNS:
-            raise ValueError(f"--program must be one of {', '.join(RUNS)}, got '{language}'")
+        one_of("--program", RUNS, language)
         self._language, self._settle, self._trigger = language, 0.5 if settle is None else settle, trigger
         path = Path(beside or _DEFAULT)
         self._folder, self._stem = path.parent, path.stem

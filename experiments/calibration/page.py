@@ -49,7 +49,8 @@ def write_calibration_page(
     sections = [*_accuracy(study, path), *_residuals(study), *_parameters(study)]
     q, rows = study.sets.calibration.q, study.sets.calibration.rows
     names = [f"row {row}" for row in rows]
-    sections.append(Section("Measured configurations", "", tips_figure(study.nominal, q, names), 560))
+    note = "Where the tool was in the measured rows; what is far from all of them was extrapolated."
+    sections.append(Section("Measured configurations", note, tips_figure(study.nominal, q, names), 560))
     left_out = [[each["file"], str(each["row"]), each["why"]] for each in rows_left_out(study, problems)]
     if left_out:
         sections.append(Section("Rows left out", "", html_table(["file", "row", "why"], left_out)))
@@ -59,17 +60,20 @@ def write_calibration_page(
 def _accuracy(study: CalibrationStudy, path: Mapping[str, Any] | None) -> list[Section]:
     """How accurate the robot was and is."""
     head = ["", "", *AXES]
-    note = "Mean, largest and 90 % absolute errors on configurations that were not used before."
     sections = []
-    if study.before is not None:
-        sections.append(Section("Validation", note, html_table(head, validation_rows(study))))
     if study.sets.validation is not None:
-        note = "Distances between measured and predicted positions on the validation set."
+        note = (
+            "Distances between measured and predicted positions on the validation set: the calibrated robot "
+            "should be far left of the nominal one."
+        )
         sections.append(Section("How the errors are spread", note, spread_figure(study), 320))
+    if study.before is not None:
+        note = "Mean, largest and 90 % absolute errors on configurations that were not used before."
+        sections.append(Section("Validation", note, html_table(head, validation_rows(study))))
     if path:
         note = "No camera: the path is planned with the nominal and with the calibrated robot. True errors."
-        sections.append(Section("Path", note, html_table(head, path_rows(path))))
-        sections.append(Section("Distance from the path", "", path_figure(path), 360))
+        sections.append(Section("Distance from the path", note, path_figure(path), 360))
+        sections.append(Section("Path", "The same errors.", html_table(head, path_rows(path))))
     return sections
 
 
@@ -86,7 +90,12 @@ def _residuals(study: CalibrationStudy) -> list[Section]:
     white = standardised(found)[kept].ravel()
     return [
         Section("Error of every pose", note, table),
-        Section("Errors in space", "", vectors_figure(found.robot, points, before[kept, -3:], after), 560),
+        Section(
+            "Errors in space",
+            "From each measured position along its error, drawn longer than it is, before and after.",
+            vectors_figure(found.robot, points, before[kept, -3:], after),
+            560,
+        ),
         Section(
             "What is left against the joints",
             "Positions along the axes of the world. A wave over a joint is something that the model lacks.",

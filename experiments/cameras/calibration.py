@@ -132,9 +132,14 @@ def write_calibration_page(path: Path, title: str, found: CamerasFound) -> None:
         "with their standard deviations."
     )
     sections = [
+        Section(
+            "Length of the wand",
+            "In each place, by triangulation alone: the narrower about zero, the better.",
+            _lengths(found),
+            320,
+        ),
         Section("Cameras", note, html_table(HEAD, _rows(found))),
         Section("Where they stand", note_map, _map(found), 620),
-        Section("Length of the wand", "In each place, by triangulation alone.", _lengths(found), 320),
         Section("Lenses", note_lenses, html_table(*_lens_table(found))),
     ]
     write_plot_page(path, f"Cameras, {title}", verdict(found), sections)

@@ -58,12 +58,9 @@ CellOption = Annotated[
 
 @cameras_app.command("calibrate")
 def calibrate_cameras_command(
-    images: Annotated[
+    recording: Annotated[
         str,
-        typer.Option(
-            metavar="FILE.csv",
-            help="Observations of wand and L-frame, or simulated.",
-        ),
+        typer.Option(metavar="FILE.csv", help="Observations of wand and L-frame, or simulated."),
     ] = SIMULATED,
     cell: CellOption = "probst",
     wand_length: Annotated[
@@ -79,8 +76,11 @@ def calibrate_cameras_command(
         ),
     ] = SimulatedWandRun.pixel_sigma,
     seed: Annotated[int, typer.Option(metavar="N", help="Seed of the simulated noise and motion.")] = 0,
-    observations: Annotated[
-        str | None, typer.Option(metavar="FILE.csv", help="Write the observations, for --images.")
+    write_recording: Annotated[
+        str | None,
+        typer.Option(
+            "--write-recording", metavar="FILE.csv", help="Keep what was observed, for --recording."
+        ),
     ] = None,
     write: Annotated[
         str | None, typer.Option(metavar="FILE.yaml", help="The cell with the calibrated cameras.")
@@ -96,21 +96,21 @@ def calibrate_cameras_command(
         nominal, kit = load_cell(cell), CalibrationKit(wand_length_mm=wand_length)
         names = [camera.name for camera in nominal.cameras]
         page = stack.enter_context(staged_file(out, *PAGE))
-        seen_file = stack.enter_context(staged_file(observations, *TABLE)) if observations else None
+        seen_file = stack.enter_context(staged_file(write_recording, *TABLE)) if write_recording else None
         cell_file = stack.enter_context(staged_file(write, *YAML)) if write else None
         stack.enter_context(output.staged())
         # The camera system's own frame is that of the L-frame.
         start, truth = nominal.camera_model(nominal.base.pose()), None
-        if images == SIMULATED:
+        if recording == SIMULATED:
             truth = start
             run = _simulated(nominal, kit, truth, SimulatedWandRun(places, pixel_sigma=pixel_sigma), seed)
             start = replace(start, radial=0.0 * start.radial, tangential=0.0 * start.tangential)
         else:
-            run = read_observations(images, names, len(kit.p_Q))
+            run = read_observations(recording, names, len(kit.p_Q))
         started = time.perf_counter()
         calibration = calibrate_with_wand(run, kit, start, names, pixel_sigma)
         found = CamerasFound(calibration, names, kit, time.perf_counter() - started, truth)
-        title = f"{nominal.name}, {'simulated' if truth else Path(images).name}"
+        title = f"{nominal.name}, {'simulated' if truth else Path(recording).name}"
         write_calibration_page(page, title, found)
         if cell_file:
             source = f"truetip cameras calibrate, {len(calibration.wand_lengths)} places of the wand"
@@ -119,7 +119,7 @@ def calibrate_cameras_command(
             write_text(seen_file, observation_text(run, names))
         output.write(calibration_json(found))
     print_calibration(human, found)
-    print_files(human, out, write, observations)
+    print_files(human, out, write, write_recording)
 
 
 def _simulated(

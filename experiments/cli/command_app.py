@@ -84,6 +84,12 @@ def _plainly(found: re.Match[str]) -> str:
     return f"{found.group(1)} must be {_KINDS.get(found.group(2), found.group(2))}"
 
 
+def _given(error: Any) -> str:
+    """What was typed in place of a value, as the check behind the error keeps it."""
+    checked = getattr(error.__cause__, "errors", None)
+    return f", got '{checked()[0]['input']}'" if checked else ""
+
+
 def _takers(file: str, options: list[Any]) -> list[str]:
     """Names of the options that take a file of this kind."""
     suffix = Path(file).suffix
@@ -108,7 +114,7 @@ def _line(error: Any, otherwise: str = "truetip") -> str:
     elif name := _NO_COMMAND.search(message):
         message = f"no command {name.group(1)}{did_you_mean(name.group(1), getattr(command, 'commands', {}))}"
     else:
-        message = _IN_OTHER_WORDS.sub(_plainly, message)
+        message = _IN_OTHER_WORDS.sub(lambda found: _plainly(found) + _given(error), message)
         message = message[:1].lower() + message[1:]
     where = path.removeprefix("truetip").strip()
     return f"{where}: {message} ({path} --help)" if where else f"{message} ({path} --help)"

@@ -11,8 +11,9 @@ FORMER: Mapping[str, Mapping[str, str]] = {
     "accept tracker": _PAGE,
     "calibrate": {"--cell": "--instruments"},
     "cameras budget": _PAGE,
-    "cameras calibrate": _PAGE,
+    "cameras calibrate": {**_PAGE, "--images": "--recording", "--observations": "--write-recording"},
     "cameras study": _PAGE,
+    "cell": {"--images": "--show-images"},
     "compensate": _FILE,
     "design": _FILE,
     "diagram": _FILE,
@@ -22,6 +23,7 @@ FORMER: Mapping[str, Mapping[str, str]] = {
     "invert": _PAGE,
     "modes": {**_PAGE, "--mode": "--shape"},
     "record": {**_FILE, "--mcap": "--write-recording"},
+    "robots import": {"--base": "--base-link", "--tip": "--tip-link"},
     "watch": _PAGE,
     "zeros": _PAGE,
 }

@@ -1,6 +1,21 @@
-"""Range checks of numeric options; errors name the option."""
+"""Checks of options: ranges of numbers, choices of names; errors name the option."""
 
 import math
+from collections.abc import Iterable
+
+from robots.configuration.suggestion import did_you_mean
+
+
+def one_of(option: str, names: Iterable[str], given: str | None) -> None:
+    """Refuses a name that there is not, with the one that was probably meant; None was not given.
+
+    Raises:
+        ValueError: if it is not among the names.
+    """
+    names = list(names)
+    if given is not None and given not in names:
+        guess = did_you_mean(given, names)
+        raise ValueError(f"{option} must be one of {', '.join(names)}, got '{given}'{guess}")
 
 
 def at_least(option: str, least: int, given: int | None) -> None:

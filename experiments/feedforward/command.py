@@ -11,7 +11,7 @@ from rich.table import Table
 
 from experiments.cli.console import count, print_files, progress_bar, refusing
 from experiments.cli.json_output import human_console, json_output
-from experiments.cli.option_limits import at_least
+from experiments.cli.option_limits import at_least, one_of
 from experiments.cli.options import (
     GridOption,
     JobsOption,
@@ -69,8 +69,7 @@ def feedforward_command(
     human = human_console(json_file)
     with json_output(json_file) as output, refusing(ValueError, OSError), ExitStack() as stack:
         at_least("--jobs", 1, jobs)
-        if plant not in (None, *PLANTS):
-            raise ValueError(f"--plant must be one of {', '.join(PLANTS)}, got '{plant}'")
+        one_of("--plant", PLANTS, plant)
         model, realistic = noted_robot(human, robot), _driven(robot, plant)
         mass = model.payload.largest_mass if payload is None else payload
         page = stack.enter_context(staged_file(report, *PAGE))

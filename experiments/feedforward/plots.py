@@ -132,6 +132,12 @@ def write_study_page(path: Path, study: FeedforwardStudy) -> None:
     """All of it as a page that opens offline."""
     sections = [
         Section(
+            "Distance from the rectangle",
+            "Of the true tip, without a camera; the feedforward has to do it alone. The lower, the better.",
+            deviation_figure(study.path),
+            380,
+        ),
+        Section(
             "Rectangle in space",
             "How far the tip is from its path: mean and maximum as ratios to the rigid model, the maximum in "
             "mm, the sag at rest before it, and how far the tip leaves that when it moves; last, the time "
@@ -139,18 +145,17 @@ def write_study_page(path: Path, study: FeedforwardStudy) -> None:
             html_table(TABLE_HEAD, table_rows(study)),
         ),
         Section(
-            "Distance from the rectangle",
-            "Of the true tip, without a camera; the feedforward has to do it alone.",
-            deviation_figure(study.path),
+            "Distance from the rectangle with fast edges",
+            "A quarter of the size, the edges as fast as the joints can go: what excites the structure, "
+            "ripples where it swings.",
+            deviation_figure(study.fast),
             380,
         ),
         Section(
             "Fast edges",
-            "A quarter of the size, the edges as fast as the joints can go: what excites the structure. The "
-            "dynamic part is how far the tip goes from where its sag at rest has it.",
+            "The dynamic part is how far the tip goes from where its sag at rest has it.",
             html_table(TABLE_HEAD[:-1], [row[:-1] for row in table_rows(study, is_fast=True)]),
         ),
-        Section("Distance from the rectangle with fast edges", "", deviation_figure(study.fast), 380),
     ]
     for angle in study.criterion:
         sections += [

@@ -173,7 +173,7 @@ def _write_page(
     for i, name in enumerate(history.cameras):
         turn = 1e6 * np.linalg.norm(history.rotations[:, i], axis=1)
         cameras.add_trace(go.Scatter(x=day, y=turn, mode="lines+markers", name=name))
-    for figure, unit in ((joints, "mdeg"), (tool, "mm"), (cameras, "microradians")):
+    for figure, unit in ((joints, "change in mdeg"), (tool, "shift in mm"), (cameras, "turn in µrad")):
         figure.update_layout(xaxis={"title": "day"}, yaxis={"title": unit})
     rows = [[alarm["kind"], _in_words(alarm)] for alarm in alarms]
     sections = [

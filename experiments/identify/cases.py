@@ -66,7 +66,7 @@ class MotionCases:
 
 def load_cases(path: Path, robot: RobotModel) -> MotionCases:
     """Reads a file. Raises ConfigurationError, with file and line, if it is missing or wrong."""
-    return _with_sensors(typed(read_nodes(path, f"cases {path}"), MotionCases), robot)
+    return _with_sensors(typed(read_nodes(path, f"--motions {path}"), MotionCases), robot)
 
 
 def default_cases(robot: RobotModel) -> MotionCases:

@@ -46,11 +46,13 @@ def read_recording(path: Path, columns: Path | None = None, needs_sensors: bool 
         TextTableError: if the table cannot be read.
         RecordingError: if columns are missing, hold no numbers, or times do not go on evenly.
         ValueError: if it is no MCAP file.
+        OSError: if a file cannot be read.
     """
     if path.suffix.lower() == MCAP:
         if columns is not None:
             raise RecordingError(f"{path}: an MCAP file needs no column map: it says what it holds")
         return read_mcap(path, needs_sensors)
+    path.stat()  # a table that is not there is named before its map
     mapped = columns or path.with_suffix(".yaml")
     node = read_nodes(mapped, f"column map {mapped}")
     plan = typed(node, RecordingMap)

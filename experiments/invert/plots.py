@@ -111,13 +111,14 @@ def write_invert_page(path: Path, study: InvertStudy) -> None:
             "springs of the model become those that explain the torques of its motors."
         )
     sections = [
-        Section("All motions", text, html_table(TABLE_HEAD, table_rows(study))),
         Section(
             "Ringing of the wrist",
-            f"After the motion from axes 2 and 3 at {posture(study.poses[study.shown])}.",
+            f"After the motion from axes 2 and 3 at {posture(study.poses[study.shown])}: the lower, the "
+            "calmer.",
             ringing_figure(study),
             420,
         ),
+        Section("All motions", text, html_table(TABLE_HEAD, table_rows(study))),
         Section(
             "What the motors do beside those of a rigid robot",
             "Less what they do at rest. The stable inverse moves them before the motion begins, which no "

@@ -6,6 +6,7 @@ from itertools import pairwise
 import numpy as np
 
 from experiments.feedforward.rectangle import rectangle, working_position
+from robots.configuration.suggestion import did_you_mean
 from robots.description.model import NUM_JOINTS, RobotModel
 from robots.dynamics.newton_inverse import InverseSolver, inverse_kinematics
 from robots.kinematics.analytic_inverse import JointLimitError, UnreachableError
@@ -62,6 +63,7 @@ def legs_of(robot: RobotModel, path: str) -> list[Leg]:
     else:
         raise ValueError(
             f"--path must be {RECTANGLE}, {JOINTS} or a file that ends in {', '.join(SUFFIXES)}, got '{path}'"
+            f"{did_you_mean(path, (RECTANGLE, JOINTS))}"
         )
     for leg in legs:
         try:

@@ -103,7 +103,7 @@ def motion_figure(result: LegResult) -> go.Figure:
             trace = go.Scatter(x=1e3 * kept.run.times[moving], y=torque, line=style, legendgroup=name)
             figure.add_trace(trace.update(showlegend=False, name=name), row=joint + 2, col=1)
             figure.update_yaxes(title=f"gear {joint + 1} in N m", row=joint + 2, col=1)
-    figure.update_yaxes(title="speed in % of path/s", row=1, col=1)
+    figure.update_yaxes(title="path in %/s", row=1, col=1)
     return figure.update_xaxes(title="time in ms", row=4)
 
 
@@ -124,16 +124,16 @@ def write_plan_page(path: Path, plan: Plan, results: list[LegResult]) -> None:
         "plant. C adds up how much the wrist still accelerates in the 0.9 s after the motion, Reiner (2010), "
         "eq. (6.1), in m/s."
     )
-    sections = [Section("All legs", text, html_table(TABLE_HEAD, table_rows(plan, results)))]
+    sections: list[Section] = []
     if plan.objective == "front":
         note = "The least energy that the planner finds for motions of this duration."
         sections.append(Section("Time against energy", note, front_figure(results), 420))
     for each in results:
         note = "Share of each limit that motors and gears of the plant use; red where it binds."
         sections.append(Section(f"Limits, {each.leg.name}", note, binding_figure(plan, each), 460))
-        sections.append(
-            Section(f"Motion, {each.leg.name}", "Gears as measured in the plant.", motion_figure(each), 760)
-        )
+        note = "Speed along the path, usual and planned, and torques of the gears as measured in the plant."
+        sections.append(Section(f"Motion, {each.leg.name}", note, motion_figure(each), 760))
+    sections.insert(1, Section("All legs", text, html_table(TABLE_HEAD, table_rows(plan, results))))
     title = f"Plan, {plan.robot.name}, {plan.payload:g} kg, {plan.path}"
     write_plot_page(path, title, verdict(plan, results), sections)
 

@@ -4,6 +4,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from experiments.cli.option_limits import one_of
 from experiments.plan.study import LegResult
 from robots.description.model import RobotModel
 from robots.kinematics.forward import Kinematics
@@ -13,8 +14,7 @@ from robots.programs.planned_moves import MOVES, PlannedMove
 
 def check_language(language: str | None) -> None:
     """Raises ValueError if no controller speaks it."""
-    if language is not None and language not in MOVES:
-        raise ValueError(f"--program must be one of {', '.join(MOVES)}, got '{language}'")
+    one_of("--program", MOVES, language)
 
 
 def program_files(language: str, robot: RobotModel, results: Sequence[LegResult]) -> dict[str, str]:

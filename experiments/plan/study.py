@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from experiments.cli.option_limits import one_of
 from experiments.plan.free_leg import free_leg
 from experiments.plan.legs import Leg, legs_of
 from experiments.plan.plant_run import PlantDriver
@@ -88,8 +89,7 @@ def study_plan(plan: Plan, progress: Callable[[float], None] | None = None) -> l
     Raises:
         ValueError: if something that is asked for does not exist, or a leg is impossible; with the place.
     """
-    if plan.objective not in OBJECTIVES:
-        raise ValueError(f"--objective must be one of {', '.join(OBJECTIVES)}, got '{plan.objective}'")
+    one_of("--objective", OBJECTIVES, plan.objective)
     legs = legs_of(plan.robot, plan.path)
     ready: list[_Ready] = []
     results: list[LegResult] = []

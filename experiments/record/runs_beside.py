@@ -126,7 +126,7 @@ def folder_names(one: Path, other: Path) -> list[str]:
 
 
 def _figure(kept: list[KeptComparison], names: list[str]) -> go.Figure:
-    figure = make_subplots(2, 1, shared_xaxes=True, vertical_spacing=0.06)
+    figure = make_subplots(2, 1, shared_xaxes=True, vertical_spacing=0.08)
     colors = law_colors(dict.fromkeys(law for each in kept for law in each.errors))
     for each, folder, dash in zip(kept, names, _DASHES, strict=True):
         for law, (time, distance, angle) in each.errors.items():

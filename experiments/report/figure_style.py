@@ -6,6 +6,7 @@ import plotly.graph_objects as go
 COLORS = ("#0f7cc0", "#d55e00", "#009e73", "#c2739f", "#8a6d00", "#5b6675", "#7a5195", "#56b4e9")
 INK = "#6a7585"  # of words and numbers; the script of the page sets that of its colour scheme
 _GRID, _LINE = "rgba(128,140,156,0.25)", "rgba(128,140,156,0.6)"
+_GRID_3D = "#a3adba"  # hairlines, of which translucent ones are not seen
 
 _AXIS = {
     "gridcolor": _GRID,
@@ -15,9 +16,11 @@ _AXIS = {
     # 1e-10 as 10 to a power and not as "100p".
     "exponentformat": "power",
     "title": {"standoff": 8},
+    # So that the first numbers of two axes do not touch in their corner.
+    "ticklabelstandoff": 4,
 }
 _AXIS_3D = {
-    "gridcolor": _LINE,
+    "gridcolor": _GRID_3D,
     "zerolinecolor": _LINE,
     "linecolor": _LINE,
     "showbackground": False,

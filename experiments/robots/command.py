@@ -35,10 +35,18 @@ def import_command(
     urdf: Annotated[str, typer.Argument(metavar="FILE.urdf", help="A URDF, macros expanded.")],
     base: Annotated[
         str,
-        typer.Option(metavar="LINK", help="Its frame is the world.", show_default="the one that carries all"),
+        typer.Option(
+            "--base-link",
+            metavar="LINK",
+            help="Its frame is the world.",
+            show_default="the one that carries all",
+        ),
     ] = "",
     tip: Annotated[
-        str, typer.Option(metavar="LINK", help="Its frame is the tool.", show_default="tool0, or the end")
+        str,
+        typer.Option(
+            "--tip-link", metavar="LINK", help="Its frame is the tool.", show_default="tool0, or the end"
+        ),
     ] = "",
     package: Annotated[
         list[str] | None,

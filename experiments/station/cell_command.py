@@ -16,11 +16,13 @@ from rich.console import Console
 
 from diagrams.runs.cell_loop import CellLoop, CellStatistics
 from diagrams.runs.shown_cell import ShownCell
+from diagrams.scenario.scenario_file import OptionSetting
 from experiments.cli.console import count, refusing
 from experiments.cli.options import RobotOption, ScenarioOption, SetOption, json_option
 from experiments.cli.prepare import prepare
 from experiments.cli.staging import staged_file
 from experiments.report.files import write_json
+from robots.configuration.suggestion import did_you_mean
 from systems.cell.network_faults import FaultConfig
 
 
@@ -57,7 +59,7 @@ def cell_command(
     images: Annotated[
         int | None,
         typer.Option(
-            "--images",
+            "--show-images",
             metavar="PORT",
             help="Show what the cameras of station.overview see, http://127.0.0.1:PORT/CAMERA for each.",
         ),
@@ -86,7 +88,7 @@ def cell_command(
         shown = None
         if images is not None:
             if not prepared.scenario.station.overview.enabled:
-                raise ValueError("--images needs cameras of the whole cell: --scenario cell-watched")
+                raise ValueError("--show-images needs cameras of the whole cell: --scenario cell-watched")
             shown = ShownCell(prepared.scenario, prepared.nominal_robot, images)
             stack.callback(shown.close)
         camera = stack.enter_context(link.camera.virtual_server(prepared.scenario.station.camera.period))
@@ -127,19 +129,21 @@ def cell_command(
     print_statistics(human, statistics)
 
 
-def fault_settings(faults: str | None) -> list[str]:
+def fault_settings(faults: str | None) -> list[OptionSetting]:
     """``loss=0.05,jitter=0.003`` as settings of a scenario.
 
     Raises:
         ValueError: if a part is no NAME=VALUE with a known name.
     """
     known = [entry.name for entry in fields(FaultConfig)]
-    parts = [part.strip() for part in (faults or "").split(",") if part.strip()]
-    for part in parts:
-        name, equals, _ = part.partition("=")
-        if not equals or name.strip() not in known:
-            raise ValueError(f"--faults takes NAME=VALUE with names {', '.join(known)}, got '{part}'")
-    return [f"station.faults.{part}" for part in parts]
+    settings = []
+    for part in filter(None, map(str.strip, (faults or "").split(","))):
+        name, equals, value = map(str.strip, part.partition("="))
+        if not equals or name not in known:
+            guess = did_you_mean(name, known)
+            raise ValueError(f"--faults takes NAME=VALUE with names {', '.join(known)}, got '{part}'{guess}")
+        settings.append(OptionSetting(f"station.faults.{name}", value, "--faults"))
+    return settings
 
 
 def print_statistics(console: Console, statistics: CellStatistics) -> None:

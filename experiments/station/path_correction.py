@@ -20,6 +20,7 @@ from diagrams.runs.virtual_cell import CellRecord
 from diagrams.scenario.scenario import scenario_text
 from experiments.cli.console import BROKEN_OFF, print_files, progress_bar, refusing
 from experiments.cli.ending import asking
+from experiments.cli.option_limits import one_of
 from experiments.cli.prepare import Prepared
 from experiments.cli.staging import staged_folder
 from experiments.report.files import write_json
@@ -57,8 +58,7 @@ def refuse_mode(mode: str, prepared: Prepared, given: dict[str, Any]) -> None:
     Raises:
         ValueError: one line.
     """
-    if mode not in MODES:
-        raise ValueError(f"--mode must be one of {', '.join(MODES)}, got '{mode}'")
+    one_of("--mode", MODES, mode)
     if mode == JOINT:
         return
     station = prepared.scenario.station

@@ -6,7 +6,7 @@ import numpy as np
 
 from experiments.report.plot_page import Section, html_table
 from experiments.zeros.example import Example
-from experiments.zeros.plots import faster_zeros, plane_figure
+from experiments.zeros.plots import plane_figure, zeros_note
 from experiments.zeros.study import one_json
 from robots.dynamics.modal.sid_file import read_sid
 
@@ -39,7 +39,7 @@ def body_zeros(path: Path, load: float) -> Example:
     head = ("node", "from the joint in m", "slowest zero in the right half-plane in 1/s")
     sections = [
         Section("Nodes", note, html_table(head, rows)),
-        Section("Zeros of the last node", faster_zeros(last).strip(), plane_figure(last)),
+        Section("Zeros of the last node", zeros_note(last), plane_figure(last)),
     ]
     numbers = {
         "body": path.name,

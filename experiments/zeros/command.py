@@ -21,7 +21,7 @@ from experiments.cli.staging import PAGE, staged_file
 from experiments.report.plot_page import Section, write_plot_page
 from experiments.zeros.body import body_zeros
 from experiments.zeros.examples import EXAMPLES, example_named
-from experiments.zeros.plots import faster_zeros, plane_figure, workspace_figure
+from experiments.zeros.plots import plane_figure, workspace_figure, zeros_note
 from experiments.zeros.study import ZeroStudy, study_zeros, zeros_json
 
 
@@ -98,7 +98,7 @@ def _write_study(page: Path, study: ZeroStudy, verdict: str) -> None:
     sections.append(
         Section(
             "Zeros of the middle position",
-            f"Poles of the exact inverse.{faster_zeros(middle)}",
+            zeros_note(middle),
             plane_figure(middle),
         )
     )

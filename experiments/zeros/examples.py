@@ -5,6 +5,8 @@ from dataclasses import replace
 
 import numpy as np
 
+from experiments.cli.console import count
+from experiments.cli.option_limits import one_of
 from experiments.report.plot_page import Section, html_table
 from experiments.zeros import beam_arm as elastic_arm
 from experiments.zeros import low_pass
@@ -22,11 +24,11 @@ from experiments.zeros.linear_arm import TIMES as ARM_TIMES
 from experiments.zeros.plots import (
     arm_locus_figure,
     beam_figure,
-    faster_zeros,
     gain_figure,
     locus_figure,
     plane_figure,
     time_figure,
+    zeros_note,
 )
 from experiments.zeros.spatial_arm import spatial_arm
 from experiments.zeros.study import BEAM_MODES, one_json, two_joint_arm_limit, two_joint_arm_zeros
@@ -50,7 +52,7 @@ def two_joint_arm() -> Example:
     numbers = {**one_json(zeros), "x_l_m": 0.5, "largest_stable_x_l_m": limit}
     note = "Reiner (2010), figure 3.9: a pair goes to infinity and comes back on the real axis."
     sections = [
-        Section("Zeros, x_l = 0.5 m", faster_zeros(zeros).strip(), plane_figure(zeros)),
+        Section("Zeros, x_l = 0.5 m", zeros_note(zeros), plane_figure(zeros)),
         Section("Zeros by the place of the output", note, arm_locus_figure(two_joint_arm_zeros), 420),
     ]
     return Example(numbers, verdict, sections)
@@ -69,12 +71,21 @@ def beam() -> Example:
         f"its length with one mode, {three:.3f} with three; for its end, if the model leaves out what the "
         "turning of the joint does to the modes."
     )
-    head = ("boundary", *(f"{n} modes" for n in BEAM_MODES))
+    head = ("boundary", *(count(n, "mode") for n in BEAM_MODES))
     rows = [[b, *(f"{limit:.3f}" for limit in of.values())] for b, of in limits.items()]
-    sections = [Section(f"Output along the beam, {n} modes", "", beam_figure(n), 360) for n in (1, 3)]
-    sections += [
-        Section(f"Zeros by the place of the output, {n} modes", "", locus_figure(n), 420) for n in (3, 1)
-    ]
+    along = (
+        "The inverse is stable where the curve is at zero, left of the dotted line (Reiner 2010, figures 3.4 "
+        "and 3.5)."
+    )
+    locus = (
+        "Pairs on the imaginary axis go to infinity as the output moves outwards, and come back on the real "
+        "one."
+    )
+    sections = []
+    for n in (1, 3):
+        modes = count(n, "mode")
+        sections.append(Section(f"Output along the beam, {modes}", along, beam_figure(n), 360))
+        sections.append(Section(f"Zeros by the place of the output, {modes}", locus, locus_figure(n), 420))
     sections += [
         Section("Largest stable output by number of modes", "", html_table(head, rows)),
         Section(
@@ -165,7 +176,7 @@ def virtual_output() -> Example:
         ),
         Section(
             "Deviation on the way",
-            "",
+            "Zero at both ends; between them the quasi-static correction should leave little.",
             time_figure(ARM_TIMES, {name: 1e3 * error for name, error in off.items()}, "deviation in mm"),
             360,
         ),
@@ -270,7 +281,12 @@ def two_beams() -> Example:
     sections = [
         Section("Height of the end", "As figure 3.7(b).", time_figure(times, heights, "y in m"), 420),
         Section("Torques", "As figure 3.7(a).", time_figure(times, torques, "torque in N m"), 360),
-        Section("Deviation of the end", "", time_figure(times, off, "deviation in mm"), 360),
+        Section(
+            "Deviation of the end",
+            "On the way the placed output stays closer than the rigid inverse; afterwards both drift.",
+            time_figure(times, off, "deviation in mm"),
+            360,
+        ),
     ]
     numbers = {**one_json(zeros), "largest_deviation_mm": largest, "at_the_end_mm": later}
     return Example({**numbers, "with_three_modes": one_json(full)}, verdict, sections)
@@ -349,8 +365,7 @@ def example_named(name: str) -> Example:
     Raises:
         ValueError: if there is no such example.
     """
-    if name not in EXAMPLES:
-        raise ValueError(f"--example must be one of {', '.join(EXAMPLES)}, got '{name}'")
+    one_of("--example", EXAMPLES, name)
     found = EXAMPLES[name]()
     return found._replace(numbers={"example": name, **found.numbers})
 

@@ -50,13 +50,14 @@ def plane_figure(zeros: Zeros) -> go.Figure:
     return figure.update_layout(xaxis=xaxis, yaxis={"title": "imaginary part in 1/s"})
 
 
-def faster_zeros(zeros: Zeros) -> str:
-    """The real parts that `plane_figure` has no room for, in a sentence; empty if there are none."""
+def zeros_note(zeros: Zeros) -> str:
+    """What `plane_figure` shows, and the real parts that it has no room for."""
+    note = "Poles of the exact inverse; those right of the dotted line make it unstable."
     real = np.sort(np.real(zeros.values))
     outside = real[np.abs(real) > _largest_shown(zeros)]
     if not len(outside):
-        return ""
-    return f" Not shown, because they are so fast: {', '.join(f'{value:,.0f}' for value in outside)} 1/s."
+        return note
+    return f"{note} Not shown, so fast are they: {', '.join(f'{value:,.0f}' for value in outside)} 1/s."
 
 
 def _largest_shown(zeros: Zeros) -> float:
@@ -73,7 +74,7 @@ def beam_figure(num_modes: int, boundary: str = "clamped") -> go.Figure:
     figure = go.Figure(go.Scatter(x=xi, y=np.maximum(largest, 0.0), mode="lines"))
     figure.add_vline(x=beam.largest_stable_xi(), line={"dash": "dot", "width": 1})
     return figure.update_layout(
-        xaxis={"title": "place of the output, share of the length"},
+        xaxis={"title": "place of the output / length"},
         yaxis={"title": "largest real part, in sqrt(E I / (m l<sup>3</sup>))"},
     )
 
@@ -94,11 +95,13 @@ def _locus(
 ) -> go.Figure:
     points = [(value, place) for place in places for value in zeros_at(place).values]
     values, at = (np.array(column) for column in zip(*points, strict=True))
-    marker = {"size": 5, "color": np.real(at), "colorscale": "Jet", "colorbar": {"title": label}}
+    bar = {"title": {"text": label, "side": "right"}}
+    marker = {"size": 5, "color": np.real(at), "colorscale": "Viridis", "colorbar": bar}
+    shown = [-1.04 * limit, 1.04 * limit]
     figure = go.Figure(go.Scatter(x=np.real(values), y=np.imag(values), mode="markers", marker=marker))
     return figure.update_layout(
-        xaxis={"title": f"real part in {unit}", "range": [-limit, limit]},
-        yaxis={"title": f"imaginary part in {unit}", "range": [-limit, limit]},
+        xaxis={"title": f"real part in {unit}", "range": shown},
+        yaxis={"title": f"imaginary part in {unit}", "range": shown},
     )
 
 

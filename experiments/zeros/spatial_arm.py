@@ -12,7 +12,7 @@ import numpy as np
 
 from experiments.report.plot_page import Section, html_table
 from experiments.zeros.example import Example
-from experiments.zeros.plots import faster_zeros, plane_figure, time_figure
+from experiments.zeros.plots import plane_figure, time_figure, zeros_note
 from experiments.zeros.runge_kutta import march
 from experiments.zeros.study import one_json
 from robots.dynamics.modal.arm_equations import NOMINAL, VARIANTS, Terms
@@ -179,7 +179,12 @@ def _sections(
     of_modes = [[name, *(f"{value:.3f}" for value in row)] for name, row in by_modes.items()]
     return [
         Section("Height of the load", "As figure 3.16(d).", time_figure(times, heights, "z in m"), 420),
-        Section("Deviation from the whole model", "", time_figure(times, off, "deviation in mm"), 420),
+        Section(
+            "Deviation from the whole model",
+            "What the load does otherwise when terms are left out; the closer to zero, the less they matter.",
+            time_figure(times, off, "deviation in mm"),
+            420,
+        ),
         Section(
             "Moment at the clamp, about y of the beam",
             "As figure 3.17(e).",
@@ -187,10 +192,10 @@ def _sections(
             420,
         ),
         Section("By what is left out", "Largest differences from the whole model.", html_table(head, rows)),
-        Section("Zeros of the whole model", faster_zeros(zeros[0]).strip(), plane_figure(zeros[0])),
+        Section("Zeros of the whole model", zeros_note(zeros[0]), plane_figure(zeros[0])),
         Section(
             "Zeros without C_t and C_r",
-            "Variant 1, eq. (3.73); as figure 3.18." + faster_zeros(zeros[1]),
+            "Variant 1, eq. (3.73); as figure 3.18. " + zeros_note(zeros[1]),
             plane_figure(zeros[1]),
         ),
         Section(

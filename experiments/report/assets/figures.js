@@ -24,13 +24,21 @@ function saveText(text, name) {
   link.click();
   URL.revokeObjectURL(link.href);
 }
-/* Words in the colour of the page; where there is less room, small titles and three dimensions from farther away. */
+/* Words in the colour of the page; where there is less room, small titles, axes beside each other with few numbers, and
+   three dimensions from farther away in a figure that is not much higher than wide. */
 function colorFigures() {
   const ink = getComputedStyle(document.documentElement).getPropertyValue("--soft").trim();
   for (const plot of document.querySelectorAll(".js-plotly-plot")) {
     const change = {"font.color": ink};
     if (window.innerWidth < 520) {
-      if (plot._fullLayout.scene) change["scene.camera.eye"] = {x: 1.9, y: 1.9, z: 1.5};
+      if (plot._fullLayout.scene) {
+        change["scene.camera.eye"] = {x: 1.9, y: 1.9, z: 1.5};
+        change.height = Math.min(plot._fullLayout.height, Math.round(1.15 * plot.offsetWidth));
+        plot.style.height = change.height + "px";
+      }
+      for (const [name, axis] of Object.entries(plot._fullLayout)) if (/^xaxis/.test(name)
+          && axis.domain[1] - axis.domain[0] < 0.6) Object.assign(change, {[`${name}.nticks`]: 4,
+        [`${name}.tickangle`]: 0, [`${name}.tickfont.size`]: 11, [`${name}.title.font.size`]: 11});
       (plot.layout.annotations || []).forEach((_, i) => { change[`annotations[${i}].font.size`] = 11; });
     }
     Plotly.relayout(plot, change);

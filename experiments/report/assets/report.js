@@ -126,7 +126,7 @@ function drawBars(id, unit, digits) {
     margin: {l: 10, r: 14, t: 6, b: 44}, xaxis: axis({type: "log", dtick: narrow() ? 2 : 1,
       exponentformat: "none", tickangle: 0,
       range: [low, high + (narrow() ? 0.55 : 0.38) * (high - low)],
-        title: titled(unit === "mm" ? "mm" : "degrees")}),
+        title: titled(unit === "mm" ? "distance in mm" : "angle in degrees")}),
     yaxis: axis({showgrid: false, tickfont: {color: css("--ink"), size: 13}})}), bare);
 }
 

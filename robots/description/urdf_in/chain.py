@@ -98,7 +98,7 @@ class UrdfText:
         Raises:
             ConfigurationError: if these are not six revolute joints in a row.
         """
-        for option, link in (("--base", base), ("--tip", tip)):
+        for option, link in (("--base-link", base), ("--tip-link", tip)):
             if link and link not in self.links:
                 raise ConfigurationError(
                     f"{self.label}: {option} must be one of {', '.join(self.links)}, got '{link}'"
@@ -188,7 +188,7 @@ class UrdfText:
         if len(joints) < NUM_AXES and len(moving) > 1:
             names = ", ".join(f"'{joint.name}'" for joint in moving)
             raise self.refuse(
-                f"behind '{link}' the arm divides into {names}; choose an end with --tip LINK", link
+                f"behind '{link}' the arm divides into {names}; choose an end with --tip-link LINK", link
             )
         return joints
 
@@ -209,7 +209,7 @@ class UrdfText:
             names = ", ".join(joint.name for joint in joints) or "none"
             raise ConfigurationError(
                 f"{self.label}: needs six revolute joints in a row, got {len(joints)}: {names}; a part of "
-                "them is chosen with --base LINK and --tip LINK"
+                "them is chosen with --base-link LINK and --tip-link LINK"
             )
 
     def _tip_behind(self, joint: UrdfJoint) -> str:

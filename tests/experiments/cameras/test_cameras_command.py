@@ -41,8 +41,8 @@ def test_a_simulated_calibration_finds_the_cell_it_came_from(tmp_path: Path):
 def test_a_calibration_from_a_file_is_the_one_that_wrote_it(tmp_path: Path):
     table = tmp_path / "seen.csv"
     arguments = ("calibrate", "--places=200", f"--report={tmp_path / 'c.html'}", "--json=-")
-    simulated = run(*arguments, f"--observations={table}")
-    read = run(*arguments, f"--images={table}")
+    simulated = run(*arguments, f"--write-recording={table}")
+    read = run(*arguments, f"--recording={table}")
     assert read.exit_code == 0, read.output
     one, other = json.loads(simulated.stdout), json.loads(read.stdout)
     for first, second in zip(one["cameras"], other["cameras"], strict=True):
@@ -65,7 +65,7 @@ def test_the_table_is_that_of_motion_capture(tmp_path: Path):
 
 HEAD = "exposure,camera,point,u_px,v_px\n"
 REFUSED = {
-    "file": ("calibrate", "--images=nowhere.csv", "nowhere.csv: no such file"),
+    "file": ("calibrate", "--recording=nowhere.csv", "nowhere.csv: no such file"),
     "cell": ("calibrate", "--cell=nowhere", "cell 'nowhere': no file"),
     "places": ("calibrate", "--places=0", "places must be at least 1, got 0"),
     "few places": ("calibrate", "--places=3", "points of the wand, needs 30"),
@@ -89,7 +89,7 @@ def test_wrong_input_is_refused_in_one_line_and_leaves_nothing(
 def test_a_wrong_line_of_a_table_is_named(tmp_path: Path):
     table = tmp_path / "seen.csv"
     table.write_text(HEAD + "1,01,A,2,3\n1,99,A,2,3\n")
-    refused = refusal(run("calibrate", f"--images={table}", f"--report={tmp_path / 'page.html'}"))
+    refused = refusal(run("calibrate", f"--recording={table}", f"--report={tmp_path / 'page.html'}"))
     assert "seen.csv, line 3: camera '99' is none of the cell" in refused
 
 

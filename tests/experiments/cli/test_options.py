@@ -28,7 +28,7 @@ VALUES = {
 }
 # The same thing in another form: what is written or read has the format of its command, and a choice of
 # robots or of motions is as wide as the command can use.
-FORMS = {"--write", "--write-recording", "--recording", "--images", "--robot", "--plant", "--base"}
+FORMS = {"--write", "--write-recording", "--recording", "--robot", "--plant"}
 
 
 def options(command: Any) -> list[Any]:

@@ -213,7 +213,7 @@ REFUSED = {
     "both": (["--recording=none.csv", "--motions=mine.yaml"], "no --motions"),
     "columns": (["--columns=mine.yaml"], "--columns says what a --recording has"),
     "slow": (["--slow=slow.csv"], "--slow says more of what was recorded"),
-    "cases": (["--motions=mine.yaml"], "cases mine.yaml"),
+    "cases": (["--motions=mine.yaml"], "--motions mine.yaml"),
     "report": (["--report=identify.txt"], "its name must end in .html"),
     "jobs": (["--jobs=0"], "--jobs must be at least 1, got 0"),
 }  # fmt: skip

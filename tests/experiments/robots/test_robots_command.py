@@ -42,9 +42,9 @@ REFUSED = {
     "no file": (["nope.urdf"], "nope.urdf"),
     "seven axes": (["seven.urdf"], "needs six revolute joints in a row, got 7"),
     "no URDF": (["seven.yaml"], "is no URDF: its name must end in .urdf or .xacro"),
-    "no link": (["seven.urdf", "--tip=hand"], "--tip must be one of l0, l1"),
+    "no link": (["seven.urdf", "--tip-link=hand"], "--tip-link must be one of l0, l1"),
     "no folder": (["seven.urdf", "--package=mine=nowhere"], "--package must be NAME=DIR"),
-    "no YAML": (["seven.urdf", "--base=l1", "--write=my.txt"], "its name must end in .yaml or .yml"),
+    "no YAML": (["seven.urdf", "--base-link=l1", "--write=my.txt"], "its name must end in .yaml or .yml"),
 }
 
 

@@ -151,7 +151,16 @@ def test_a_virtual_cell_is_watched_until_ctrl_c_which_leaves_the_report(tmp_path
 def test_a_cell_of_another_terminal_is_watched_with_the_images_that_its_cameras_send(tmp_path: Path):
     """Reports over UDP, images over HTTP; both programs share nothing else."""
     wire = ["--set", f"station.link.port={free_port()}", "--set", "station.overview.delay=0.1"]
-    base = [sys.executable, "-m", "experiments.main", "cell", "--scenario", "cell-watched", "--images", "0"]
+    base = [
+        sys.executable,
+        "-m",
+        "experiments.main",
+        "cell",
+        "--scenario",
+        "cell-watched",
+        "--show-images",
+        "0",
+    ]
     moves = ["--set", "station.link.run.streams=true", "--announce", "--until-eof"]
     # It ends when its input closes, which it does with this block.
     with subprocess.Popen(
