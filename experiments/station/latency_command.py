@@ -169,8 +169,8 @@ def write_latency_page(path: Path, found: Latency, record: LatencyRecord) -> Non
     spread = go.Figure(go.Histogram(x=1e3 * record.turn_around, nbinsx=100))
     spread.update_layout(xaxis_title="turn-around in ms", yaxis_title="replies")
     verdict = (
-        f"A command takes {1e3 * found.loop:.1f} ms to the joint, {1e3 * found.dead_time:z.1f} ms more than "
-        "the cycle in which it is heard."
+        f"A command takes {1e3 * found.loop:.1f} ms to the joint, {1e3 * abs(found.dead_time):.1f} ms "
+        f"{'less' if found.dead_time < 0.0 else 'more'} than the cycle in which it is heard."
     )
     if found.camera is not None:
         verdict += f" A picture is {1e3 * found.camera:.1f} ms old when it arrives."
@@ -179,12 +179,21 @@ def write_latency_page(path: Path, found: Latency, record: LatencyRecord) -> Non
         "Delays of a station",
         verdict,
         [
-            Section("The joint follows its command", "Both over the controller's own stamps.", moved),
+            Section(
+                "The joint follows its command",
+                "Both over the controller's own stamps; moved back by the loop the joint lies on its command.",
+                moved,
+            ),
             Section(
                 "The clocks",
                 "A line that rises or falls is a drift; steps would be a clock set anew.",
                 clocks,
             ),
-            Section("Our own turn-around", "From a message in to its reply out.", spread, 320),
+            Section(
+                "Our own turn-around",
+                "From a message in to its reply out; the few far right are what else the machine did.",
+                spread,
+                320,
+            ),
         ],
     )

@@ -96,10 +96,11 @@ def metric_name(metric: str) -> str:
 
 
 def _factor_titles(study: Study) -> dict[str, str]:
-    """The factors with their units, where the scenario declares one."""
+    """The factors with their units, where the scenario declares one; in two lines, to stand side by side."""
     scenario = load_scenario(study.scenario, study.settings)
     units = {factor: unit_at(scenario, factor) for factor in study.factors}
-    return {factor: f"{factor} in {unit}" if unit else factor for factor, unit in units.items()}
+    titles = {factor: f"{factor} in {unit}" if unit else factor for factor, unit in units.items()}
+    return {factor: ".<br>".join(title.rsplit(".", 1)) for factor, title in titles.items()}
 
 
 def _known(values: np.ndarray) -> np.ndarray:

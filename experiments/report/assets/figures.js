@@ -32,9 +32,9 @@ function colorFigures() {
     const change = {"font.color": ink};
     if (window.innerWidth < 520) {
       if (plot._fullLayout.scene) {
-        change["scene.camera.eye"] = {x: 1.9, y: 1.9, z: 1.5};
+        change["scene.camera.eye"] = {x: 2.1, y: 2.1, z: 1.6};
         change.height = Math.min(plot._fullLayout.height, Math.round(1.15 * plot.offsetWidth));
-        plot.style.height = change.height + "px";
+        plot.style.height = plot.parentElement.style.height = change.height + "px";
       }
       for (const [name, axis] of Object.entries(plot._fullLayout)) if (/^xaxis/.test(name)
           && axis.domain[1] - axis.domain[0] < 0.6) Object.assign(change, {[`${name}.nticks`]: 4,

@@ -27,7 +27,7 @@ ROWS = {
 
 def test_an_axis_has_the_unit_of_its_factor_where_the_scenario_declares_one():
     layout = effects_figure(STUDY, ROWS, "max_norm_mm").to_dict()["layout"]
-    titles = [layout[axis]["title"]["text"] for axis in ("xaxis", "xaxis2", "xaxis3")]
+    titles = [layout[axis]["title"]["text"].replace("<br>", "") for axis in ("xaxis", "xaxis2", "xaxis3")]
     assert titles == ["station.payload in kg", "station.drive.dead_time in s", "reference.path"]
     assert layout["yaxis"]["title"]["text"] == "mean, in mm"
 
