@@ -103,8 +103,8 @@ def joints_figure(q: np.ndarray, residuals: np.ndarray) -> go.Figure:
                 ),
                 row=joint // 3 + 1, col=joint % 3 + 1,
             )  # fmt: skip
-    figure.update_yaxes(title_text="mm", col=1)
-    figure.update_xaxes(title_text="degrees", row=2)
+    figure.update_yaxes(title_text="residual in mm", col=1)
+    figure.update_xaxes(title_text="position in degrees", row=2)
     return figure
 
 

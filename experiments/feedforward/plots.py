@@ -31,7 +31,8 @@ def criterion_figure(study: FeedforwardStudy, angle_deg: int) -> go.Figure:
     figure.update_yaxes(title="axis 3 in degrees", col=1)
     decades = np.log10([study.criterion[angle_deg][kind] for kind in KINDS])
     marks = np.linspace(decades.min(), decades.max(), 6)
-    bar = {"title": "C in m/s", "tickvals": marks, "ticktext": [f"{10**mark:.2g}" for mark in marks]}
+    title = {"text": "C in m/s", "side": "right"}
+    bar = {"title": title, "tickvals": marks, "ticktext": [f"{10**mark:.2g}" for mark in marks]}
     return figure.update_layout(coloraxis={"colorscale": "Viridis", "colorbar": bar})
 
 
@@ -50,7 +51,10 @@ def surface_figure(study: FeedforwardStudy, angle_deg: int) -> go.Figure:
 def ratio_figure(study: FeedforwardStudy, angle_deg: int) -> go.Figure:
     """Contours of C with the elastic structure in the model over C with elastic joints alone."""
     style = {"showlabels": True, "labelfont": {"color": "#1c2430"}}
-    figure = go.Figure(_contour(study, study.ratio(angle_deg), contours=style, colorscale=_LIGHT))
+    bar = {"title": {"text": "ratio", "side": "right"}}
+    figure = go.Figure(
+        _contour(study, study.ratio(angle_deg), contours=style, colorscale=_LIGHT, colorbar=bar)
+    )
     return figure.update_layout(xaxis={"title": "axis 2 in degrees"}, yaxis={"title": "axis 3 in degrees"})
 
 
@@ -209,7 +213,7 @@ def two_joint_figure() -> go.Figure:
     }
     colors = {"rigid": "#c0392b", "approximate": "#27ae60", "exact": "#2c3e90"}  # those of the source
     titles = ("driven joint", "sprung joint")
-    figure = make_subplots(3, 2, shared_xaxes=True, vertical_spacing=0.05, subplot_titles=titles)
+    figure = make_subplots(3, 2, shared_xaxes=True, vertical_spacing=0.08, subplot_titles=titles)
     for name, values in (models | {"exact": exact}).items():
         line = {"color": colors[name], "dash": "dash" if name == "exact" else "solid"}
         rows = [*values, values[1] - exact[1]][: 2 if name == "exact" else 3]

@@ -181,7 +181,7 @@ def write_latency_page(path: Path, found: Latency, record: LatencyRecord) -> Non
         [
             Section(
                 "The joint follows its command",
-                "Both over the controller's own stamps; moved back by the loop the joint lies on its command.",
+                "Both over the controller's own stamps; moved back by the loop, the joint lies on it.",
                 moved,
             ),
             Section(

@@ -24,6 +24,23 @@ function saveText(text, name) {
   link.click();
   URL.revokeObjectURL(link.href);
 }
+/* Three axes or more side by side have no room on a narrow screen: there they stand above each other. */
+function stacked(layout) {
+  const named = letter => Object.keys(layout).filter(name => new RegExp(`^${letter}axis\\d*$`).test(name));
+  const columns = named("x"), rows = named("y"), count = columns.length;
+  const isRow = rows.length === count && rows.every(name => layout[name].domain[1] - layout[name].domain[0] > 0.9);
+  if (count < 3 || !isRow) return {};
+  const gap = 0.42 / count, high = (1 - gap * (count - 1)) / count, change = {height: Math.round(0.7 * count * layout.height)};
+  columns.forEach((name, i) => {
+    const top = 1 - i * (high + gap);
+    change[`${name}.domain`] = [0, layout.coloraxis ? 0.92 : 1];
+    Object.assign(change, {[`${name}.nticks`]: 5, [`${name}.tickangle`]: 0});
+    change[`${rows[i]}.domain`] = [Math.max(0, top - high), top];
+    change[`${rows[i]}.showticklabels`] = true;
+    if ((layout.annotations || []).length === count) Object.assign(change, {[`annotations[${i}].x`]: 0.5, [`annotations[${i}].y`]: top});
+  });
+  return change;
+}
 /* Words in the colour of the page; where there is less room, small titles, axes beside each other with few numbers, and
    three dimensions from farther away in a figure that is not much higher than wide. */
 function colorFigures() {
@@ -34,9 +51,10 @@ function colorFigures() {
       if (plot._fullLayout.scene) {
         change["scene.camera.eye"] = {x: 2.1, y: 2.1, z: 1.6};
         change.height = Math.min(plot._fullLayout.height, Math.round(1.15 * plot.offsetWidth));
-        plot.style.height = plot.parentElement.style.height = change.height + "px";
       }
-      for (const [name, axis] of Object.entries(plot._fullLayout)) if (/^xaxis/.test(name)
+      Object.assign(change, stacked(plot._fullLayout));
+      if (change.height) plot.style.height = plot.parentElement.style.height = change.height + "px";
+      else for (const [name, axis] of Object.entries(plot._fullLayout)) if (/^xaxis/.test(name)
           && axis.domain[1] - axis.domain[0] < 0.6) Object.assign(change, {[`${name}.nticks`]: 4,
         [`${name}.tickangle`]: 0, [`${name}.tickfont.size`]: 11, [`${name}.title.font.size`]: 11});
       (plot.layout.annotations || []).forEach((_, i) => { change[`annotations[${i}].font.size`] = 11; });

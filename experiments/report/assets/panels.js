@@ -31,7 +31,7 @@ function drawPanel(panel) {
       dtick: axes.x_log ? 1 : undefined, nticks: axes.x_log ? undefined : 7});
     extra["yaxis" + n] = axis({type: axes.y_log ? "log" : "linear", domain: cells[i].y, anchor: "x" + n,
       title: titled(axes.y), exponentformat: "none", dtick: axes.y_log ? 1 : undefined,
-      nticks: axes.y_log ? undefined : 6});
+      nticks: axes.y_log ? undefined : panel.axes.length > 3 && narrow() ? 4 : 6});
     for (const limit of axes.limits) shapes.push({type: "line", xref: "x" + n + " domain", yref: "y" + n,
       x0: 0, x1: 1, y0: limit, y1: limit, line: {color: css("--soft"), width: 1.2, dash: "dot"}});
     if (axes.over_time) for (const x of [data.marks.path_start, data.marks.dwell_start]) shapes.push({
