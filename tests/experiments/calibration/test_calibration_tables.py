@@ -101,6 +101,8 @@ def test_who_measures_positions_need_not_know_how_well_they_turn(tmp_path: Path)
     numbers = json.loads(result.stdout)
     assert numbers["noise"]["position_mm"] == pytest.approx(0.1)
     assert numbers["rank"] == 27
+    # Without fresh rows there is an error before and after all the same.
+    assert "On its own rows the mean error falls" in (tmp_path / "out" / "report.html").read_text()
 
 
 def write_lines(file: Path, seen: Observations, rows: range) -> None:

@@ -209,7 +209,7 @@ REFUSED = {
     "excite": (["--excite=slow.csv", "--write=robot.yaml"], "--excite only designs a motion"),
     "robot": (["--robot=kr211"], "robot 'kr211': no file"),
     "plant": (["--robot=irb140"], "has no variant named irb140-realistic: say what moves by --plant"),
-    "recording": (["--recording=none.csv"], "column map none.yaml"),
+    "recording": (["--recording=none.csv"], "--recording none.csv: no such file"),
     "both": (["--recording=none.csv", "--motions=mine.yaml"], "no --motions"),
     "columns": (["--columns=mine.yaml"], "--columns says what a --recording has"),
     "slow": (["--slow=slow.csv"], "--slow says more of what was recorded"),

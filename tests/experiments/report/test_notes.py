@@ -19,8 +19,9 @@ def sections() -> Iterator[tuple[str, list[ast.expr]]]:
 
 def is_written(content: ast.expr) -> bool:
     """Whether it is a table or text, which speaks for itself."""
-    named = isinstance(content, ast.Call) and isinstance(content.func, ast.Name)
-    return isinstance(content, ast.JoinedStr) or (named and content.func.id in TABLES)
+    if isinstance(content, ast.Call) and isinstance(content.func, ast.Name):
+        return content.func.id in TABLES
+    return isinstance(content, ast.JoinedStr)
 
 
 def test_every_figure_says_what_one_should_see():
