@@ -10,7 +10,9 @@ from dataclasses import dataclass
 import numpy as np
 
 HALF = 90  # samples before and after a step: with 0.05 mm of noise it takes so many to see 0.2 mm
-THRESHOLD = 45.0  # of chi squared with three degrees of freedom: noise passes it in one of 1e9 windows
+# Of chi squared with three degrees of freedom. Noise alone passes 45 in one of 1e9 windows; but where a gear
+# changes its flank there is a step of a third of 0.2 mm in every lap, which passed it once in eight hours.
+THRESHOLD = 52.0
 _DEGREE = 5  # of the bends: a circle of two seconds is followed over half of it
 
 
