@@ -114,7 +114,20 @@ def plan_command(
         mass = model.payload.largest_mass if payload is None else payload
         limits = motion_limits(model, tool_speed, tool_acceleration, duty).with_reserve(reserve)
         true = None if plant is None else load_robot(plant)
-        plan = Plan(model, mass, path, objective, dynamics, limits, recuperation, true, may_ring, free, boxes)
+        plan = Plan(
+            model,
+            mass,
+            path,
+            objective,
+            dynamics,
+            limits,
+            recuperation,
+            true,
+            may_ring,
+            free,
+            boxes,
+            reserve > 0.0,
+        )
         page = stack.enter_context(staged_file(report, *PAGE))
         table = stack.enter_context(staged_file(write, *TABLE)) if write else None
         code = stack.enter_context(staged_folder(report.parent)) if program else None

@@ -29,9 +29,9 @@ from robots.planning.time_spline import TimeSpline, fitted
 OBJECTIVES = ("time", "energy", "front")
 COEFFICIENTS = 36  # of the spline: about one for each tick of some 12 ms of a quick motion
 STILL = 2e-3  # m/s, C that is none: 2 mm/s^2 in the mean
-_CALMER = (0.12, 0.3, 0.55, 0.8)  # of the time that is gained, which is given away for calm
-_CALMER_ENERGY = (10.0, 40.0, 100.0, 150.0, 220.0)  # weights of calm
-_SMOOTHER = 10.0  # motions where the optimiser has not converged
+_CALMER = (0.03, 0.12, 0.3, 0.42, 0.55, 0.8)  # of the time that is gained, which is given away for calm
+_CALMER_ENERGY = (0.1, 0.4, 1.0, 10.0, 40.0, 100.0, 150.0, 220.0)  # weights of calm
+_SMOOTHER = 10.0  # motions for laws, which are late, and where the optimiser has not converged
 _FRONT = (1.0, 1.05, 1.1, 1.2, 1.35, 1.5)  # of the shortest duration
 
 
@@ -51,6 +51,7 @@ class Plan:
         may_ring: whether a motion may make the arm ring more than the usual timing does.
         is_free: whether the joints may go another way than the usual motion does.
         obstacles: that they keep clear of on it.
+        is_for_law: whether a law follows the motion; else it runs open loop.
     """
 
     robot: RobotModel
@@ -64,6 +65,7 @@ class Plan:
     may_ring: bool = False
     is_free: bool = False
     obstacles: tuple[Obstacle, ...] = ()
+    is_for_law: bool = False
 
 
 @dataclass(frozen=True)
@@ -122,7 +124,7 @@ def _made_ready(plan: Plan, leg: Leg) -> _Ready:
     dynamics = PathDynamics(plan.robot, plan.payload, leg.path, plan.dynamics)
     elastic = PathDynamics(plan.robot, plan.payload, leg.path, "elastic_structure")
     require_standing(dynamics, plan.limits)
-    driver = PlantDriver(plan.robot, plan.payload, elastic, plan.plant)
+    driver = PlantDriver(plan.robot, plan.payload, elastic, plan.plant, plan.is_for_law)
 
     def baseline(limits: MotionLimits) -> Timing:
         return (
@@ -134,7 +136,7 @@ def _made_ready(plan: Plan, leg: Leg) -> _Ready:
         leg = free_leg(plan.robot, plan.payload, leg, plan.limits, plan.dynamics, plan.obstacles)
         dynamics = PathDynamics(plan.robot, plan.payload, leg.path, plan.dynamics)
         elastic = PathDynamics(plan.robot, plan.payload, leg.path, "elastic_structure")
-        driver = PlantDriver(plan.robot, plan.payload, elastic, plan.plant)
+        driver = PlantDriver(plan.robot, plan.payload, elastic, plan.plant, plan.is_for_law)
     return _Ready(leg, dynamics, elastic, driver, usual)
 
 
@@ -144,11 +146,13 @@ def _planned(plan: Plan, ready: _Ready, allowed: float) -> LegResult:
 
     def optimal(limits: MotionLimits) -> TimeSpline:
         began = time.perf_counter()
-        # Where it does not converge from the rigid robot's motion, it begins with the usual one.
+        # Where it does not converge from one, it begins with the other; the usual one has the right duration.
         starts = [
             rigid_start(plan.robot, plan.payload, ready.leg.path, limits, COEFFICIENTS),
             as_spline(usual.timing),
         ]
+        if plan.objective == "energy":
+            starts.reverse()
         found = _optimal(plan, dynamics, limits, starts, usual.timing.duration)
         last.append((found, time.perf_counter() - began))
         return found.motion
@@ -208,7 +212,8 @@ def as_spline(timing: Timing) -> TimeSpline:
 def _optimal(
     plan: Plan, dynamics: PathDynamics, limits: MotionLimits, starts: list[TimeSpline], usual: float
 ) -> Optimum:
-    for start, smoother in product(starts, (1.0, _SMOOTHER)):
+    smoothers = (_SMOOTHER, _SMOOTHER**2) if plan.is_for_law else (1.0, _SMOOTHER)
+    for start, smoother in product(starts, smoothers):
         is_frugal = plan.objective == "energy"
         found = optimum(
             dynamics,
@@ -259,6 +264,7 @@ def plan_json(plan: Plan, results: list[LegResult]) -> dict[str, Any]:
         "legs": [
             {
                 "name": each.leg.name,
+                "inverse": each.planned.run.inverse,
                 "time_s": each.planned.timing.duration,
                 "baseline_s": each.baseline.timing.duration,
                 "energy_j": each.planned.run.energy(plan.recuperation),

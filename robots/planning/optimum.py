@@ -17,7 +17,7 @@ from robots.planning.time_spline import AT_REST, TimeSpline, at_rest, bases, poi
 OBJECTIVES = ("time", "energy")
 ITERATIONS = 60  # of IPOPT, at most
 # Weight of the fourth derivative: without it limits are used in ways that a drive of 4 ms cannot follow.
-_SMOOTH = {"time": 5e-7, "energy": 1e-8, "calm": 1e-9}
+_SMOOTH = {"time": 5e-8, "energy": 1e-8, "calm": 1e-9}
 _ROUNDED = 0.03  # of the mean power at the start, below which the magnitude of a power is rounded
 _SLOWEST = 2.5  # times the duration of the start: beyond that the optimiser is lost
 _NEAR = 0.45  # use of a limit at the start, from which on the optimiser looks at it

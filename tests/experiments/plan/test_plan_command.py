@@ -32,7 +32,7 @@ def run(folder: Path, *arguments: str) -> Result:
 def test_a_motion_of_three_axes_is_better_than_the_best_jerk_profile(
     tmp_path: Path, objective: str, saved: float
 ):
-    # Least energy rings by 3 % more than the profile, which giving some away would mend.
+    # Least energy rings more than the profile, which giving some away would mend.
     options = ["--reserve=0", "--may-ring"] if objective == "energy" else ["--reserve=0"]
     result = run(tmp_path, "--path=joints", f"--objective={objective}", *options, "--json=-")
     assert result.exit_code == 0, result.output

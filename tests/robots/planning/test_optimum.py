@@ -17,8 +17,8 @@ from robots.planning.time_spline import TimeSpline, at_rest
 
 ANGLE = np.deg2rad(40.0)
 FREE = np.full(6, np.inf)
-_ROUGHEST = 1e-7
-_ROUGH = 2e-4  # of the usual weight: a closed form knows no drive that has to follow
+_ROUGHEST = 1e-6
+_ROUGH = 2e-3  # of the usual weight: a closed form knows no drive that has to follow
 
 
 @pytest.fixture(scope="module")
@@ -59,11 +59,11 @@ def test_with_limited_torque_and_rate_it_takes_as_long_as_the_closed_form(robot)
     kept = limits(
         gear_torque=acceleration * of_torque, gear_torque_rate=jerk * of_torque, speed=np.full(6, 50.0)
     )
-    start = rigid_start(robot, 16.0, dynamics.path, replace(kept, acceleration=np.full(6, acceleration)), 80)
-    found = optimum(dynamics, kept, start, smoother=_ROUGH)
+    start = rigid_start(robot, 16.0, dynamics.path, replace(kept, acceleration=np.full(6, acceleration)), 160)
+    found = optimum(dynamics, kept, start, smoother=_ROUGHEST)
     assert found.status == "Solve_Succeeded"
     # What five continuous derivatives cost where the closed form has jumps of the jerk.
-    assert wanted * 0.999 < found.motion.duration < wanted * 1.01
+    assert wanted * 0.999 < found.motion.duration < wanted * 1.005
 
 
 def test_with_limited_torque_alone_it_comes_near_bang_bang(robot):
