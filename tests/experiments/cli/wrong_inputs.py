@@ -170,7 +170,7 @@ REFUSED = {
     "zeros --robot none": "robot 'none': no file",
     "zeros --grid 0": "--grid must be at least 2, got 0",
     "zeros --payload -3": "payload of KUKA KR 210 R2700 extra must be between 0 and 210.0 kg, got",
-    "zeros --example bema": "--example must be one of beam,",
+    "zeros --example bema": "got 'bema'; did you mean beam?",
     "zeros --report x": "cannot write the file x: its name must end in .html or .htm",
     "feedforward --robot none": "robot 'none': no file",
     "feedforward --grid 0": "--grid must be at least 2, got 0",
