@@ -31,7 +31,6 @@ from experiments.report.plot_page import Section, html_table, write_plot_page
 from experiments.station.guided_command import ask_before_moving, check_measures_alone, on_station
 from robots.description.model import RobotModel
 from robots.metrology.daily_check import TOOL, sizes_alone
-from systems.link.makers import LINK_NAMES
 from systems.link.udp_channel import ChannelError
 
 _HISTORY = (".parquet",)
@@ -85,10 +84,7 @@ def health_command(
     human = human_console(json_file)
     with json_output(json_file) as output, refusing(ValueError, OSError, ChannelError), ExitStack() as stack:
         at_least("--checks", 1, checks)
-        is_guided = with_cell or station in LINK_NAMES
-        name, changes = on_station(
-            scenario or ("cell" if is_guided else "nominal"), settings or [], station, with_cell
-        )
+        name, changes = on_station(scenario, settings or [], station, with_cell, simulated="nominal")
         prepared = prepare(name, changes, robot, needs_path=False)
         is_simulated = prepared.scenario.station.kind == "simulated"
         if not is_simulated:

@@ -30,21 +30,33 @@ from systems.link.makers import LINK_NAMES
 from systems.link.udp_channel import ChannelError, is_loopback
 from systems.reference.paths import make_path
 
-_CELLS = {"rsi": "cell-kuka"}  # the shipped scenario of a link, where it is not ``cell``
+_CELLS = {"egm": "cell", "rsi": "cell-kuka"}  # the shipped scenario of each link
 
 
 def on_station(
-    scenario: str | None, settings: list[str], station: str | None, with_cell: bool
+    scenario: str | None,
+    settings: list[str],
+    station: str | None,
+    with_cell: bool,
+    simulated: str = "misaligned",
+    cells: Mapping[str, str] = _CELLS,
 ) -> tuple[str, list[str]]:
     """The scenario and its settings with the options that choose a station.
+
+    Args:
+        scenario: as asked for; None for the shipped one.
+        settings: of the command line.
+        station: what stands there; None for what the scenario says.
+        with_cell: whether a virtual cell shall stand there.
+        simulated: the shipped scenario of a simulated station.
+        cells: the shipped scenario of each link; a virtual cell is the first unless another is asked for.
 
     Raises:
         ValueError: if a virtual cell is wanted for a simulated station, or the scenario is refused.
     """
     if with_cell and station == "simulated":
         raise ValueError(f"--with-cell needs --station {' or '.join(LINK_NAMES)}, got '{station}'")
-    is_guided = with_cell or station in LINK_NAMES
-    name = scenario or (_CELLS.get(station or "", "cell") if is_guided else "misaligned")
+    name = scenario or cells.get(station or "", next(iter(cells.values())) if with_cell else simulated)
     kind = station or (load_scenario(name, settings).station.link.kind if with_cell else None)
     return name, [*settings, *([OptionSetting("station.kind", kind, "--station")] if kind else [])]
 

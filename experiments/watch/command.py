@@ -22,10 +22,11 @@ from experiments.watch.live_command import watch_station
 from experiments.watch.page import AID, run_verdict, study_verdict, write_run_page, write_study_page
 from experiments.watch.run import seen_by_network, watch_recorded, watch_simulated
 from experiments.watch.study import study_watch
-from systems.link.makers import LINK_NAMES
 from systems.link.udp_channel import ChannelError
 from systems.vision.people.person_networks import PersonNetwork
 from systems.vision.people.surroundings import load_surroundings
+
+_CELLS = {"egm": "cell-watched", "rsi": "cell-kuka-watched"}  # the shipped scenario of each link
 
 
 def watch_command(
@@ -35,7 +36,7 @@ def watch_command(
             "--scenario",
             metavar="NAME|FILE",
             help="A shipped scenario or a YAML file.",
-            show_default="watched; on a station cell-watched",
+            show_default="watched; on a station cell-watched or cell-kuka-watched",
         ),
     ] = None,
     settings: SetOption = None,
@@ -153,10 +154,7 @@ def _on_station(
     Raises:
         ValueError: if a virtual cell is wanted for a simulated station, or the scenario is refused.
     """
-    is_live = with_cell or station in LINK_NAMES
-    name, changes = on_station(
-        scenario or ("cell-watched" if is_live else "watched"), settings, station, with_cell
-    )
+    name, changes = on_station(scenario, settings, station, with_cell, simulated="watched", cells=_CELLS)
     if with_cell and load_scenario(name, changes).station.link.kind == "egm":
         changes = [*changes, OptionSetting("station.link.run.streams", "true", "--with-cell")]
     return name, changes

@@ -31,6 +31,7 @@ def test_the_shipped_scenarios_load_by_name_and_say_what_they_are():
     assert shipped_scenarios() == [
         "cell",
         "cell-kuka",
+        "cell-kuka-watched",
         "cell-watched",
         "dead-time",
         "everything",

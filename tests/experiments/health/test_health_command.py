@@ -66,6 +66,7 @@ def test_a_history_goes_on_and_a_joint_that_drifts_is_named(tmp_path: Path):
         ),
         (["--with-cell", "--set", "station.link.has_camera=false"], "health needs a camera"),
         (["--with-cell", "--scenario", "cell-watched"], "health does not watch for people"),
+        (["--with-cell", "--station", "rsi", "--checks", "2"], "this one is checked once, got 2"),
         (["--history", "h.csv"], "h.csv"),
     ],
 )

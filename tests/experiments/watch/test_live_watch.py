@@ -138,8 +138,9 @@ def test_what_cannot_be_watched_is_refused_in_one_line(arguments: list[str], mes
 
 @pytest.mark.slow
 @pytest.mark.real_time
-def test_a_virtual_cell_is_watched_until_ctrl_c_which_leaves_the_report(tmp_path: Path):
-    process, _ = started(tmp_path, "watch", "--with-cell", *ENDING)
+@pytest.mark.parametrize("station", ["egm", "rsi"])
+def test_a_virtual_cell_is_watched_until_ctrl_c_which_leaves_the_report(station: str, tmp_path: Path):
+    process, _ = started(tmp_path, "watch", "--with-cell", "--station", station, *ENDING)
     numbers = ended_after_decision(process, tmp_path)
     assert numbers["duration_s"] >= 0.0
     assert ADVICE in numbers["notes"]
