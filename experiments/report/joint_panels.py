@@ -7,6 +7,8 @@ from experiments.metrics.run_metrics import Comparison
 from experiments.report.panels import Axes, Panel
 from robots.description.model import NUM_JOINTS, RobotModel
 
+_FITTED = "The range fits the path; double-click for what the start did."
+
 
 def joint_panels(logs: Comparison, robot: RobotModel | None) -> list[Panel]:
     """The panels that there are numbers for; without a robot speeds have no limit to compare them with."""
@@ -45,19 +47,21 @@ def joint_panels(logs: Comparison, robot: RobotModel | None) -> list[Panel]:
             "joint-torques",
             "Torques",
             "On the link side of the gear, as the robot reports them: weight at rest, inertia and friction "
-            "in motion; ripples are vibration or a restless correction.",
+            "in motion; ripples are vibration or a restless correction. " + _FITTED,
             "N m",
             torques,
             first,
+            fits_path=True,
         ),
         _panel(
             "gear-deflection",
             "Deflection of the gears",
             "True position of the link minus that of the motor seen behind its gear: the sag under the load, "
-            "and around it the vibration that no encoder of a motor sees.",
+            "and around it the vibration that no encoder of a motor sees. " + _FITTED,
             "arcmin",
             yielded,
             first,
+            fits_path=True,
         ),
     ]
     return [panel for panel in panels if not panel.is_empty]
@@ -71,10 +75,11 @@ def _panel(
     values: dict[str, np.ndarray],
     logs: dict[str, RunLog],
     limits: np.ndarray | None = None,
+    fits_path: bool = False,
 ) -> Panel:
     dotted = [] if limits is None else limits.tolist()
     axes = [
-        Axes("time in s", unit, heading=f"joint {number}", limits=dotted, over_time=True)
+        Axes("time in s", unit, f"joint {number}", limits=dotted, over_time=True, fits_path=fits_path)
         for number in range(1, NUM_JOINTS + 1)
     ]
     curves = {

@@ -20,6 +20,7 @@ class Axes:
         limits: y values of dotted lines.
         shape: how points are joined: ``"linear"`` or ``"hvh"`` for the steps of a histogram.
         over_time: whether x is the time of the run, whose marks are then drawn.
+        fits_path: whether the range of y is that of the path, whatever happened before it.
     """
 
     x: str
@@ -30,6 +31,7 @@ class Axes:
     limits: Sequence[float] = ()
     shape: str = "linear"
     over_time: bool = False
+    fits_path: bool = False
 
 
 @dataclass(frozen=True)

@@ -48,14 +48,14 @@ def write_plot_page(path: str | Path, title: str, verdict: str, sections: Sequen
 
 
 def html_table(head: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
-    """A table; cells are text unless they are marked as HTML."""
+    """A table; cells are text unless they are marked as HTML. In the page it sorts by a click on a head."""
     return f"<div class=scroll tabindex=0><table>{_inside(head, rows)}</table></div>"
 
 
 def sortable_table(
     name: str, head: Sequence[str], rows: Sequence[Sequence[str]], has_filter: bool = False
 ) -> str:
-    """A long table that sorts by a click on a head, with a button that saves it.
+    """A long table that scrolls below its head, with a name for the file that its button saves.
 
     Args:
         name: of the file, without its suffix; unlike all others of the page.
@@ -63,10 +63,9 @@ def sortable_table(
         rows: cells, text unless they are marked as HTML.
         has_filter: whether a field above it hides the rows without the words that are typed there.
     """
-    button = f'<button class=csv data-table="{name}">Save as CSV</button>'
-    table = f'<table class=sortable id="{name}">{_inside(head, rows)}</table>'
+    table = f'<table id="{name}">{_inside(head, rows)}</table>'
     filter_field = f'<input class=filter data-table="{name}" placeholder="Filter" aria-label="Filter"> '
-    return f'{filter_field if has_filter else ""}{button}<div class="scroll tall" tabindex="0">{table}</div>'
+    return f'{filter_field if has_filter else ""}<div class="scroll tall" tabindex="0">{table}</div>'
 
 
 def _inside(head: Sequence[str], rows: Sequence[Sequence[str]]) -> str:

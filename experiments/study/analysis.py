@@ -85,6 +85,17 @@ def main_effects(study: Study, rows: Rows, metric: str) -> list[Effect]:
     return effects
 
 
+def strongest_factor(study: Study, rows: Rows, metric: str) -> str | None:
+    """The factor over whose values the mean of a metric changes most; None where nothing can be compared."""
+    reach = {
+        effect.factor: float(np.ptp(effect.mean[np.isfinite(effect.mean)]))
+        for effect in main_effects(study, rows, metric)
+        if np.isfinite(effect.mean).any()
+    }
+    strongest = max(reach, key=lambda factor: reach[factor], default=None)
+    return strongest if len(reach) > 1 and strongest and reach[strongest] > 0.0 else None
+
+
 def sobol_indices(study: Study, rows: Rows, metric: str) -> Indices | None:
     """Indices of a metric over the rows of one law, averaged over repetitions.
 

@@ -24,7 +24,7 @@ from experiments.cli.workers import Executor, SimulationError
 from experiments.metrics.single_figures import FIGURES
 from experiments.report.plot_page import Section, html_table, write_plot_page
 from experiments.report.style import law_title
-from experiments.study.analysis import Rows, of_law, spread, study_json, worst_row
+from experiments.study.analysis import Rows, of_law, spread, strongest_factor, study_json, worst_row
 from experiments.study.figures import (
     effects_figure,
     indices_figure,
@@ -184,10 +184,13 @@ def study_verdict(study: Study, rows: Rows) -> str:
     if not ranked:
         return f"All {count(len(rows['row']), 'run')} failed."
     best = ranked[0]
+    strongest = strongest_factor(study, of_law(rows, best), metric)
     return (
         f"Over {count(len(rows['row']), 'run')} {law_title(best)} has the best worst run: "
         f"{metric_name(metric)} {found[best]['worst']:.3g}, in the median {found[best]['median']:.3g}, "
-        f"{metric_unit(metric)}." + (f" {count(failed, 'run')} failed." if failed else "")
+        f"{metric_unit(metric)}."
+        + (f" Of what is varied, {strongest} changes it most." if strongest else "")
+        + (f" {count(failed, 'run')} failed." if failed else "")
     )
 
 

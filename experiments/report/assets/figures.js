@@ -49,7 +49,7 @@ function colorFigures() {
     const change = {"font.color": ink};
     if (window.innerWidth < 520) {
       if (plot._fullLayout.scene) {
-        change["scene.camera.eye"] = {x: 2.1, y: 2.1, z: 1.6};
+        change["scene.camera.eye"] = {x: 2.5, y: 2.5, z: 1.7};
         change.height = Math.min(plot._fullLayout.height, Math.round(1.15 * plot.offsetWidth));
       }
       Object.assign(change, stacked(plot._fullLayout));

@@ -19,10 +19,26 @@ function panelCells(count) {
   });
 }
 
+/* The range of what happens from the start of the path on; the jolt of the start would leave no room for it. */
+function rangeOnPath(panel, i) {
+  let low = Infinity, high = -Infinity;
+  for (const codes of data.laws.filter(shown).map(law => panel.curves[law.id] || [])) {
+    const {x, y} = codes[i] ? curve(codes[i]) : {x: [], y: []};
+    x.forEach((time, k) => {
+      if (time < data.marks.path_start || y[k] === null || Number.isNaN(y[k])) return;
+      low = Math.min(low, y[k]);
+      high = Math.max(high, y[k]);
+    });
+  }
+  const edge = 0.08 * (high - low);
+  return edge > 0 ? [low - edge, high + edge] : undefined;
+}
 function drawPanel(panel) {
   if (!isOpen(panel.id)) return;
   const cells = panelCells(panel.axes.length), shapes = [], annotations = [];
-  const extra = {shapes, annotations, hovermode: "closest", margin: {l: 62, r: 14, t: 26, b: 46}};
+  const extra = {shapes, annotations, hovermode: "closest", 
+    /* Room for the buttons that appear above it. */
+    margin: {l: 62, r: 14, t: onPaper || narrow() ? 26 : 44, b: 46}};
   panel.axes.forEach((axes, i) => {
     const n = i ? i + 1 : "";
     extra["xaxis" + n] = axis({type: axes.x_log ? "log" : "linear", domain: cells[i].x, anchor: "y" + n,
@@ -30,7 +46,7 @@ function drawPanel(panel) {
       range: axes.over_time ? [data.laws[0].true.t[0], data.marks.path_end] : undefined, exponentformat: "none",
       dtick: axes.x_log ? 1 : undefined, nticks: axes.x_log ? undefined : 7});
     extra["yaxis" + n] = axis({type: axes.y_log ? "log" : "linear", domain: cells[i].y, anchor: "x" + n,
-      title: titled(axes.y), exponentformat: "none", dtick: axes.y_log ? 1 : undefined,
+      title: titled(axes.y), exponentformat: "none", range: axes.fits_path ? rangeOnPath(panel, i) : undefined, dtick: axes.y_log ? 1 : undefined,
       nticks: axes.y_log ? undefined : panel.axes.length > 3 && narrow() ? 4 : 6});
     for (const limit of axes.limits) shapes.push({type: "line", xref: "x" + n + " domain", yref: "y" + n,
       x0: 0, x1: 1, y0: limit, y1: limit, line: {color: css("--soft"), width: 1.2, dash: "dot"}});
@@ -69,7 +85,7 @@ function drawWorst() {
       Object.assign({mode: "lines+markers", marker: {size: [2, 5], color: law.color,
         symbol: ["circle", "diamond"]}, showlegend: false}, group)));
   }
-  const far = narrow() ? 1.9 : 1.45, scene = {aspectmode: "data", uirevision: "worst", dragmode: "turntable",
+  const far = narrow() ? 2.3 : 1.45, scene = {aspectmode: "data", uirevision: "worst", dragmode: "turntable",
     camera: {eye: {x: 1.2 * far, y: -0.9 * far, z: 0.5 * far}, center: {x: 0, y: 0, z: -0.1}}};
   for (const name of ["x", "y", "z"]) scene[name + "axis"] = {title: {text: name + " in mm",
     font: {size: 12, color: css("--soft")}}, gridcolor: css("--grid"), zerolinecolor: css("--grid"),

@@ -93,7 +93,7 @@ function drawPath() {
       line: {color: law.color, width: 5}, hovertemplate: law.title + "<extra></extra>"});
   }
   const extent = Math.max(...high.map((v, k) => v - low[k]));
-  const far = narrow() ? 1.45 : 1, eye = {x: 1.05 * far, y: -0.62 * far, z: 0.62 * far};
+  const far = narrow() ? 1.75 : 1, eye = {x: 1.05 * far, y: -0.62 * far, z: 0.62 * far};
   const ratio = {}, scene = {aspectmode: "manual", camera: {eye, center: {x: 0, y: 0, z: -0.04}},
     dragmode: "turntable", uirevision: "path"};
   ["x", "y", "z"].forEach((name, k) => {
@@ -170,8 +170,9 @@ window.figuresForPaper = () => {
   onPaper = null;
   document.documentElement.classList.remove("paper");
   for (const id in figures) if (!id.startsWith("bars"))
-    Object.assign(figures[id].layout, {showlegend: true,
-      legend: {orientation: "h", x: 0, y: 1.02, yanchor: "bottom"}});
+    Object.assign(figures[id].layout, {showlegend: true, margin: {...figures[id].layout.margin, t: 62},
+      /* At the top of the picture, above the words that stand at the top of its axes. */
+      legend: {orientation: "h", x: 0, y: 1, yref: "container", yanchor: "top"}});
   return figures;
 };
 
@@ -192,4 +193,5 @@ select.addEventListener("change", () => { magnification = Number(select.value); 
 matchMedia("(prefers-color-scheme: dark)").addEventListener("change", draw);
 draw();
 prepareFigures();
+prepareTables();
 document.body.dataset.drawn = "yes";

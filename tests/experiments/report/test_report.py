@@ -86,7 +86,6 @@ def test_no_figure_can_be_uploaded(opened):
 
 
 @pytest.mark.slow
-@pytest.mark.slow
 def test_every_plot_has_a_picture_for_printing_with_its_whole_width_and_a_legend(opened, logs):
     """A browser prints neither what WebGL has drawn nor a plot that is wider than the paper."""
     found = re.findall(r'<img class="paper-only" id="([\w-]+)-on-paper"[^>]* src="([^"]*)"', opened.dom)

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from diagrams.scenario.scenario import Scenario
+from experiments.study.analysis import strongest_factor
 from experiments.study.figures import effects_figure, metric_name, metric_unit
 from experiments.study.study_file import Levels, Range, Study
 from robots.configuration.quantity import unit_at
@@ -30,6 +31,12 @@ def test_an_axis_has_the_unit_of_its_factor_where_the_scenario_declares_one():
     titles = [layout[axis]["title"]["text"].replace("<br>", "") for axis in ("xaxis", "xaxis2", "xaxis3")]
     assert titles == ["station.payload in kg", "station.drive.dead_time in s", "reference.path"]
     assert layout["yaxis"]["title"]["text"] == "mean, in mm"
+
+
+def test_the_factor_that_changes_the_result_most_is_named_where_there_are_two():
+    assert strongest_factor(STUDY, ROWS, "max_norm_mm") == "station.payload"  # by 2 mm, dead time by 1
+    alone = Study(laws=["pbvs"], factors={"station.payload": Levels([0.0, 7.0])})
+    assert strongest_factor(alone, ROWS, "max_norm_mm") is None
 
 
 @pytest.mark.parametrize(
