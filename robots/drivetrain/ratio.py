@@ -44,10 +44,20 @@ class FourierRatio:
         object.__setattr__(self, "_terms", terms)
         waves = [(a / self.base, f, p) for a, f, p in zip(*np.moveaxis(terms, -1, 1), strict=True)]
         object.__setattr__(self, "_waves", waves)
-        # What Newton's first step from an even gear leaves at most.
-        first = np.sum(np.abs(terms[0]) / terms[1], axis=-1) / self.base
-        left = 0.5 * np.sum(np.abs(terms[0]) * terms[1], axis=-1) / self.base * first**2
-        object.__setattr__(self, "_steps", 1 if np.all(left < _EXACT_ENOUGH) else _NEWTON_STEPS)
+        object.__setattr__(self, "_steps", self._newton_steps(*np.abs(terms[:2])))
+
+    def _newton_steps(self, amplitude: np.ndarray, frequency: np.ndarray) -> int:
+        """How many steps from an even gear are exact enough.
+
+        Each leaves the square of what was left, times half of the curvature over the least slope at most.
+        """
+        left = np.sum(amplitude / frequency, axis=-1) / self.base
+        curved = 0.5 * np.sum(amplitude * frequency, axis=-1) / (self.base - amplitude.sum(axis=-1))
+        for steps in range(1, _NEWTON_STEPS):
+            left = curved * left**2
+            if np.all(left < _EXACT_ENOUGH):
+                return steps
+        return _NEWTON_STEPS
 
     def ratio(self, phi_B: np.ndarray) -> np.ndarray:
         """d(phi_A) / d(phi_B), eq. (2.6a)."""
