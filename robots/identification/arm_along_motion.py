@@ -68,6 +68,10 @@ class ElasticArm:
                 raise ValueError(f"sensor '{sensor.name}': {robot.name} has no body '{sensor.body}'")
         self._sensors = sensors
         self._bodies = [self._plant.GetBodyByName(sensor.body) for sensor in sensors]
+        self._rotations = np.array([sensor.rotation for sensor in sensors]).reshape(-1, 3, 3)  # R_BS
+        self._of_sensors = [int(body.index()) for body in self._bodies]
+        self._watched = dict(zip(self._of_sensors, self._bodies, strict=True))
+        self._accelerating = [i for i, sensor in enumerate(sensors) if sensor.kind == "accelerometer"]
         # Scratch memory only: written before every use.
         self._context, self._forces = self._plant.CreateDefaultContext(), MultibodyForces(self._plant)
         self._gravity = self._plant.gravity_field().gravity_vector()
@@ -96,16 +100,17 @@ class ElasticArm:
         torques = self._plant.CalcInverseDynamics(self._context, vdot, self._forces)[self.sprung]
         torques = torques - self._springs * q[self.sprung] - self._dampers * v[self.sprung]
         accelerations = self._plant.CalcSpatialAccelerationsFromVdot(self._context, vdot)
-        readings = np.empty((len(self._sensors), 3))
-        for row, sensor, body in zip(readings, self._sensors, self._bodies, strict=True):
-            R_WB = self._plant.EvalBodyPoseInWorld(self._context, body).rotation().matrix()
-            w_WB = self._plant.EvalBodySpatialVelocityInWorld(self._context, body).rotational()
-            shown = w_WB
-            if sensor.kind == "accelerometer":
-                at_body = accelerations[int(body.index())]
-                shown = at_body.Shift(R_WB @ sensor.position, w_WB).translational() - self._gravity
-            row[:] = (R_WB @ sensor.rotation).T @ shown
-        return torques, readings.ravel()
+        plant, context = self._plant, self._context
+        rotations, turning = {}, {}  # R_WB, w_WB
+        for index, body in self._watched.items():
+            rotations[index] = plant.EvalBodyPoseInWorld(context, body).rotation().matrix()
+            turning[index] = plant.EvalBodySpatialVelocityInWorld(context, body).rotational()
+        R_WB = np.array([rotations[index] for index in self._of_sensors]).reshape(-1, 3, 3)
+        shown = np.array([turning[index] for index in self._of_sensors]).reshape(-1, 3)
+        for i in self._accelerating:
+            p_BS_W, at_body = R_WB[i] @ self._sensors[i].position, accelerations[self._of_sensors[i]]
+            shown[i] = at_body.Shift(p_BS_W, shown[i]).translational() - self._gravity
+        return torques, (shown[:, None] @ R_WB @ self._rotations).ravel()
 
     def along(self, case: MotionCase, knot_time: float = 0.02, base_step: int = 2) -> ArmAlongMotion:
         """Linearises about a case.

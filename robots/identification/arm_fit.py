@@ -11,6 +11,7 @@ from robots.identification.elastic_parameters import ElasticParameters
 
 _SHIFT = 1.0  # samples, by which the times of robot and sensors may still be apart
 _ROBUST = 3.0  # in units of the spread: larger residuals, as where teeth meet, count less and less
+_ALONE = 1e-6  # of the information: what the other parts say of it at least
 _MAD = 1.4826  # of a normal distribution, standard deviation over median of the absolute value
 
 
@@ -82,6 +83,11 @@ class ArmProblem:
         scaled = np.square(self.residuals(p) / (_ROBUST * spread))
         return _ROBUST**2 * (np.sqrt(1.0 + scaled) - 1.0).sum(axis=(0, 2))
 
+    def set_rests(self, rests: np.ndarray) -> None:
+        """Where gears without load begin within their play from now on, (cases, 6)."""
+        self.response.set_rests(rests)
+        self._last = None
+
     def _response(self, p: np.ndarray, sensitivity: bool) -> Response:
         if self._last is not None and np.array_equal(self._last[0], p):
             found = self._last[1]
@@ -92,11 +98,11 @@ class ArmProblem:
         self._last = p.copy(), found
         return found
 
-    def jacobian(self, p: np.ndarray) -> np.ndarray:
-        """Of the residuals, (m, cases, channels, n)."""
+    def _whitened(self, p: np.ndarray, spread: np.ndarray) -> np.ndarray:
+        """Derivatives of the weighted residuals, (m, cases, channels, n)."""
         sensitivity = self._response(p, True).sensitivity
         assert sensitivity is not None
-        return sensitivity * self._known[..., None]
+        return sensitivity * (self._known / spread)[..., None]
 
     def solve(
         self, p: np.ndarray, spread: np.ndarray, steps: int, tolerance: float
@@ -115,7 +121,10 @@ class ArmProblem:
         # that is believed they are shares of a spring, whatever logarithms the dampers have.
         origin = np.append(prior.start, np.zeros(cases)) - 1.0
         sigma = np.append(prior.prior_sigma, np.full(cases, _SHIFT))
-        by_shift = self._shift_columns(spread).reshape(self.measured.size, cases)
+        rows = self.measured.size
+        J = np.zeros((rows + n + cases, n + cases))
+        J[:rows, n:] = self._shift_columns(spread).reshape(rows, cases)
+        J[rows:] = np.diag(1.0 / sigma)
 
         def residuals(x: np.ndarray) -> np.ndarray:
             at = x + origin
@@ -123,8 +132,8 @@ class ArmProblem:
             return np.concatenate([left.ravel(), (x - 1.0) / sigma])
 
         def jacobian(x: np.ndarray) -> np.ndarray:
-            whitened = (self.jacobian((x + origin)[:n]) / spread[:, None]).reshape(-1, n)
-            return np.vstack([np.hstack([whitened, by_shift]), np.diag(1.0 / sigma)])
+            J[:rows, :n] = self._whitened((x + origin)[:n], spread).reshape(rows, n)
+            return J.copy()  # scipy weighs it in place
 
         lower, upper = (
             np.append(limit, np.full(cases, sign * np.inf))
@@ -175,20 +184,20 @@ class ArmProblem:
         n = len(p)
         sigma = np.append(self.parameters.prior_sigma, np.full(len(shift), _SHIFT))
         residuals = self._shifted(p, shift) / spread
-        J = np.concatenate([self.jacobian(p) / spread[:, None], self._shift_columns(spread)], axis=3)
+        J = np.concatenate([self._whitened(p, spread), self._shift_columns(spread)], axis=3)
         # As soft_l1 weighs them.
         weight = 1.0 / np.sqrt(1.0 + np.square(residuals / _ROBUST))
         # By case and sensor, whose three channels belong together.
         m, cases, channels, columns = J.shape
-        J = J.reshape(m, cases, channels // 3, 3, columns)
-        weight = weight.reshape(J.shape[:-1])
-        pull = np.einsum("mcsk,mcskn->mcsn", weight * residuals.reshape(weight.shape), J)
-        flat = J.reshape(-1, columns)
-        information = (flat * weight.reshape(-1, 1)).T @ flat
+        J = J.reshape(m, cases, channels // 3, 3, columns) * np.sqrt(weight).reshape(m, cases, -1, 3, 1)
+        residuals = residuals.reshape(J.shape[:-1]) * np.sqrt(weight).reshape(J.shape[:-1])
+        of_phases = [part_of(J[phases == k], residuals[phases == k]) for k in range(phases.max() + 1)]
+        of_cases = [part_of(J[:, k], residuals[:, k]) for k in range(cases)]
+        of_sensors = [part_of(J[:, :, k], residuals[:, :, k]) for k in range(channels // 3)]
+        information = np.sum([part.information for part in of_cases], axis=0)
         covariance = np.linalg.inv(information + np.diag(1.0 / sigma**2))
-        of_phases = [pull[phases == k].sum(axis=(0, 1)) for k in range(phases.max() + 1)]
-        groups = [pull.sum(axis=(0, 2)), pull.sum(axis=(0, 1)), np.array(of_phases)]
-        whole = covariance + _scatter(groups, covariance)
+        ways = of_cases, of_sensors, of_phases
+        whole = covariance + np.sum([scatter(parts, covariance) for parts in ways], axis=0)
         of_unknowns = information[:n, :n] * np.outer(sigma[:n], sigma[:n])
         singular = np.linalg.svd(of_unknowns, compute_uv=False)
         condition = float(np.sqrt(singular[0] / max(singular[-1], 1e-300)))
@@ -203,22 +212,42 @@ class ArmProblem:
         )
 
 
-def _scatter(groups: Sequence[np.ndarray], covariance: np.ndarray) -> np.ndarray:
-    """How far parts of the data pull the unknowns apart: the sandwich covariance, clustered in several ways.
+@dataclass(frozen=True)
+class DataPart:
+    """What a part of the data says of n unknowns, whitened."""
+
+    pull: np.ndarray  # (n,), the gradient
+    information: np.ndarray  # (n, n)
+
+
+def part_of(J: np.ndarray, residuals: np.ndarray) -> DataPart:
+    """From whitened sensitivities, (..., n), and residuals, (...)."""
+    flat = J.reshape(-1, J.shape[-1])
+    return DataPart(residuals.ravel() @ flat, flat.T @ flat)
+
+
+def scatter(parts: Sequence[DataPart], covariance: np.ndarray) -> np.ndarray:
+    """How far parts of the data pull the unknowns apart: the sandwich covariance, clustered, (n, n).
 
     What the model lacks is another thing in each case, to each sensor, and in each phase of the motions:
     while the robot speeds up, slows down, and as the ringing dies away. At the solution the gradients of the
     parts add up to zero, but none of them is zero; how large they are says how much the parts disagree.
-    Cameron, Gelbach and Miller (2011), without the terms that they subtract, which is on the safe side. What
-    is wrong alike for all of them is not in it.
+    Summed over several ways to part the data it is that of Cameron, Gelbach and Miller (2011), without the
+    terms that they subtract, which is on the safe side.
+
+    A part that is nearly alone in what it says has drawn the solution to itself and seems to agree. With H
+    for its share of the information, its gradient counts (1 - H)^(-1/2) times: CR2 of Bell and McCaffrey
+    (2002). What is wrong alike for all parts is not in it.
 
     Args:
-        groups: gradients of the parts, (parts, n) each.
-        covariance: of noise alone, the inverse of the information, (n, n).
+        parts: of the data.
+        covariance: of noise alone, the inverse of information and priors, (n, n).
     """
-    total = np.zeros_like(covariance)
-    for of_parts in groups:
-        parts = len(of_parts)
-        if parts > 1:
-            total += parts / (parts - 1.0) * of_parts.T @ of_parts
-    return covariance @ total @ covariance
+    root = np.linalg.cholesky(covariance)
+    moved = []
+    for part in parts:
+        share, axes = np.linalg.eigh(root.T @ part.information @ root)
+        left = np.maximum(1.0 - share, _ALONE)
+        moved.append(root @ axes @ ((axes.T @ root.T @ part.pull) / np.sqrt(left)))
+    # A single part is the whole: its gradient is zero.
+    return np.transpose(moved) @ np.array(moved) if len(parts) > 1 else np.zeros_like(covariance)

@@ -23,12 +23,14 @@ from robots.identification.first_stage import (
 from robots.identification.motion import MotionCase, SensorPlace
 from robots.identification.recording import RecordedCase, check_axes, check_excitation, lag_of
 
-_FAR = 0.3  # of the logarithm of a spring, from which on the arm is linearised again where it then sags
+# Whether few motions alone, and how many steps; between rounds times, rests and equations become better.
+_ROUNDS = ((True, 8), (False, 5), (False, 5))
+_LAST_STEPS = 10
 _PHASES = 4  # of a motion
 _PHASE = 0.1  # s, of the ringing
 _PLACES = (-1.0, -0.5, 0.0, 0.5, 1.0)  # within the play of a gear, tried
 # At the end the rule errs by a two-hundredth in a frequency of 80 Hz; the first stages need less.
-_FINE = Grid(2, 1, 2)
+_FINE = Grid(2, 1, 4)
 
 Progress = Callable[[float], None]
 
@@ -58,20 +60,20 @@ class _Data:
         sensors: list[SensorPlace],
         progress: Progress,
     ) -> None:
-        self.recorded, self.sensors = recorded, sensors
+        self.recorded, self.sensors, self._arm = recorded, sensors, arm
         self.motions: list[ArmAlongMotion] = []
-        self.linearise(arm, progress)
+        for case in recorded:
+            self.motions.append(arm.along(case.at_lag(0.0)))
+            progress(len(self.motions) / len(recorded))
         self.lags = np.zeros(len(recorded))
         self.rests = np.zeros((len(recorded), NUM_JOINTS))  # within the play, see `ArmResponse`
         self.cases: list[MotionCase] = []
         self._offsets: list[np.ndarray] = []  # of the sensors at rest, (sensors, 3)
 
-    def linearise(self, arm: ElasticArm, progress: Progress) -> None:
-        """Takes an arm whose springs let it sag as it does."""
-        self._arm, self.motions = arm, []
-        for case in self.recorded:
-            self.motions.append(arm.along(case.at_lag(0.0)))
-            progress(len(self.motions) / len(self.recorded))
+    @property
+    def rigid(self) -> list[np.ndarray]:
+        """What sensors show on an arm that yields but does not vibrate, (n, sensors, 3) of each case."""
+        return [motion.readings.reshape(len(motion.readings), -1, 3) for motion in self.motions]
 
     def align(self, modelled: Sequence[np.ndarray]) -> None:
         """Brings the sensors to the robot's time, and takes their bias from the rest before the motion.
@@ -132,22 +134,19 @@ class _Data:
         Returns:
             How many evaluations it took.
         """
-        everything = range(len(self.recorded))
-        problem = self.problem(parameters, ratio, everything)
+        problem = self.problem(parameters, ratio, range(len(self.recorded)))
         free, best = problem.response.unloaded(p), problem.cost(p, spread)
-        evaluations = problem.evaluations
         for joint in np.flatnonzero(free.any(axis=0)):
             kept = self.rests[:, joint].copy()
             for place in _PLACES:
                 self.rests[:, joint] = np.where(free[:, joint], place, kept)
-                problem = self.problem(parameters, ratio, everything)
+                problem.set_rests(self.rests)
                 cost = problem.cost(p, spread)
-                evaluations += problem.evaluations
                 better = cost < best
                 best = np.where(better, cost, best)
                 kept = np.where(better & free[:, joint], place, kept)
             self.rests[:, joint] = kept
-        return evaluations
+        return problem.evaluations
 
     def align_to(self, parameters: ElasticParameters, ratio: np.ndarray, p: np.ndarray) -> int:
         """Aligns all cases to what unknowns p make of them; returns how many evaluations that took."""
@@ -215,35 +214,36 @@ def identify_arm(
     """
     tell = progress or (lambda share: None)
     arm = ElasticArm(robot, payload, sensors)
-    data = _Data(arm, recorded, sensors, lambda share: tell(0.2 * share))
-    rigid = [motion.readings.reshape(len(motion.readings), -1, 3) for motion in data.motions]
-    check_excitation([case.at_lag(0.0) for case in recorded], rigid, sensors)
-    data.align(rigid)
-    check_axes(data.cases, rigid, sensors)
     floor, some = sensor_floor(sensors), few(len(recorded))
     everything = list(range(len(recorded)))
+    first = _Data(arm, [recorded[i] for i in some], sensors, lambda share: tell(0.1 * share))
+    check_excitation([case.at_lag(0.0) for case in first.recorded], first.rigid, sensors)
+    first.align(first.rigid)
+    check_axes(first.cases, first.rigid, sensors)
 
     # Linear gears first: where the springs are far off, play only makes valleys to be lost in.
     plain = ElasticParameters(arm, gear_parts=False)
     problems: list[ArmProblem] = []
 
     def until(horizon: float) -> ArmProblem:
-        problems.append(data.problem(plain, robot.gear_ratio, some, horizon=horizon))
+        problems.append(first.problem(plain, robot.gear_ratio, every, horizon=horizon))
         return problems[-1]
 
-    p = solve_from_afar(until, plain.start.copy(), floor, lambda shift: data.shift(some, shift))
+    every = list(range(len(some)))
+    p = solve_from_afar(until, plain.start.copy(), floor, lambda shift: first.shift(every, shift))
     evaluations = sum(problem.evaluations for problem in problems)
+    # About where the arm sags with these springs, and all of the motions.
+    sagging = ElasticArm(varied(robot, plain.factors(p)), payload, sensors)
+    data = _Data(sagging, recorded, sensors, lambda share: tell(0.2 + 0.2 * share))
+    data.align(data.rigid)
     evaluations += data.align_to(plain, robot.gear_ratio, p)
-    if np.abs(p[plain.of_kind("stiffness")]).max() > _FAR:
-        sagging = ElasticArm(varied(robot, plain.factors(p)), payload, sensors)
-        data.linearise(sagging, lambda share: tell(0.3 + 0.1 * share))
     data.bring_near(plain, robot.gear_ratio, p, some)
-    tell(0.4)
 
     parameters = ElasticParameters(arm, gear_parts, _turning(data.cases, robot.gear_ratio))
     found = parameters.start.copy()
     found[: len(p)] = p
-    for chosen, steps in ((some, 6), (everything, 3)):
+    for is_few, steps in _ROUNDS:
+        chosen = some if is_few else everything
         problem = data.problem(parameters, robot.gear_ratio, chosen)
         found, _ = problem.solve(found, problem.spread(found, floor), steps, NEAR)
         spread = problem.spread(found, floor)
@@ -251,9 +251,9 @@ def identify_arm(
         if gear_parts:
             evaluations += data.find_rests(parameters, robot.gear_ratio, found, spread)
         data.bring_near(parameters, robot.gear_ratio, found, everything)
-        tell(0.7 if chosen is some else 0.85)
+        tell(0.7 if is_few else 0.85)
     problem = data.problem(parameters, robot.gear_ratio, everything, _FINE)
-    found, shift = problem.solve(found, problem.spread(found, floor), 4, NEAR)
+    found, shift = problem.solve(found, problem.spread(found, floor), _LAST_STEPS, NEAR)
     tell(0.95)
     before = problem.readings(parameters.start)
     phases = _phases(data.cases, problem.response.kept)

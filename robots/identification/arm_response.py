@@ -86,6 +86,11 @@ class ArmResponse:
         self._base = [_filtered(m.readings, self._low_pass, grid) for m in motions]
         self._columns = _columns(parameters)
 
+    def set_rests(self, rests: np.ndarray) -> None:
+        """Where gears without load begin within their play from now on, (cases, 6)."""
+        for case, rest in zip(self._cases, rests, strict=True):
+            case.rest = rest.copy()
+
     def unloaded(self, p: np.ndarray) -> np.ndarray:
         """Which gears carry nothing before a case begins, (cases, 6) bool."""
         numbers = self._parameters.numbers(p)
@@ -135,7 +140,7 @@ class _Case:
     def __init__(
         self, motion: ArmAlongMotion, case: MotionCase, turns: np.ndarray, grid: Grid, rest: np.ndarray
     ) -> None:
-        self._rest = rest
+        self.rest = rest
         self._motion, self.samples = motion, len(case.theta)
         self._load = _refined(motion.load, grid.steps)
         turned = turns * _refined(case.theta, grid.steps)
@@ -150,12 +155,15 @@ class _Case:
         self._whole, self._h = _between(self._knots, whole, self._close), h
         self._held = np.concatenate([motion.stiffness, motion.coriolis], axis=2)
         self._levers = np.concatenate([motion.by_turn, motion.by_speed, motion.by_acceleration], axis=2)
+        self._inverted: tuple[np.ndarray, np.ndarray] | None = None  # of which springs
 
     def posture(self, springs: np.ndarray) -> tuple[np.ndarray, ...]:
         """What changes with the posture, at knots; see `response_kernels.go_through`."""
-        own = GAMMA * self._h * springs[1] + BETA * self._h**2 * springs[0]
-        inverse = np.linalg.inv(self._whole + np.diag(own))
-        return self._knots, self._held, self._motion.rest[:, None], self._levers, self._close, inverse
+        if self._inverted is None or not np.array_equal(self._inverted[0], springs):
+            own = GAMMA * self._h * springs[1] + BETA * self._h**2 * springs[0]
+            self._inverted = springs, np.linalg.inv(self._whole + np.diag(own))
+        rest = self._motion.rest[:, None]
+        return self._knots, self._held, rest, self._levers, self._close, self._inverted[1]
 
     def course(self, ripple: np.ndarray) -> tuple[np.ndarray, ...]:
         """What changes from step to step with ripples of the gears in rad, (2, 6)."""
@@ -167,12 +175,12 @@ class _Case:
         """Deflections in rad under the first load, (e,), signs of the gears' loads, places in the play."""
         load, K, rest = self._load[0], self._motion.stiffness[0], self._motion.rest[0]
         offset = (self._waves[0, 0] * ripple).sum(axis=0)
-        x, sign, side = np.zeros_like(load), np.zeros(NUM_JOINTS), self._rest
+        x, sign, side = np.zeros_like(load), np.zeros(NUM_JOINTS), self.rest
         for _ in range(6):
             carried = -load - K @ (x - rest)
             x = carried / springs[0]
             sign = np.where(np.abs(x[_G]) < _UNLOADED, 0.0, np.sign(x[_G]))
-            side = np.where(sign == 0.0, self._rest, sign)
+            side = np.where(sign == 0.0, self.rest, sign)
             x[_G] = carried[_G] / gears[:, 0] + side * gears[:, 2] + offset
         return x, sign, side
 
