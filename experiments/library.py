@@ -9,7 +9,7 @@ from diagrams.record.log import RunLog
 from diagrams.runs.simulation import run
 from diagrams.scenario.scenario import Scenario, load_scenario
 from experiments.calibration.calibrate import validate
-from experiments.cli.workers import Executor
+from experiments.cli.workers import Executor, LocalProcesses
 from experiments.comparison.compare import compare as run_laws
 from experiments.comparison.compare import compared_laws
 from experiments.identify.cases import MotionCases, default_cases
@@ -221,7 +221,7 @@ def record_motions(
     """
     model = _robot(robot)
     chosen = default_cases(model) if motions is None else motions
-    return simulated_recording(model, _robot(plant), chosen, seed, processes, progress)
+    return simulated_recording(model, _robot(plant), chosen, seed, LocalProcesses(processes), progress)
 
 
 def identify(

@@ -10,12 +10,20 @@ from rich.console import Console
 from rich.markup import escape
 from rich.table import Table
 
+from experiments.cli.cluster import executor
 from experiments.cli.console import count, print_files, progress_bar, refusing
 from experiments.cli.json_output import human_console, json_output
 from experiments.cli.option_limits import at_least
-from experiments.cli.options import JobsOption, JsonOption, PictureOption, StudiedRobotOption
+from experiments.cli.options import (
+    JobsOption,
+    JsonOption,
+    PictureOption,
+    SchedulerOption,
+    StudiedRobotOption,
+)
 from experiments.cli.prepare import noted_robot
 from experiments.cli.staging import PAGE, TABLE, YAML, staged_file
+from experiments.cli.workers import Executor
 from experiments.feedforward.command import realistic_robot
 from experiments.identify.cases import MotionCases, default_cases, load_cases
 from experiments.identify.excitation import (
@@ -27,6 +35,14 @@ from experiments.identify.excitation import (
 from experiments.identify.plots import table_head, table_rows, verdict, write_identify_page
 from experiments.identify.recording_file import RECORDINGS, read_recording, write_recording
 from experiments.identify.recording_map import Recording
+from experiments.identify.search import (
+    LEAST_EVALUATIONS,
+    SEARCH_HEAD,
+    check_pymoo,
+    compare_searches,
+    search_json,
+    search_rows,
+)
 from experiments.identify.simulated import simulated_recording
 from experiments.identify.slow import identify_slow_recording
 from experiments.identify.study import (
@@ -90,7 +106,17 @@ def identify_command(
     rectangle: Annotated[
         bool, typer.Option(help="Drive a rectangle with the identified inverse model; needs --plant.")
     ] = True,
-    seed: Annotated[int, typer.Option(metavar="N", help="Seed of the noise of simulated sensors.")] = 0,
+    search: Annotated[
+        int | None,
+        typer.Option(
+            metavar="N",
+            help="Compare with CMA-ES and a genetic algorithm, from N starts off by a factor of two.",
+        ),
+    ] = None,
+    search_evaluations: Annotated[
+        int, typer.Option(metavar="N", help="Of the model, for each of these.")
+    ] = 1500,
+    seed: Annotated[int, typer.Option(metavar="N", help="Seed of simulated noise and of searches.")] = 0,
     write: Annotated[
         Path | None,
         typer.Option(metavar="FILE.yaml", help="The identified robot, for --robot of every command."),
@@ -106,12 +132,15 @@ def identify_command(
     report: PictureOption = Path("out/identify.html"),
     json_file: JsonOption = None,
     jobs: JobsOption = None,
+    scheduler: SchedulerOption = None,
 ) -> None:
     """Identify stiffness and damping from short motions, gyros and accelerometers."""
     human = human_console(json_file)
     with json_output(json_file) as output, refusing(ValueError, OSError), ExitStack() as stack:
         at_least("--jobs", 1, jobs)
         at_least("--seed", 0, seed)
+        at_least("--search", 1, search)
+        at_least("--search-evaluations", LEAST_EVALUATIONS, search_evaluations)
         if recording is not None and (cases is not None or write_table is not None):
             raise ValueError(
                 "--recording is what was recorded: no --motions and no --write-recording go with it"
@@ -134,6 +163,9 @@ def identify_command(
             human.print(escape(told_of(excitation)))
             return
         truth = _plant(robot, plant, recording is not None)
+        where = executor(scheduler, jobs)
+        if search is not None:
+            check_pymoo()
         page = stack.enter_context(staged_file(report, *PAGE))
         robot_file = stack.enter_context(staged_file(write, *YAML)) if write else None
         table = stack.enter_context(staged_file(write_table, *RECORDINGS)) if write_table else None
@@ -143,7 +175,7 @@ def identify_command(
         else:
             assert truth is not None
             motions = load_cases(cases, model) if cases else default_cases(model)
-            recorded = _simulated(model, truth, motions, seed, jobs)
+            recorded = _simulated(model, truth, motions, seed, where)
             if table:
                 write_recording(table, recorded)
         of_slow = identify_slow_recording(slow, model) if slow else None
@@ -151,12 +183,18 @@ def identify_command(
             study = study_recording(model, truth, recorded, gear_parts, of_slow, progress)
         if rectangle and truth is not None:
             with progress_bar("rectangle") as progress:
-                study = with_rectangle(study, jobs, progress)
-        write_identify_page(page, study)
+                study = with_rectangle(study, where, progress)
+        searches = None
+        if search is not None:
+            with progress_bar(f"searches from {count(search, 'start')}") as progress:
+                searches = compare_searches(study, search, search_evaluations, seed, where, progress)
+        write_identify_page(page, study, searches)
         if robot_file:
             write_text(robot_file, robot_text(study.identified))
-        output.write(identify_json(study))
+        output.write(identify_json(study) | ({"searches": search_json(searches)} if searches else {}))
     _print(human, study)
+    if searches:
+        human.print(_table(SEARCH_HEAD, search_rows(searches)))
     print_files(human, report, write, write_table)
 
 
@@ -175,10 +213,10 @@ def _plant(robot: str, plant: str | None, is_recorded: bool) -> RobotModel | Non
 
 
 def _simulated(
-    model: RobotModel, truth: RobotModel, motions: MotionCases, seed: int, jobs: int | None
+    model: RobotModel, truth: RobotModel, motions: MotionCases, seed: int, where: Executor
 ) -> Recording:
     with progress_bar(f"recording of {count(len(motions.starts(model)), 'motion')}") as progress:
-        return simulated_recording(model, truth, motions, seed, jobs, progress)
+        return simulated_recording(model, truth, motions, seed, where, progress)
 
 
 def _print(human: Console, study: IdentifyStudy) -> None:
@@ -189,7 +227,7 @@ def _print(human: Console, study: IdentifyStudy) -> None:
 def _table(head: list[str], rows: list[list[str]]) -> Table:
     table = Table(box=box.SIMPLE_HEAD, padding=(0, 1, 0, 0))
     for name in head:
-        left = name in ("parameter", "unit")
+        left = name in ("parameter", "unit", "method")
         table.add_column(name, justify="left" if left else "right", no_wrap=True)
     for row in rows:
         table.add_row(*map(escape, row))

@@ -1,9 +1,10 @@
 """Benchmark of identifications from starts that are far off: errors, and whether intervals hold the truth.
 
-``python -m experiments.identify.coverage_bench 50 out/coverage.jsonl [FIRST]``: so many robots, each with
-springs, dampers and noise of its own, 18 motions of the realistic plant each, believed to be by a factor of
-two too stiff or too soft in every spring. A line a robot goes into the file; those that are there are not
-done again.
+``python -m experiments.identify.coverage_bench ROBOTS DRAWS out/coverage.jsonl [FIRST]``: so many robots,
+each with springs and dampers of its own, 18 motions of the realistic plant each. The motions are recorded
+once a robot, without noise, into a folder beside the file; each draw adds noise, a clock and beliefs of its
+own, by a factor of two too stiff or too soft in every spring. A line a draw goes into the file; what is there
+is not done again.
 """
 
 import json
@@ -14,9 +15,11 @@ from pathlib import Path
 
 import numpy as np
 
+from experiments.cli.workers import LocalProcesses
 from experiments.identify.cases import default_cases
+from experiments.identify.recording_file import read_recording, write_recording
 from experiments.identify.recording_map import Recording
-from experiments.identify.simulated import simulated_recording
+from experiments.identify.simulated import places, simulated_recording
 from experiments.identify.study import IdentifyStudy, study_recording
 from robots.description.drive_parts import Backlash
 from robots.description.model import RobotModel, load_robot
@@ -24,6 +27,7 @@ from robots.description.variation import Factors, varied
 
 ROBOT, SPREAD, TIMES = "kr210", 0.2, 0.4  # logarithms of springs and of retardation times, either way
 OFF = 2.0  # times
+OFFSET, DRIFT = 0.02, 2e-5  # s and relative, of the clock of the sensors, either way
 WITHIN = 1.96  # standard deviations
 KINDS = {"stiffness_": 0.03, "damping_": 0.25}  # allowed errors
 
@@ -66,18 +70,54 @@ def far(robot: RobotModel, rng: np.random.Generator) -> RobotModel:
     return varied(robot, Factors(coins(6), coins(6, 2), coins(6, 3)))
 
 
-def identified(seed: int, recording: Recording | None = None) -> tuple[IdentifyStudy, RobotModel]:
-    """One robot, recorded and identified."""
-    rng = np.random.default_rng(seed)
-    nominal = load_robot(ROBOT)
-    plant = drawn(load_robot(f"{ROBOT}-realistic"), rng)
-    believed = far(nominal, rng)
-    # Simulated under the nominal feedforward: it excites alike whatever is believed.
-    recording = recording or simulated_recording(nominal, plant, default_cases(nominal), seed, processes=1)
-    return study_recording(believed, plant, recording), plant
+def recorded(seed: int, folder: Path) -> Recording:
+    """The motions of one robot without noise, simulated or as they were kept.
+
+    The sensors are read with the ticks of the robot: a clock of their own, which a draw gives them, would
+    only cost steps of the integration. The feedforward is the nominal one: it excites alike whatever is
+    believed.
+    """
+    path = folder / f"robot_{seed}.parquet"
+    if not path.exists():
+        nominal, motions = load_robot(ROBOT), default_cases(load_robot(ROBOT))
+        sensors = places(motions.logger)
+        motions.logger.clock_offset = motions.logger.clock_drift_ppm = 0.0
+        for sensor in motions.logger.sensors:
+            sensor.noise_sigma = 0.0
+        found = simulated_recording(nominal, plant_of(seed), motions, seed, LocalProcesses(1))
+        folder.mkdir(parents=True, exist_ok=True)
+        write_recording(path, replace(found, sensors=sensors))
+    return read_recording(path)
 
 
-def line(seed: int, study: IdentifyStudy) -> dict:
+def plant_of(seed: int) -> RobotModel:
+    """The robot of a seed."""
+    return drawn(load_robot(f"{ROBOT}-realistic"), np.random.default_rng(seed))
+
+
+def with_noise(recording: Recording, rng: np.random.Generator) -> Recording:
+    """As sensors with noise and a clock of their own show it."""
+    sigma = np.array([sensor.sigma for sensor in recording.sensors])[:, None]
+    offset, drift = rng.uniform(-OFFSET, OFFSET), rng.uniform(-DRIFT, DRIFT)
+    cases = [
+        replace(
+            case,
+            stamps=(1.0 + drift) * case.stamps + offset,
+            readings=case.readings + sigma * rng.normal(size=case.readings.shape),
+        )
+        for case in recording.cases
+    ]
+    return replace(recording, cases=cases)
+
+
+def identified(seed: int, draw: int, recording: Recording) -> IdentifyStudy:
+    """One robot, as one draw of noise and beliefs has it."""
+    rng = np.random.default_rng([seed, draw])
+    believed = far(load_robot(ROBOT), rng)
+    return study_recording(believed, plant_of(seed), with_noise(recording, rng))
+
+
+def line(seed: int, draw: int, study: IdentifyStudy, seconds: float) -> dict:
     """What is kept of one."""
     rows = [
         {
@@ -89,7 +129,7 @@ def line(seed: int, study: IdentifyStudy) -> dict:
         for each in study.parameters
         if each.true and each.name.startswith(tuple(KINDS))
     ]
-    return {"seed": seed, "seconds": study.seconds, "parameters": rows}
+    return {"robot": seed, "draw": draw, "seconds": seconds, "parameters": rows}
 
 
 def report(lines: list[dict]) -> None:
@@ -106,25 +146,28 @@ def report(lines: list[dict]) -> None:
         )
 
 
-def main(robots: int, path: Path, first: int) -> None:
+def main(robots: int, draws: int, path: Path, first: int) -> None:
     """Does what is not there, then reports."""
     lines = [json.loads(text) for text in path.read_text().splitlines()] if path.exists() else []
-    done = {each["seed"] for each in lines}
+    done = {(each["robot"], each["draw"]) for each in lines}
+    folder = path.with_suffix(".recordings")
     path.parent.mkdir(parents=True, exist_ok=True)
     for seed in range(first, first + robots):
-        if seed in done:
-            continue
-        started = time.process_time()
-        study, _ = identified(seed)
-        lines.append(line(seed, study))
-        with path.open("a") as file:
-            file.write(json.dumps(lines[-1]) + "\n")
-        print(f"robot {seed}: {time.process_time() - started:.0f} CPU s", flush=True)
-        report(lines[-1:])
+        recording = recorded(seed, folder)
+        for draw in range(draws):
+            if (seed, draw) in done:
+                continue
+            started = time.process_time()
+            study = identified(seed, draw, recording)
+            lines.append(line(seed, draw, study, time.process_time() - started))
+            with path.open("a") as file:
+                file.write(json.dumps(lines[-1]) + "\n")
+            print(f"robot {seed}, draw {draw}: {lines[-1]['seconds']:.0f} CPU s", flush=True)
+            report(lines[-1:])
     report(lines)
 
 
 if __name__ == "__main__":
-    if len(sys.argv) < 3:
+    if len(sys.argv) < 4:
         raise SystemExit(__doc__)
-    main(int(sys.argv[1]), Path(sys.argv[2]), int(sys.argv[3]) if len(sys.argv) > 3 else 0)
+    main(int(sys.argv[1]), int(sys.argv[2]), Path(sys.argv[3]), int(sys.argv[4]) if len(sys.argv) > 4 else 0)

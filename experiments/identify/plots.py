@@ -7,6 +7,7 @@ import plotly.graph_objects as go
 from plotly.subplots import make_subplots
 
 from experiments.cli.console import count
+from experiments.identify.search import SEARCH_HEAD, SearchComparison, search_rows
 from experiments.identify.study import IdentifyStudy
 from experiments.report.plot_page import Section, html_table, sortable_table, write_plot_page
 
@@ -141,7 +142,47 @@ def sensitivity_rows(study: IdentifyStudy) -> list[list[str]]:
     return [[fit.parameters.names[i], f"{noise[i]:.2g}", f"{fit.sigma[i]:.2g}"] for i in order]
 
 
-def write_identify_page(path: Path, study: IdentifyStudy) -> None:
+def cost_figure(searches: SearchComparison) -> go.Figure:
+    """Where all searches ended: cost over time of the processor, a point a start."""
+    figure = go.Figure()
+    for method in dict.fromkeys(run.method for run in searches.runs):
+        runs = [run for run in searches.runs if run.method == method]
+        x, y = [run.seconds for run in runs], [float(run.cost) for run in runs]
+        figure.add_trace(go.Scatter(x=x, y=y, mode="markers", name=method, marker={"size": 9}))
+    figure.update_xaxes(title="time of the processor in s", rangemode="tozero")
+    return figure.update_yaxes(title="cost at the end", type="log")
+
+
+def front_figure(searches: SearchComparison) -> go.Figure:
+    """Costs of slower and faster motions that cannot both be less."""
+    slow, fast = searches.front.cost.T
+    front = go.Scatter(x=slow, y=fast, mode="markers+lines", line={"color": _AFTER})
+    figure = go.Figure(front)
+    figure.update_xaxes(title="cost of the slower motions")
+    return figure.update_yaxes(title="cost of the faster motions")
+
+
+def _search_sections(searches: SearchComparison) -> list[Section]:
+    return [
+        Section(
+            "Searches",
+            "Springs and dampers with linear gears from few motions, the same problem for all; every spring "
+            "is by a factor of two too stiff or too soft at the start. The furthest spring is told against "
+            "the search with the least cost; a start fails that ends 5 % above it.",
+            html_table(SEARCH_HEAD, search_rows(searches)),
+        ),
+        Section("Where searches ended", "A point for each start.", cost_figure(searches), 420),
+        Section(
+            "Slower against faster motions",
+            "NSGA-II from around the best: what a model with linear gears can say better of the slower "
+            "motions only at the cost of the faster ones. Were all as in the model, it would be a point.",
+            front_figure(searches),
+            420,
+        ),
+    ]
+
+
+def write_identify_page(path: Path, study: IdentifyStudy, searches: SearchComparison | None = None) -> None:
     """All of it as a page that opens offline."""
     parameters = Section(
         "Parameters",
@@ -173,6 +214,8 @@ def write_identify_page(path: Path, study: IdentifyStudy) -> None:
         ),
         Section("Correlations", "Of the unknowns.", correlation_figure(study), 800),
     ]
+    if searches is not None:
+        sections += _search_sections(searches)
     write_plot_page(
         path, f"Identification of {study.robot.name}, {study.payload:g} kg", verdict(study), sections
     )

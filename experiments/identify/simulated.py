@@ -11,7 +11,7 @@ from pydrake.systems.primitives import LogVectorOutput
 from diagrams.integration import Integration, IntegratorConfig
 from diagrams.scenario.scenario import StationConfig
 from diagrams.station import SimulatedStation
-from experiments.cli.workers import Progress, SimulationError, in_processes
+from experiments.cli.workers import Executor, LocalProcesses, Progress, SimulationError, in_order
 from experiments.feedforward.trial import CommandPlayer, Trial, commands
 from experiments.identify.cases import MotionCases
 from experiments.identify.recording_map import Recording
@@ -97,7 +97,7 @@ def simulated(
     plant: RobotModel,
     cases: MotionCases,
     seed: int,
-    processes: int | None = None,
+    executor: Executor | None = None,
     progress: Callable[[float], None] | None = None,
 ) -> list[RecordedCase]:
     """Records all cases.
@@ -107,7 +107,7 @@ def simulated(
         plant: what moves.
         cases: what is moved.
         seed: of the noise of the sensors.
-        processes: how many work at a time; None for one per core.
+        executor: where the motions are simulated, each of them a job; None for all cores of this machine.
         progress: is called now and then with the share that is done, 0 to 1.
 
     Raises:
@@ -122,7 +122,7 @@ def simulated(
             robot, payload, q, angle, config, plant, settle=cases.settle, speeding_up=cases.speeding_up
         )
         runs.append(CaseRun(f"{number}", trial, cases.logger, cases.ringing, 1000 * seed + number))
-    return in_processes(_run, runs, processes, progress)
+    return in_order(executor or LocalProcesses(), _run, runs, progress)
 
 
 def simulated_recording(
@@ -130,11 +130,11 @@ def simulated_recording(
     plant: RobotModel,
     motions: MotionCases,
     seed: int,
-    processes: int | None = None,
+    executor: Executor | None = None,
     progress: Callable[[float], None] | None = None,
 ) -> Recording:
     """What `simulated` records, with payload and places of the sensors; arguments and errors as there."""
-    cases = simulated(robot, plant, motions, seed, processes, progress)
+    cases = simulated(robot, plant, motions, seed, executor, progress)
     payload = robot.payload.largest_mass if motions.payload is None else motions.payload
     return Recording(payload, cases, places(motions.logger))
 

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from experiments.cli.workers import Progress, SimulationError, in_processes
+from experiments.cli.workers import Executor, Progress, SimulationError, in_order
 from experiments.feedforward.rectangle import RectangleTrial
 from experiments.identify.recording_map import Recording
 from experiments.identify.slow import slow_json, with_slow_motion
@@ -117,7 +117,7 @@ def study_recording(
 
 
 def with_rectangle(
-    study: IdentifyStudy, processes: int | None, progress: Callable[[float], None]
+    study: IdentifyStudy, executor: Executor, progress: Callable[[float], None]
 ) -> IdentifyStudy:
     """The study with the rectangle of `truetip feedforward` driven on what moved.
 
@@ -129,7 +129,7 @@ def with_rectangle(
         RectangleTrial(robot, study.payload, config, study.plant)
         for robot, config in ((study.robot, rigid), (study.robot, elastic), (study.identified, elastic))
     ]
-    of_rigid, nominal, identified = in_processes(_integral, trials, processes, progress)
+    of_rigid, nominal, identified = in_order(executor, _integral, trials, progress)
     return replace(
         study, rectangle_ratio={"nominal": nominal / of_rigid, "identified": identified / of_rigid}
     )

@@ -215,6 +215,9 @@ REFUSED = {
     "slow": (["--slow=slow.csv"], "--slow says more of what was recorded"),
     "cases": (["--motions=mine.yaml"], "--motions mine.yaml"),
     "report": (["--report=identify.txt"], "its name must end in .html"),
+    "search": (["--search=0"], "--search must be at least 1, got 0"),
+    "evaluations": (["--search=1", "--search-evaluations=9"], "--search-evaluations must be at least 60"),
+    "scheduler": (["--scheduler=tcp://127.0.0.1:1"], "no Dask scheduler at tcp://127.0.0.1:1"),
     "jobs": (["--jobs=0"], "--jobs must be at least 1, got 0"),
 }  # fmt: skip
 
@@ -246,6 +249,8 @@ def test_springs_that_are_a_fifth_softer_than_believed_are_found(tmp_path: Path)
         "--no-gear-parts",
         "--no-rectangle",
         "--jobs=2",
+        "--search=1",
+        "--search-evaluations=60",
         f"--write={robot}",
         "--json=-",
     )
@@ -259,5 +264,11 @@ def test_springs_that_are_a_fifth_softer_than_believed_are_found(tmp_path: Path)
     assert load_robot(str(robot)).joints[1].drive_train.stiffness == pytest.approx(
         0.8 * base.joints[1].drive_train.stiffness, rel=0.03
     )
+    # So few evaluations bring a search without a gradient nowhere near.
+    runs = {each["method"]: each for each in numbers["searches"]["runs"]}
+    assert set(runs) == {"gradient", "CMA-ES", "genetic, then pattern"}
+    assert not runs["gradient"]["failed"]
+    assert runs["gradient"]["cost"] == min(each["cost"] for each in runs.values())
     opened = open_page(tmp_path / "identify.html")
+    assert "starts that fail" in opened.dom
     assert not [line for line in opened.console if "rror" in line]
