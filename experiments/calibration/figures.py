@@ -68,13 +68,14 @@ def vectors_figure(robot: RobotModel, points: np.ndarray, before: np.ndarray, af
     for name, errors in (("before", before), ("after", after)):
         longest = float(np.linalg.norm(errors, axis=1).max(initial=0.0))
         scale = _LONGEST * size / longest if longest > 0.0 else 1.0
+        factor = float(f"{scale:.2g}")  # as a number that one reads, not 2.1e+03
         gap = np.full(len(errors), np.nan)
         x, y, z = (
             np.column_stack([p, p + scale * e, gap]).ravel() for p, e in zip(points.T, errors.T, strict=True)
         )
         figure.add_trace(
             go.Scatter3d(
-                x=x, y=y, z=z, mode="lines", name=f"{name}, {scale:.2g} times as long", hoverinfo="name",
+                x=x, y=y, z=z, mode="lines", name=f"{name}, {factor:g} times as long", hoverinfo="name",
                 line={"color": COLORS[name] if name == "after" else "#d2691e", "width": 4},
             )
         )  # fmt: skip

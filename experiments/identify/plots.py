@@ -100,7 +100,6 @@ def signals_figure(study: IdentifyStudy, case: int) -> go.Figure:
             )
             figure.add_trace(trace.update(legendgroup=name, showlegend=row == 1), row, 1)
         figure.update_yaxes(title={"text": _UNITS[sensor.kind], "font": {"size": 12}}, row=row, col=1)
-    figure.update_layout(legend={"y": -60.0 / (_ROW * len(found.sensors))})  # close to the last row
     return figure.update_xaxes(title="time in s", row=len(found.sensors))
 
 

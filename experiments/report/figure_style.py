@@ -42,12 +42,19 @@ TEMPLATE = go.layout.Template(
             # The default view cuts off the titles of the axes.
             "camera": {"eye": {"x": 1.45, "y": 1.45, "z": 0.95}, "center": {"x": 0.0, "y": 0.0, "z": -0.1}},
         },
-        # Below, where it takes no width from the figure.
-        "legend": {"orientation": "h", "x": 0.0, "y": -0.2, "yanchor": "top", "itemsizing": "constant"},
+        # At the bottom of the whole figure, where it takes no width from it and leaves room for words above.
+        "legend": {
+            "orientation": "h",
+            "x": 0.0,
+            "y": 0.0,
+            "yref": "container",
+            "yanchor": "bottom",
+            "itemsizing": "constant",
+        },
         "margin": {"l": 60, "r": 20, "t": 28, "b": 50},
     }
 )
-_OF_SCENES = {"legend": {"y": 0.0, "yanchor": "bottom"}, "margin": {"l": 0, "r": 0, "t": 0, "b": 0}}
+_OF_SCENES = {"legend": {"yref": "paper"}, "margin": {"l": 0, "r": 0, "t": 0, "b": 0}}
 
 
 def styled(figure: go.Figure, height: int) -> go.Figure:

@@ -24,13 +24,14 @@ function saveText(text, name) {
   link.click();
   URL.revokeObjectURL(link.href);
 }
-/* Three axes or more side by side have no room on a narrow screen: there they stand above each other. */
+/* Three columns of axes or more have no room on a narrow screen: there all axes stand above each other. */
 function stacked(layout) {
   const named = letter => Object.keys(layout).filter(name => new RegExp(`^${letter}axis\\d*$`).test(name));
   const columns = named("x"), rows = named("y"), count = columns.length;
-  const isRow = rows.length === count && rows.every(name => layout[name].domain[1] - layout[name].domain[0] > 0.9);
-  if (count < 3 || !isRow) return {};
-  const gap = 0.42 / count, high = (1 - gap * (count - 1)) / count, change = {height: Math.round(0.7 * count * layout.height)};
+  const share = name => layout[name].domain[1] - layout[name].domain[0];
+  if (count < 3 || rows.length !== count || columns.some(name => share(name) > 0.4)) return {};
+  const gap = (share(rows[0]) > 0.9 ? 0.42 : 0.6) / count, high = (1 - gap * (count - 1)) / count;
+  const change = {height: Math.round(0.7 * count * layout.height * Math.min(1, 1.15 * share(rows[0])))};
   columns.forEach((name, i) => {
     const top = 1 - i * (high + gap);
     change[`${name}.domain`] = [0, layout.coloraxis ? 0.92 : 1];
@@ -41,6 +42,18 @@ function stacked(layout) {
   });
   return change;
 }
+/* Long titles of axes in two lines. */
+function inTwoLines(layout) {
+  const change = {};
+  for (const [name, axis] of Object.entries(layout)) {
+    const text = /^xaxis/.test(name) && axis.title ? axis.title.text || "" : "";
+    if (text.length < 38 || text.includes("<")) continue;
+    const middle = text.length / 2, spaces = [...text.matchAll(/ /g)].map(found => found.index);
+    const at = spaces.sort((a, b) => Math.abs(a - middle) - Math.abs(b - middle))[0];
+    if (at) change[`${name}.title.text`] = `${text.slice(0, at)}<br>${text.slice(at + 1)}`;
+  }
+  return change;
+}
 /* Words in the colour of the page; where there is less room, small titles, axes beside each other with few numbers, and
    three dimensions from farther away in a figure that is not much higher than wide. */
 function colorFigures() {
@@ -49,10 +62,14 @@ function colorFigures() {
     const change = {"font.color": ink};
     if (window.innerWidth < 520) {
       if (plot._fullLayout.scene) {
-        change["scene.camera.eye"] = {x: 2.5, y: 2.5, z: 1.7};
+        const far = plot.data.some(trace => trace.colorbar || trace.marker && trace.marker.colorbar) ? 1.2 : 1;
+        change["scene.camera.eye"] = {x: 2.5 * far, y: 2.5 * far, z: 1.7 * far};
+        for (const name of ["x", "y", "z"]) change[`scene.${name}axis.nticks`] = 4;
         change.height = Math.min(plot._fullLayout.height, Math.round(1.15 * plot.offsetWidth));
       }
-      Object.assign(change, stacked(plot._fullLayout));
+      const isSquare = Object.values(plot._fullLayout).some(axis => axis && axis.scaleanchor);
+      if (isSquare) change.height = Math.min(plot._fullLayout.height, plot.offsetWidth);
+      Object.assign(change, inTwoLines(plot._fullLayout), stacked(plot._fullLayout));
       if (change.height) plot.style.height = plot.parentElement.style.height = change.height + "px";
       else for (const [name, axis] of Object.entries(plot._fullLayout)) if (/^xaxis/.test(name)
           && axis.domain[1] - axis.domain[0] < 0.6) Object.assign(change, {[`${name}.nticks`]: 4,

@@ -176,7 +176,7 @@ canvas.onpointerdown = event => { state.isPlaying = false;
 element("speed").onchange = event => { state.speed = Number(event.target.value); };
 element("magnify").onchange = event => { state.magnify = Number(event.target.value); layTrails(); isStale = true; };
 element("elastic").onchange = event => { state.elastic = Number(event.target.value); isStale = true; };
-element("robot").onchange = event => { state.robot = event.target.value; setFineness(state.robot === "all"); isStale = true; };
+element("robot").onchange = event => { state.robot = event.target.value; beginAnew(); isStale = true; };
 for (const button of document.querySelectorAll("[data-view]")) button.onclick = () => setView(button.dataset.view);
 for (const button of document.querySelectorAll("button.law")) button.onclick = () => {
   const law = laws.find(each => each.id === button.dataset.law);
@@ -200,6 +200,22 @@ document.addEventListener("keydown", event => {
 });
 
 let isStale = true, before = null, drawn = 0, told = 0;
+/* Without a graphics card pixels get coarser until it draws thirty frames a second; several robots that one sees
+   through begin with coarser ones. */
+const wantedRate = 31, coarsest = 0.4, watched = 15;
+let watchedFrom = null, watchedFrames = 0;
+function beginAnew() {
+  setFineness(isSoft && state.robot === "all" ? 0.6 : 1);
+  watchedFrom = null;
+}
+function keepPace(now) {
+  if (!isSoft || !state.isPlaying || drawn < 2 * watched) { watchedFrom = null; return; }
+  if (watchedFrom === null) { watchedFrom = now; watchedFrames = 0; return; }
+  if (++watchedFrames < watched) return;
+  const rate = 1000 * watchedFrames / (now - watchedFrom);
+  watchedFrom = null;
+  if (rate < wantedRate && fineness > coarsest) setFineness(Math.max(coarsest, 0.8 * fineness));
+}
 function fit() {
   renderer.setSize(holder.clientWidth, holder.clientHeight);
   eye.aspect = holder.clientWidth / Math.max(holder.clientHeight, 1);
@@ -224,6 +240,7 @@ function tick(now) {
     if (!state.isPlaying || now - told > 100) { tell(); told = now; } else drawCourse();
     isStale = false;
     window.replayFrames = ++drawn;
+    keepPace(now);
   }
   requestAnimationFrame(tick);
 }

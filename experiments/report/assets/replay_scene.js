@@ -114,9 +114,13 @@ try { renderer = new THREE.WebGLRenderer({antialias: devicePixelRatio < 2 && !is
   holder.innerHTML = "<p class=note style='padding:80px 20px'>This replay needs WebGL, which the browser does not have or has switched off.</p>";
   throw error;
 }
-/* Several robots that one sees through cost several times as much: then pixels are coarser without a graphics card. */
-function setFineness(isCrowded) { renderer.setPixelRatio(Math.min(devicePixelRatio, 2) * (isSoft && isCrowded ? 0.6 : 1)); }
-setFineness(false);
+/* Pixels of the picture for one of the screen. Without a graphics card they are most of what a frame costs. */
+let fineness = 1;
+function setFineness(share) {
+  fineness = share;
+  renderer.setPixelRatio(Math.min(devicePixelRatio, 2) * share);
+}
+setFineness(1);
 renderer.domElement.setAttribute("role", "img");
 renderer.domElement.setAttribute("aria-label", "The robot on its path");
 holder.append(renderer.domElement);

@@ -57,15 +57,17 @@ def test_it_goes_on_drawing_without_a_graphics_card(tmp_path: Path, robots: str)
         tab.open(page)
         assert "SwiftShader" in tab.run(RENDERER)
         tab.run(f"element('robot').value = '{robots}'; element('robot').dispatchEvent(new Event('change'))")
-        tab.run("new Promise(done => setTimeout(done, 1000))")
+        tab.run("new Promise(done => setTimeout(done, 5000))")  # in which it finds how fine it can draw
         frames, before = tab.run("window.replayFrames"), thread_seconds(tab.process)
         started = time.monotonic()
         time.sleep(WATCHED)
         drawn = tab.run("window.replayFrames") - frames
+        fineness = tab.run("fineness")
         seconds, after = time.monotonic() - started, thread_seconds(tab.process)
     spent = [used - before.get(thread, 0.0) for thread, used in after.items()]
     print(
-        f"\nreplay, {robots}: {drawn / seconds:.0f} frames a second at a load of {os.getloadavg()[0]:.1f}; "
+        f"\nreplay, {robots}: {drawn / seconds:.0f} frames a second at a load of {os.getloadavg()[0]:.1f}, "
+        f"{fineness:.2f} pixels for one of the screen along a side; "
         f"a frame takes {1e3 * sum(spent) / drawn:.0f} ms, {1e3 * max(spent) / drawn:.0f} of them one thread"
     )
     assert drawn > 0
