@@ -21,6 +21,7 @@ class ControllerModel:
     payload: float = 0.0  # kg at the flange
     period: float = 4e-3  # s, between two commands
     preview: float = 0.0  # s, how far ahead of time the wanted pose is that a law is given
+    camera_period: float = 4e-3  # s, between two exposures
     camera_delay: float = 0.0  # s, from an exposure to the arrival of its pose
     command_delay: float = 0.0  # s, from a command to its motion: transport and dead time
     elasticity: str = "joints"  # what yields: rigid (nothing), joints or structure
@@ -49,6 +50,7 @@ class ControllerModelConfig:
     robot: str = ""  # a shipped robot or the path of a robot file
     payload: float | None = quantity(None, 0.0, 1000.0, "kg")  # at the flange
     payload_centre_mm: list[float] = numbers((), (0, 3), unit="mm")  # three, in the frame of the flange
+    camera_period: float | None = quantity(None, 5e-4, 1.0, "s")  # between two exposures
     camera_delay: float | None = quantity(None, 0.0, 1.0, "s")  # from an exposure to the arrival of its pose
     command_delay: float | None = quantity(None, 0.0, 1.0, "s")  # transport and dead time
     stiffness: list[float] = numbers((), (0, 1, 6), 0.01, 100.0)  # of the gears: one factor, or six

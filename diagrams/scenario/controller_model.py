@@ -33,6 +33,7 @@ def controller_model(scenario: Scenario, robot: RobotModel | None = None) -> Con
         payload=payload,
         period=station.period,
         preview=scenario.reference.preview,
+        camera_period=station.camera.period if config.camera_period is None else config.camera_period,
         camera_delay=station.camera.delay if config.camera_delay is None else config.camera_delay,
         command_delay=(
             drive.command_delay + drive.dead_time if config.command_delay is None else config.command_delay
