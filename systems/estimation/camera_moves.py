@@ -24,6 +24,7 @@ class CameraMoves:
         self._B = directions
         n = len(directions)
         self.layout = Layout(
+            moves=(1,),  # how many there were
             xi=(n,),  # of all moves but the last
             xi_before=(n,),  # the unknowns before the last move
             gain=(6, n),  # from what they have changed by since then to the move
@@ -39,6 +40,7 @@ class CameraMoves:
             xi: the unknowns then, (n,).
         """
         B, P = self._B, np.linalg.inv(A)
+        memory.moves[0] += 1.0
         memory.xi += self._of_last(memory, xi)
         # What moves before it are off by stays as it is from now on.
         memory.spread += memory.gain @ P @ memory.gain.T + np.linalg.inv(np.eye(6) + B.T @ A @ B)
@@ -49,13 +51,13 @@ class CameraMoves:
 
     def robot(self, memory: SimpleNamespace, xi: np.ndarray) -> np.ndarray:
         """Of unknowns (n,) what is of the robot."""
-        if not memory.gain.any():
+        if not memory.moves[0]:
             return xi
         return xi - memory.xi - self._of_last(memory, xi)
 
     def covariance(self, memory: SimpleNamespace, P: np.ndarray) -> np.ndarray:
         """The robot's from that of the unknowns as they are seen, (n, n)."""
-        if not memory.gain.any():
+        if not memory.moves[0]:
             return P
         B = self._B
         K = np.eye(len(P)) - B @ memory.gain

@@ -19,7 +19,6 @@ _JUMP, _CALM = 9.0, 4.0  # sigmas of the mean: what no parameter describes lasts
 _MODEL_SHARE = 3.0 / _JUMP  # what the estimate is wrong by is within 5 sigmas
 _FIRST = 15  # samples, whose median is what the next ones are compared with
 _MARGIN = np.repeat([3e-3, 1e-3], 3)  # rad and m, what the first linearisations may be wrong by
-_SURE = np.zeros(6)  # where the estimate is not what an error could come from
 _RECENT = 24  # samples, among which a change is looked for that came from one to the next
 _AFTER = 3  # of them at least have to be behind it
 _SUDDEN = 60.0  # by which chi squared is smaller with a step than with a parabola: e to the 30 to one
@@ -179,28 +178,19 @@ class Innovations:
             H: its columns, (6, n).
             solve: gives P H^T, (n, 6), with the covariance P of the estimate; called where it matters.
         """
-        z = kernels.innovations.largest(r, self._variances)
-        by_model = None  # what the estimate may be wrong by, in variances of the camera
-        if z > _SUSPICIOUS:
-            by_model = np.einsum("ij,ji->i", H, solve()) / self._variances
-            z = kernels.innovations.largest(r, self._variances * (1.0 + by_model))
         memory.pause[0] = max(0.0, memory.pause[0] - 1.0)
-        is_large = z > _OUTLIER
-        # Reflections lie anywhere; a tool that was displaced is seen at the same place again.
-        is_again = is_large and kernels.innovations.largest(r - memory.left_out, self._variances) < _OUTLIER
-        if is_large:
-            memory.left_out[:] = r
-        if is_large and memory.outliers[0] < _LONGEST_OUTLIER and not is_again:
-            memory.outliers[0] += 1.0
-            return Verdict(is_outlier=True)
-        # Samples that were left out count as soon as they agree, or are too many in a row to be outliers.
-        number = 1 + int(memory.outliers[0]) * int(is_large)
-        share = 1.0 - (1.0 - 1.0 / _WINDOW) ** number
+        means = memory.error, memory.spread, memory.recent, memory.by_model
+        by_model, number = None, 1  # what the estimate may be wrong by, in variances of the camera
+        size = kernels.innovations.enter_usual(r, self._variances, _SUSPICIOUS, _share(1), *means)
+        if size < 0.0:
+            by_model = np.einsum("ij,ji->i", H, solve()) / self._variances
+            number = self._number(memory, r, by_model)
+            if not number:
+                return Verdict(is_outlier=True)
+            size = kernels.innovations.enter(r, by_model, number, _share(number), self._variances, *means)
         memory.outliers[0] = 0.0
         memory.held[0] += number
-        means = memory.error, memory.spread, memory.recent, memory.by_model
-        unsure = _SURE if by_model is None else by_model
-        size = _AVERAGING * kernels.innovations.enter(r, unsure, number, share, self._variances, *means)
+        size *= _AVERAGING
         if size > _CALM:
             if by_model is None:
                 by_model = np.einsum("ij,ji->i", H, solve()) / self._variances
@@ -216,6 +206,21 @@ class Innovations:
         memory.doubtful[0] += 1.0
         is_long = memory.doubtful[0] > _RECENT // 2
         return Verdict(has_drifted=bool(is_long), is_doubtful=not is_long)
+
+    def _number(self, memory: SimpleNamespace, r: np.ndarray, by_model: np.ndarray) -> int:
+        """How many samples an innovation (6,) stands for; none if it is an outlier.
+
+        Samples that were left out count as soon as they agree, or are too many in a row to be outliers.
+        """
+        if kernels.innovations.largest(r, self._variances * (1.0 + by_model)) <= _OUTLIER:
+            return 1
+        # Reflections lie anywhere; a tool that was displaced is seen at the same place again.
+        is_again = kernels.innovations.largest(r - memory.left_out, self._variances) < _OUTLIER
+        memory.left_out[:] = r
+        if memory.outliers[0] < _LONGEST_OUTLIER and not is_again:
+            memory.outliers[0] += 1.0
+            return 0
+        return 1 + int(memory.outliers[0])
 
     def measure_noise(self, memory: SimpleNamespace, r: np.ndarray) -> None:
         """Takes the innovation of a sample that counts, (6,), into the measured noise of the camera.
@@ -275,6 +280,11 @@ class Innovations:
         if left @ left < _EXPLAINED * (whitened @ whitened):
             return Event(LOAD_CHANGED, float(change[0] * model.sigma[model.M][0]), size)
         return Event(TOOL_DISPLACED, size, size)
+
+
+def _share(number: int) -> float:
+    """Of so many samples in the running mean."""
+    return 1.0 - (1.0 - 1.0 / _WINDOW) ** number
 
 
 def _with_step(y: np.ndarray) -> np.ndarray:

@@ -6,7 +6,7 @@ import numpy as np
 
 from robots.description.model import NUM_JOINTS, RobotModel
 from systems.estimation import kernels
-from systems.estimation.kernels.arrays import Gap
+from systems.estimation.kernels.arrays import Gap, Gears
 from systems.estimation.memory import Layout
 
 # Of each joint: two waves with sine and cosine each, hysteresis, an open gap, and one that it holds.
@@ -36,6 +36,10 @@ class GearErrors:
         self._ratio = np.asarray(robot.gear_ratio, dtype=float)
         self._compliance = 1.0 / np.asarray(robot.joint_stiffness, dtype=float)
         self.layout = Layout(started=(1,), state=(4, NUM_JOINTS))
+
+    def parts(self, lag: np.ndarray) -> Gears:
+        """Gears as compiled functions take them; ``lag`` is that of their damping in s, (6,)."""
+        return Gears(self._ratio, self._compliance, lag, _GAP)
 
     def step(self, memory: SimpleNamespace, torque: np.ndarray, duration: float) -> np.ndarray:
         """Loads the gears by torques in N m, (6,), for a time in s; returns their states in -1 to 1, (18,).

@@ -1,5 +1,6 @@
 """What samples of the past said, kept so that it can be read again with better parameters."""
 
+from collections.abc import Callable
 from types import SimpleNamespace
 
 import numpy as np
@@ -88,20 +89,30 @@ class Keyframes:
 
         What a linearisation far off leaves looks like a change of the robot.
         """
-        change = np.abs((xi - memory.xi_sum) * self._model.sigma)[self._model.G]
-        return bool(change.max() <= _LINEAR)
+        return self._change(xi, memory.xi_sum) <= _LINEAR
 
-    def work(self, memory: SimpleNamespace, constants: Constants, xi: np.ndarray, tolerance: float) -> bool:
+    def _change(self, xi: np.ndarray, before: np.ndarray) -> float:
+        """The largest change of a geometric parameter in m or rad."""
+        return kernels.tip.largest_step(xi, before, self._model.sigma, self._model.K.start)
+
+    def work(
+        self, memory: SimpleNamespace, constants: Callable[[], Constants], xi: np.ndarray, tolerance: float
+    ) -> bool:
         """Goes on with a pass, or begins one if a parameter has moved by more than the tolerance (m, rad).
+
+        Args:
+            memory: of the layout.
+            constants: gives the geometry at xi; asked if there is something to read.
+            xi: the estimate.
+            tolerance: of the parameters.
 
         Returns:
             Whether the sum has been replaced.
         """
         first, end = int(memory.first[0]), int(memory.end[0])
         if memory.position[0] < 0.0:
-            change = np.abs((xi - memory.xi_pass) * self._model.sigma)[self._model.G]
             is_full = end - first > self._length - 48
-            if first == end or not (change.max() > tolerance or is_full):
+            if first == end or not (is_full or self._change(xi, memory.xi_pass) > tolerance):
                 return False
             memory.position[0] = first
             memory.leaving[0] = end - self._length + 96 if is_full else first
@@ -115,7 +126,7 @@ class Keyframes:
         A = memory.A_leaving if is_leaving else memory.A_pass
         b = memory.b_leaving if is_leaving else memory.b_pass
         model = self._model
-        arm = constants, model.unknowns(model.full(xi)), model.loads.masses
+        arm = constants(), model.unknowns(model.full(xi)), model.loads.masses
         kernels.keyframes.read(*arm, xi, memory.rows, position, until, self._weights, A, b)
         memory.position[0] = until
         if until < end:

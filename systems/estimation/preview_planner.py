@@ -10,7 +10,7 @@ from systems.estimation import kernels
 from systems.estimation.arm_geometry import Arm, Constants
 from systems.estimation.arm_loads import NUM_SETS
 from systems.estimation.gear_errors import NUM_STATES
-from systems.estimation.kernels.arrays import FollowerState, PathInstant
+from systems.estimation.kernels.arrays import FollowerState, PathInstant, Planned
 from systems.estimation.memory import Layout
 from systems.estimation.tip_model import TipModel
 
@@ -24,7 +24,7 @@ class Wanted(NamedTuple):
 
     X_WE: np.ndarray  # (4, 4)
     V_WE: np.ndarray  # (6,)
-    aside: tuple[np.ndarray, np.ndarray, np.ndarray]  # rad and its derivatives, (6,) each
+    aside: np.ndarray  # (3, 6), rad and its derivatives
 
 
 class MotorPlan(NamedTuple):
@@ -53,7 +53,7 @@ class PreviewPlanner:
     def __init__(self, model: TipModel, period: float) -> None:
         """Lays out the memory."""
         self._model, self._period = model, period
-        self._gear_lag = model.lag[:6]
+        self._gears = model.gear_errors.parts(model.lag[:6])
         self.layout = Layout(
             started=(1,),
             x_geometry=(model.size,),
@@ -107,23 +107,16 @@ class PreviewPlanner:
         deflection = self._model.deflections(x, loads)[0]
         tilt = columns[:, 6:18] @ deflection[6:]
         yields = -np.linalg.solve(columns[:, :6], tilt) - deflection[:6]
-        return self._with_gear_errors(memory, x, (q, yields, 0.0), loads[0])
+        return self._with_gear_errors(memory, x, q, yields, loads[0])
 
     def _with_gear_errors(
-        self,
-        memory: SimpleNamespace,
-        x: np.ndarray,
-        now: tuple[np.ndarray, np.ndarray, float],
-        loads: np.ndarray,
+        self, memory: SimpleNamespace, x: np.ndarray, q: np.ndarray, yields: np.ndarray, loads: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray]:
-        """By how much motors have to be ahead, and the states of gears, from what springs make of it.
-
-        ``now`` is q, the yields of springs, and s since the last time.
-        """
-        model, (q, yields, duration) = self._model, now
+        """By how much motors are ahead at first, rad, and the states of gears, from the yields of springs."""
+        model = self._model
         if not model.has_gear_errors:
             return yields, np.zeros(NUM_STATES)
-        states = model.gear_errors.step(memory.gears, model.total_load(x, loads)[:6], duration)
+        states = model.gear_errors.step(memory.gears, model.total_load(x, loads)[:6], 0.0)
         shapes = model.gear_shapes(q + yields, states)
         return yields - model.gear_error(x, shapes), states
 
@@ -147,25 +140,22 @@ class PreviewPlanner:
         x, rate = parameters
         model = self._model
         constants = self.constants(memory, x)
-        left, fading = _blend(since_start)
-        instant = PathInstant(
-            wanted.X_WE,
-            wanted.V_WE,
-            left * memory.start_error,
-            fading * memory.start_error,
-            rate[model.G],
-            np.array(wanted.aside),
-            float(step),
-            _NEWTON_STEP,
+        moment = wanted.X_WE, wanted.V_WE, *_blend(since_start), rate[model.G], wanted.aside
+        instant = PathInstant(*moment, float(step), _NEWTON_STEP)
+        state = FollowerState(
+            memory.q,
+            memory.rates,
+            memory.wander,
+            memory.start_error,
+            memory.start_yield,
+            memory.yields,
+            memory.gears.state,
         )
-        columns, loads, yields = np.empty((6, len(constants.frame))), np.empty((NUM_SETS, 18)), np.empty(6)
-        arm, moving = (constants, model.loads.masses, model.unknowns(x)), np.empty((3, 6))
-        state = FollowerState(memory.q, memory.rates, memory.wander)
-        kernels.plan.follow(*arm, instant, state, moving, columns, loads, yields)
-        yields, states = self._with_gear_errors(memory, x, (moving[0], yields, step), loads)
-        yields += left * memory.start_yield
-        motion, history = np.empty((4, 6)), memory.yields
-        kernels.plan.motors(moving, memory.wander, yields, history, step, self._gear_lag, columns, motion)
+        motion, moving, loads = np.empty((4, 6)), np.empty((3, 6)), np.empty((NUM_SETS, 18))
+        columns, states = np.empty((6, len(constants.frame))), np.zeros(NUM_STATES)
+        planned = Planned(motion, moving, loads, columns, states)
+        arm = constants, model.loads.masses, model.unknowns(x), self._gears
+        kernels.plan.plan(*arm, instant, state, planned)
         theta, velocity, acceleration, twist = motion
         return MotorPlan(theta, velocity, acceleration, loads, moving[1:].ravel(), twist, columns, states)
 

@@ -22,16 +22,17 @@ from systems.estimation.events import (
     Innovations,
 )
 from systems.estimation.gear_errors import NUM_SHAPES, NUM_STATES
+from systems.estimation.kernels.arrays import OpenKeyframe
 from systems.estimation.keyframes import Keyframes, keyframe_row
 from systems.estimation.memory import Layout
-from systems.estimation.tip_model import Prediction, Spread, TipModel, moved
+from systems.estimation.tip_model import NO_SHAPES, Prediction, Spread, TipModel, moved
 
 _AGAIN = 500  # samples, in which a second event says that the first was explained wrongly
 _OF_THE_LOAD = 0.1  # of its spread, when a tool was displaced
 _DOUBT = 3.0  # times wider, what is known of everything, where it does not hold
 _TRUST = 0.02  # m or rad, the largest step from where the past was read
 _KEEP_EVERY = 10  # samples, between two notes of what is known
-_DRIFT_EVERY = 50  # samples, between two looks whether the clock drifts
+_DRIFT_EVERY = 50  # samples, between two looks whether the clock drifts, halfway between two such notes
 _LEAST_DRIFT, _DRIFT_SIGMAS = (
     1e-4,
     8.0,
@@ -250,22 +251,48 @@ class TipEstimator:
                 if found == TOOL_DISPLACED and memory.after_step.is_event[0]:
                     size = self._camera_or_tool.size(memory.after_step, found, pair.X_WE[:3, 3])
                     event = Event(found, size, size)
-        sums = memory.A_open, memory.b_open, memory.sum_y, memory.sum_H
-        kernels.information.add_sample(r, H, memory.xi, self.weights, weight, *sums)
-        means = [pair.theta, gears, pair.motion, pair.twist, (since_first,)]
-        means += [shapes.ravel()] if shapes is not None else []
-        self._open(memory, np.concatenate(means), weight)
-        memory.count[0] += 1.0
-        moved_away = (
-            kernels.tip.largest_change(pair.theta, memory.first_theta, NUM_JOINTS) > config.keyframe_step
-        )
-        is_long = memory.samples[0] >= config.keyframe_samples
-        if moved_away or is_long or int(memory.count[0]) in _CLOSE_AT:
-            self._close(memory)
-        if event is None and memory.count[0] % _DRIFT_EVERY == 0.0:
+        self._take(memory, (r, gears, H), pair, shapes, weight)
+        if event is None and memory.count[0] % _DRIFT_EVERY == _DRIFT_EVERY // 2:
             event = self._look_for_drift(memory)
-        self._solve(memory)
+            if event is not None:
+                self._solve(memory)
         return event
+
+    def _take(
+        self,
+        memory: SimpleNamespace,
+        innovation: tuple[np.ndarray, np.ndarray, np.ndarray],
+        pair: Pair,
+        shapes: np.ndarray | None,
+        weight: float,
+    ) -> None:
+        """Adds a sample to the open keyframe, closes that if the robot has gone far enough, and solves.
+
+        ``innovation`` is the error, the deflections of the gears and the columns.
+        """
+        memory.count[0] += 1.0
+        is_long = memory.samples[0] + 1.0 >= self._config.keyframe_samples
+        is_closing = is_long or int(memory.count[0]) in _CLOSE_AT
+        since_first = self._since_first(memory, pair.time)
+        seen = pair.theta, pair.motion, pair.twist, since_first, NO_SHAPES if shapes is None else shapes
+        keyframe = OpenKeyframe(
+            memory.A_open,
+            memory.b_open,
+            memory.samples,
+            memory.weight,
+            memory.first_theta,
+            memory.sums,
+            memory.sum_y,
+            memory.sum_H,
+        )
+        past, model = memory.keyframes, self.model
+        sums = past.A, past.b, past.xi_sum, model.sigma, model.K.start
+        limits = -1.0 if is_closing else self._config.keyframe_step, _TRUST
+        r, gears, H = innovation
+        take = kernels.information.take
+        if take(r, gears, H, memory.xi, seen, self.weights, weight, keyframe, sums, limits):
+            self._close(memory)
+            self._solve(memory)
 
     def _look_for_foreign(self, memory: SimpleNamespace, H: np.ndarray) -> Event | None:
         """Finds out early that a camera of another frame teaches nothing."""
@@ -294,16 +321,9 @@ class TipEstimator:
 
     def work(self, memory: SimpleNamespace) -> None:
         """What can be done in a tick without a sample, or after its command is out: relinearise."""
-        constants = self.constants(memory)
-        if self._keyframes.work(memory.keyframes, constants, memory.xi, self._config.relinearise):
+        keyframes, tolerance = memory.keyframes, self._config.relinearise
+        if self._keyframes.work(keyframes, lambda: self.constants(memory), memory.xi, tolerance):
             self._solve(memory)
-
-    def _open(self, memory: SimpleNamespace, means: np.ndarray, weight: float) -> None:
-        if memory.samples[0] == 0.0:
-            memory.first_theta[:] = means[:6]
-        memory.samples[0] += 1.0
-        memory.weight[0] += weight
-        memory.sums += weight * means
 
     def _close(self, memory: SimpleNamespace) -> None:
         """Makes the open samples a keyframe: one pose at their mean, with their mean error."""

@@ -17,7 +17,7 @@ from systems.estimation.kernels.arrays import Seen, SeenOnce, Unknowns
 from systems.estimation.learnt_robot import known_before
 
 HELD = 1e5  # information on the drift of a clock as long as nothing shows that there is one
-_NO_SHAPES = np.empty((0, 6))
+NO_SHAPES = np.empty((0, 6))
 _BASE = 0  # the body whose placement in the world it is
 _STAYS = 0.02  # of the spread, by which what was measured of a robot may have changed since
 
@@ -72,6 +72,7 @@ class TipModel:
         self.geometry, self.loads = ArmGeometry(robot, chosen), ArmLoads(robot)
         self.robot, self.parameters = robot, error_parameters(robot)
         g = len(chosen)
+        self._no_geometry = np.full(g, np.inf)
         self.has_gear_errors = spread.gear_error > 0.0
         self.gear_errors = GearErrors(robot)
         self.size = g + 24 + 6 * NUM_SHAPES * self.has_gear_errors
@@ -140,12 +141,9 @@ class TipModel:
             step: the largest distance of a parameter.
             last: what the answer was last, which saves time if it is still right.
         """
-        change = kernels.tip.largest_change
-        if change(x, x_geometry, self.K.start) > step:
-            x_geometry[:] = x
-        if last is None or change(last.chosen, x_geometry, self.K.start) != 0.0:
-            return self.constants(x_geometry)
-        return last
+        of = self._no_geometry if last is None else last.chosen
+        is_near = kernels.tip.stay_near(x, x_geometry, step, of)
+        return last if last is not None and is_near else self.constants(x_geometry)
 
     def forward(self, constants: Constants, x: np.ndarray, q: np.ndarray) -> tuple[np.ndarray, Arm]:
         """The tip of an arm that does not yield, near the value that the constants are for.
@@ -227,7 +225,7 @@ class TipModel:
         """
         theta, loads, twist, X_WE = pair
         out = np.empty(6), np.empty((6, self.size)), np.empty(6)
-        seen = SeenOnce(twist, time, _NO_SHAPES if shapes is None else shapes)
+        seen = SeenOnce(twist, time, NO_SHAPES if shapes is None else shapes)
         kernels.tip.innovation(constants, self.unknowns(x), theta, loads, seen, X_WE, *out)
         return out
 

@@ -125,7 +125,8 @@ class SelfCalibrating(LeafSystem):
             self._needs = PathNeeds(self.tip_model, self.estimator.weights, path, home, self._late)
         except ValueError:
             return  # out of reach of the nominal robot: whoever starts the run says so
-        rate, sharp = 1.0 / self.period, self._config.probe.sharp
+        rate = 1.0 / max(self.period, self._model.camera_period)  # of a tick one sample is taken
+        sharp = self._config.probe.sharp
         found = designed(self._needs, self._probe, path.path_start, rate, sharp)
         self._probe.pattern, self._forecast = found
 
@@ -149,13 +150,15 @@ class SelfCalibrating(LeafSystem):
         q, still = np.linspace(0.1, 0.6, NUM_JOINTS), np.zeros(NUM_JOINTS)
         X_WE = model.forward(model.constants(model.mean), model.mean, q[None])[0][0]
         self._planner.start(memory.planner, model.mean, q, X_WE)
-        wanted, parameters = Wanted(X_WE, still, (still, still, still)), (model.mean, np.zeros(model.size))
+        wanted, parameters = (
+            Wanted(X_WE, still, np.zeros((3, NUM_JOINTS))),
+            (model.mean, np.zeros(model.size)),
+        )
         for _ in range(2):
             plan = self._planner.step(memory.planner, parameters, wanted, 0.0, self.period)
             motion = plan.theta, plan.velocity, plan.acceleration
             command = self._drives.command(memory.drives, motion, plan.loads, self._model.payload)
-        Phi, y, _ = self._drives.compare(memory.drives, motion, command.columns, still, q)
-        self._drives.learn(memory.drives, Phi, y)
+        self._drives.look_back(memory.drives, motion, command.columns, still, q)
         pair = Pair(q, plan.loads, plan.motion, plan.twist, X_WE)
         self._lead.step(memory.lead, model.mean, memory.columns, self.period)
         for _ in range(40):  # the first ones are only looked at
@@ -166,6 +169,7 @@ class SelfCalibrating(LeafSystem):
             X_WE[0, 3] += size
             self.estimator.add(memory.estimator, pair._replace(X_WE=X_WE))
         self._learning.steps.hear(memory.steps, q)
+        self._learning.delay.search.rehearse(memory.delay.search)
         for time in (0.0, 1.0):
             self._learning.encoders.append(memory.encoders, time, np.concatenate((q, still)))
             self._learning.plan.append(memory.plan, time, memory.passed.all)
@@ -215,7 +219,8 @@ class SelfCalibrating(LeafSystem):
         if pair is None:
             return None
         time = sample.time + self.estimator.clock_offset(memory.estimator, sample.time)
-        still = pair._replace(twist=np.zeros(6))  # of the joints' clock alone
+        rounding = self._learning.steps.sigma(memory.steps)
+        still = pair._replace(twist=np.zeros(6), rounding=rounding)  # of the joints' clock alone
         X_WE = self.estimator.predict(memory.estimator, still).X_WE[0]
         return time, X_WE, self.estimator.tip_covariance(memory.estimator, still)
 
@@ -227,14 +232,20 @@ class SelfCalibrating(LeafSystem):
         """Takes note of the samples of the last tick, whose command did not wait for the joints."""
         state = context.get_mutable_discrete_state()
         memory = self._views(state.get_mutable_value(int(self._memory)))
-        self._hear(context, memory, state, self._joints.Eval(context).time)
+        joints, reference = self._joints.Eval(context), self._reference.Eval(context)
+        samples = joints, self._camera.Eval(context)
+        self._hear(memory, state, joints.time, samples, reference.path.path_start)
 
     def _hear(
-        self, context: Context, memory: SimpleNamespace, discrete_state: DiscreteValues, time: float
+        self,
+        memory: SimpleNamespace,
+        discrete_state: DiscreteValues,
+        time: float,
+        samples: tuple[JointSample, PoseSample],
+        path_start: float,
     ) -> None:
         """Takes note of the samples of a tick at a time in s."""
-        samples = self._joints.Eval(context), self._camera.Eval(context)
-        self._learning.hear(memory, time, samples, self._reference.Eval(context).path.path_start)
+        self._learning.hear(memory, time, samples, path_start)
         seen = (memory.heard.accepted[0], 0.0, memory.heard.newest[0])
         discrete_state.set_value(int(self._outputs[4]), seen)
 
@@ -263,7 +274,8 @@ class SelfCalibrating(LeafSystem):
         memory = self._views(discrete_state.get_mutable_value(int(self._memory)))
         self._learning.learn(memory)  # unless somebody has asked for it since the last tick
         if joints.time > memory.heard.joints[0]:  # or they come later, see `hear`
-            self._hear(context, memory, discrete_state, time)
+            samples = joints, self._camera.Eval(context)
+            self._hear(memory, discrete_state, time, samples, reference.path.path_start)
         if not joints.running:
             # When it runs again it starts from where it stands then.
             self._next.take_back(memory)

@@ -165,19 +165,15 @@ class Learning:
         exposure = min(stamp + self.estimator.clock_offset(memory.estimator, stamp), newest)
         then, now = at.then, at.now
         rings = Ring(encoders.count, encoders.times, encoders.rows), Ring(plan.count, plan.times, plan.rows)
-        kernels.instants.read(*rings, exposure, self._load_lag, at.theta, then.all, now.all)
-        is_known = memory.delay.known[0]
-        if is_known and kernels.tip.largest_change(now.theta, at.theta, NUM_JOINTS) > _ASTRAY:
-            return None
         # As it would have been seen had the clock been right: the column stands for all of the offset.
         at.X_WE[:] = X_WE
-        kernels.poses.move(at.X_WE, (exposure - stamp) * now.twist)
+        rows, ahead = (at.theta, then.all, now.all), exposure - stamp
+        off = kernels.instants.read(*rings, exposure, self._load_lag, *rows, now.twist, ahead, at.X_WE)
+        if memory.delay.known[0] and off > _ASTRAY:
+            return None
         is_settling = exposure < memory.delay.settled[0] + _SETTLING
         unrest = UNREST if is_settling else float(now.unrest[0])
-        rounding = self.steps.sigma(memory.steps)
-        return Pair(
-            at.theta, then.loads, then.motion, now.twist, at.X_WE, unrest, then.states, stamp, rounding
-        )
+        return Pair(at.theta, then.loads, then.motion, now.twist, at.X_WE, unrest, then.states, stamp)
 
     def encoders_at(self, memory: SimpleNamespace, time: float) -> np.ndarray | None:
         """Positions between two samples, a cubic through positions and velocities, rad, (6,)."""
@@ -228,8 +224,13 @@ class Learning:
         drives, row = memory.drives, memory.passed
         row.all[:] = planned
         motion = row.theta, row.velocity, row.acceleration
-        Phi, y, left = self.drives.compare(drives, motion, row.columns, row.correction, actual)
-        if left > _UPSET and instant > memory.heard.path_start[0]:
+        planned_then = motion, row.columns, row.correction
+        is_watched, is_paused = instant > memory.heard.path_start[0], np.isfinite(memory.paused_until[0])
+        most = -1.0 if is_paused else _UPSET if is_watched else np.inf
+        left = self.drives.look_back(drives, *planned_then, actual, most)
+        if left <= most:
+            return
+        if left > _UPSET and is_watched:
             if instant > memory.upset_at[0] + _CALM_AGAIN:
                 memory.upset_at[0] = instant
             until = min(instant + _UPSET_PAUSE, memory.upset_at[0] + _LONGEST_PAUSE)
@@ -240,4 +241,4 @@ class Learning:
         if np.isfinite(memory.paused_until[0]):
             memory.paused_until[0] = -np.inf
             self.drives.widen(drives)
-        self.drives.learn(drives, Phi, y)
+        self.drives.look_back(drives, *planned_then, actual)

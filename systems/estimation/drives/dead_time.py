@@ -7,6 +7,8 @@ from typing import NamedTuple
 
 import numpy as np
 
+from systems.estimation import kernels
+from systems.estimation.kernels.arrays import Ring
 from systems.estimation.memory import History, Layout
 
 _RATE = 0.5  # s/s, at most, at which the plan runs ahead or waits while the delay is corrected
@@ -78,26 +80,14 @@ class DeadTime:
             is_working: take the short window, and positions as they are. Otherwise they are compared less
                 their means, so that offsets do not matter, but neither does a delay at constant speed.
         """
-        times, actual = self._measured.ordered(memory.measured)
-        command_times, commands = self._commanded.ordered(memory.commanded)
+        measured, commanded = memory.measured, memory.commanded
         n = self._short if is_working else self._window
-        if len(times) < n or len(command_times) < 2:
+        if measured.count[0] < n or commanded.count[0] < 2:
             return None
-        times, actual = times[-n:], actual[-n:]
-        grid = times[-1] + self._period * np.arange(-(n - 1) - self._longest, 1)
-        even = grid[self._longest :]
-        actual = np.stack([np.interp(even, times, column) for column in actual.T])
-        wanted = np.stack([np.interp(grid, command_times, column) for column in commands.T])
-        mean = actual.mean(axis=1, keepdims=True)
-        actual, wanted = actual - mean, wanted - mean
-        motion = float((actual**2).sum())
-        if np.sqrt((actual**2).mean(axis=1)).max() < self._config.excitation:
+        rings = (Ring(part.count, part.times, part.rows) for part in (measured, commanded))
+        squares, least = np.empty(self._longest + 1), self._config.excitation
+        if not kernels.dead_time.misfits(*rings, n, self._period, is_working, least, squares):
             return None
-        shifted = np.lib.stride_tricks.sliding_window_view(wanted, n, axis=1)  # (6, shifts, n)
-        if not is_working:
-            shifted = shifted - shifted.mean(axis=2, keepdims=True)
-        # The first window of the grid is the latest one.
-        squares = ((shifted - actual[:, None]) ** 2).sum(axis=(0, 2))[::-1] / motion
         best = int(np.argmin(squares))
         fine = 0.0
         if 0 < best < len(squares) - 1:
@@ -106,6 +96,13 @@ class DeadTime:
             fine = 0.5 * (before - behind) / bend if bend > 0.0 else 0.0
         place = min(max(round(believed / self._period), 0), len(squares) - 1)
         return Lateness((best + fine) * self._period, float(squares[best]), float(squares[place]))
+
+    def rehearse(self, memory: SimpleNamespace) -> None:
+        """Has everything compiled that `search` needs, on memory that nobody uses."""
+        for k in range(self._window):
+            self.command(memory, k * self._period, np.zeros(6))
+            self.measure(memory, k * self._period, np.zeros(6))
+        self.search(memory, 0.0)
 
     def found(self, lateness: Lateness | None) -> bool:
         """Whether the encoders are delayed commands and nothing else."""

@@ -133,28 +133,29 @@ class DriveModel:
         kernels.drives.features(v, a, columns, Phi)
         return Phi
 
-    def compare(
+    def look_back(
         self,
         memory: SimpleNamespace,
         planned: tuple[np.ndarray, np.ndarray, np.ndarray],
         columns: np.ndarray,
         correction: np.ndarray,
         actual: np.ndarray,
-    ) -> tuple[np.ndarray, np.ndarray, float]:
-        """What the motors have to say of an instant that was planned.
+        most: float = np.inf,
+    ) -> float:
+        """Learns what the motors have to say of an instant that was planned.
 
         Args:
             memory: of the layout.
             planned: position, velocity and acceleration, (6,) each.
             columns, correction: of the command of that instant, (42,) and (6,) in rad.
             actual: where the motors were, rad, (6,).
+            most: nothing is learnt if more than this is not explained yet, rad.
 
         Returns:
-            Phi (6, 41) and y (6,) for `learn`, and the most that is not explained yet in rad.
+            The most that was not explained before in rad.
         """
-        Phi, y = np.zeros((6, SIZE)), np.empty(6)
-        left = kernels.drives.compare(planned, correction, columns, actual, memory.beta, Phi, y)
-        return Phi, y, left
+        known = memory.P, memory.beta, self._config.following_sigma**2, most
+        return kernels.drives.look_back(planned, correction, columns, actual, *known)
 
     def learn(self, memory: SimpleNamespace, Phi: np.ndarray, y: np.ndarray) -> None:
         """One step of recursive least squares: the motors were y behind a plan without correction, (6,)."""

@@ -9,6 +9,7 @@ from importlib import import_module
 from types import ModuleType
 
 _COMPILED = (
+    "dead_time",
     "drives",
     "gears",
     "geometry",

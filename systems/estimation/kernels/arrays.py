@@ -81,8 +81,8 @@ class PathInstant(NamedTuple):
 
     X_WE: np.ndarray  # (4, 4), on the path
     V_WE: np.ndarray  # (6,)
-    error: np.ndarray  # (6,), from the tip to there that is to be left
-    error_rate: np.ndarray  # (6,), by which it changes per s
+    left: float  # share of the way from where the robot began onto the path
+    fading: float  # by which it changes per s
     parameter_rate: np.ndarray  # (g,), of the chosen parameters
     aside: np.ndarray  # (3, 6), a motion of the joints beside the path: rad and derivatives
     step: float  # s since the instant before
@@ -95,6 +95,10 @@ class FollowerState(NamedTuple):
     q: np.ndarray  # (6,) rad, of the joints behind the gears
     rates: np.ndarray  # (2, 6), of the last two instants, newest first
     wander: np.ndarray  # (6,) rad/s, by which joints move because parameters do
+    start_error: np.ndarray  # (6,), from the tip to the path where the robot began
+    start_yield: np.ndarray  # (6,) rad, by which motors were further ahead then than they should have been
+    yields: np.ndarray  # (4, 6) rad, by which motors are ahead, newest first
+    gears: np.ndarray  # (4, 6), of `GearErrors`
 
 
 class Drives(NamedTuple):
@@ -134,9 +138,41 @@ class Gap(NamedTuple):
     width: float  # rad of deflection, after which it has turned over
 
 
+class Gears(NamedTuple):
+    """What gears have beyond their springs."""
+
+    ratio: np.ndarray  # (6,)
+    compliance: np.ndarray  # (6,) rad per N m
+    lag: np.ndarray  # (6,) s, by which damping holds them back
+    gap: Gap
+
+
+class Planned(NamedTuple):
+    """A plan of one instant, to be written."""
+
+    motion: np.ndarray  # (4, 6) position, velocity and acceleration of the motors, and the twist of the tip
+    moving: np.ndarray  # (3, 6) rad and derivatives of the joints behind the gears
+    loads: np.ndarray  # (5, 18)
+    columns: np.ndarray  # (6, C)
+    states: np.ndarray  # (18,) of the gears
+
+
 class Ring(NamedTuple):
     """Rows of numbers with their times, the last ones of all that there were."""
 
     count: np.ndarray  # (1,), of all of them
     times: np.ndarray  # (n,) s
     rows: np.ndarray  # (n, columns)
+
+
+class OpenKeyframe(NamedTuple):
+    """Samples that are being merged: sums of what they say, each times its weight."""
+
+    A: np.ndarray  # (n, n), of H^T W H
+    b: np.ndarray  # (n,), of H^T W y with y = r + H xi
+    samples: np.ndarray  # (1,)
+    weight: np.ndarray  # (1,)
+    first_theta: np.ndarray  # (6,), of the first sample, rad
+    means: np.ndarray  # (31,) or (73,), of theta, gears, motion, twist, time and shapes
+    y: np.ndarray  # (6,)
+    H: np.ndarray  # (6, n)

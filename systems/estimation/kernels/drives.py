@@ -36,27 +36,6 @@ def _behind(v, a, filtered, beta, i):
 
 
 @compiled
-def compare(planned, correction, filtered, actual, beta, Phi, y):
-    """Equations y = Phi beta of one instant, and by how much they are off at most at a beta, rad.
-
-    Args:
-        planned: position, velocity and acceleration of the motors, (6,) each.
-        correction: that was commanded beside the plan, rad, (6,).
-        filtered: as of `features`.
-        actual: positions of the motors, rad, (6,).
-        beta: (41,).
-        Phi: (6, 41), which are zero before, y: (6,), are written.
-    """
-    theta, v, a = planned
-    features(v, a, filtered, Phi)
-    largest = 0.0
-    for i in range(6):
-        y[i] = theta[i] - actual[i] + correction[i]
-        largest = max(largest, abs(y[i] - _behind(v[i], a[i], filtered, beta, i)))
-    return largest
-
-
-@compiled
 def learn(P, beta, Phi, y, variance):
     """Takes six equations y = Phi beta of one variance into covariance P and parameters beta."""
     n, m = len(beta), len(y)
@@ -102,12 +81,41 @@ def learn(P, beta, Phi, y, variance):
         for i in range(n):
             beta[i] += gain[k, i] * r[k]
     for i in range(n):
-        for k in range(m):
-            a, b = 0.5 * gain[k, i], 0.5 * PH[k, i]
+        row = P[i]
+        for k in range(0, m, 2):  # two at once, as the row is read and written only once then
+            a, b, c, d = 0.5 * gain[k, i], 0.5 * PH[k, i], 0.5 * gain[k + 1, i], 0.5 * PH[k + 1, i]
+            one, two, three, four = PH[k], gain[k], PH[k + 1], gain[k + 1]
             for j in range(i + 1):
-                P[i, j] -= a * PH[k, j] + b * gain[k, j]
+                row[j] -= a * one[j] + b * two[j] + c * three[j] + d * four[j]
         for j in range(i):
-            P[j, i] = P[i, j]
+            P[j, i] = row[j]
+
+
+@compiled
+def look_back(planned, correction, filtered, actual, P, beta, variance, most):
+    """Learns from one planned instant that has passed; see `DriveModel.look_back`.
+
+    Args:
+        planned: position, velocity and acceleration of the motors, (6,) each.
+        correction: that was commanded beside the plan, rad, (6,).
+        filtered: as of `features`.
+        actual: positions of the motors, rad, (6,).
+        P, beta, variance: as of `learn`.
+        most: rad, that may be unexplained if there shall be something to learn.
+
+    Returns:
+        By how much the positions are off at most at the beta from before, rad.
+    """
+    theta, v, a = planned
+    Phi, y = np.zeros((6, len(beta))), np.empty(6)
+    features(v, a, filtered, Phi)
+    largest = 0.0
+    for i in range(6):
+        y[i] = theta[i] - actual[i] + correction[i]
+        largest = max(largest, abs(y[i] - _behind(v[i], a[i], filtered, beta, i)))
+    if largest <= most:
+        learn(P, beta, Phi, y, variance)
+    return largest
 
 
 @inner

@@ -2,6 +2,8 @@
 
 import math
 
+import numpy as np
+
 from systems.estimation.kernels.poses import compiled
 
 
@@ -37,6 +39,19 @@ def enter(r, by_model, number, share, variances, error, spread, recent, by_model
         spread[i] += share * (math.sqrt(by_model[i]) - spread[i])
         most = max(most, abs(error[i]) / math.sqrt(variances[i]))
     return most
+
+
+@compiled
+def enter_usual(r, variances, suspicious, share, error, spread, recent, by_model_then):
+    """`enter` of one innovation that needs no explanation; -1 and nothing else if it does.
+
+    Args:
+        r, share, variances, error, spread, recent, by_model_then: as of `enter`.
+        suspicious: how many standard deviations need one.
+    """
+    if largest(r, variances) > suspicious:
+        return -1.0
+    return enter(r, np.zeros(6), 1, share, variances, error, spread, recent, by_model_then)
 
 
 @compiled

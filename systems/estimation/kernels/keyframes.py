@@ -13,7 +13,7 @@ from systems.estimation.kernels.arrays import (
     WEIGHT,
     SeenOnce,
 )
-from systems.estimation.kernels.information import add_squares
+from systems.estimation.kernels.information import add_squares, complete
 from systems.estimation.kernels.poses import compiled, error
 from systems.estimation.kernels.tip import predict_one_anew
 
@@ -43,3 +43,4 @@ def read(c, unknowns, masses, xi, keyframes, first, until, weights, A, b):
             for j in range(number):
                 y[i] += H[i, j] * xi[j]
         add_squares(H, shares, y, A, b)
+    complete(A)

@@ -4,6 +4,8 @@ import math
 
 import numpy as np
 
+from systems.estimation.kernels.gears import shapes
+from systems.estimation.kernels.gears import step as step_gears
 from systems.estimation.kernels.geometry import place
 from systems.estimation.kernels.loads import load
 from systems.estimation.kernels.poses import compiled, error, inner
@@ -40,7 +42,7 @@ def invert(columns, inverse):
 
 
 @inner
-def _newton(c, x, q, wanted, frames, columns, inverse):
+def _newton(c, x, q, start_error, wanted, frames, columns, inverse):
     """One step towards a pose, in place; the arm is the one before it. Returns its size in rad."""
     X, r, largest = np.empty((4, 4)), np.empty(6), 0.0
     place(c, q, X, frames, columns)
@@ -50,14 +52,14 @@ def _newton(c, x, q, wanted, frames, columns, inverse):
     for i in range(6):
         move = 0.0
         for j in range(6):
-            move += inverse[i, j] * (r[j] - wanted.error[j])
+            move += inverse[i, j] * (r[j] - wanted.left * start_error[j])
         q[i] += move
         largest = max(largest, abs(move))
     return largest
 
 
-@compiled
-def follow(c, masses, unknowns, wanted, state, moving, columns, loads, yields):
+@inner
+def _follow(c, masses, unknowns, wanted, state, moving, columns, loads, yields):
     """The joints behind the gears where a stiff arm is on the path, and what motion and load bend there.
 
     Args:
@@ -68,14 +70,14 @@ def follow(c, masses, unknowns, wanted, state, moving, columns, loads, yields):
             loads: (5, 18); yields: (6,) in rad, by which springs make motors be ahead of links; are written.
     """
     frames, inverse, X = np.empty((7, 4, 4)), np.empty((6, 6)), np.empty((4, 4))
-    q, rates, wander = state.q, state.rates, state.wander
+    q, rates, wander, start = state.q, state.rates, state.wander, state.start_error
     for i in range(6):
         q[i] += wanted.step * (1.5 * rates[0, i] - 0.5 * rates[1, i] + wander[i])
-    if _newton(c, unknowns.x, q, wanted, frames, columns, inverse) > wanted.newton_step:
-        _newton(c, unknowns.x, q, wanted, frames, columns, inverse)
+    if _newton(c, unknowns.x, q, start, wanted, frames, columns, inverse) > wanted.newton_step:
+        _newton(c, unknowns.x, q, start, wanted, frames, columns, inverse)
     drift = np.empty(6)
     for i in range(6):
-        drift[i] = wanted.error_rate[i]
+        drift[i] = wanted.fading * start[i]
         for k in range(len(c.chosen)):
             drift[i] += columns[i, 18 + k] * wanted.parameter_rate[k]
     is_aside = False
@@ -104,8 +106,8 @@ def follow(c, masses, unknowns, wanted, state, moving, columns, loads, yields):
             yields[i] -= inverse[i, k] * tilt
 
 
-@compiled
-def motors(moving, wander, yields, history, step, lag, columns, out):
+@inner
+def _motors(moving, wander, yields, history, step, lag, columns, out):
     """Motion of the motors, (3, 6), and the twist of the tip as the fourth row.
 
     Args:
@@ -130,6 +132,47 @@ def motors(moving, wander, yields, history, step, lag, columns, out):
         out[3, k] = 0.0
         for i in range(6):
             out[3, k] += columns[k, i] * (moving[1, i] + wander[i])
+
+
+@inner
+def _add_gear_errors(gears, unknowns, g, step, planned, state, yields):
+    """By how much gears are off beyond their springs, taken from the yields; renews their state."""
+    x, torque, turns = unknowns.x, np.empty(6), np.empty(6)
+    for j in range(6):
+        torque[j] = planned.loads[0, j]
+        for k in range(4):
+            torque[j] += x[g + 18 + k] * planned.loads[1 + k, j]
+        turns[j] = gears.ratio[j] * (planned.moving[0, j] + yields[j])
+    step_gears(gears.compliance, gears.gap, torque, step, False, state.gears)
+    number = (len(x) - g - 24) // 6
+    waves = np.empty((number, 6))
+    for k in range(3):
+        for j in range(6):
+            planned.states[6 * k + j] = state.gears[1 + k, j]
+    shapes(turns, planned.states, waves)
+    for k in range(number):
+        for j in range(6):
+            yields[j] -= waves[k, j] * x[g + 24 + 6 * k + j]
+
+
+@compiled
+def plan(c, masses, unknowns, gears, wanted, state, planned):
+    """Plans one instant.
+
+    Args:
+        c, masses, unknowns, gears: the arm, and the gears that it has errors of, if any.
+        wanted: `PathInstant`.
+        state: `FollowerState`; is renewed.
+        planned: `Planned`; is written.
+    """
+    yields, g = np.empty(6), len(c.chosen)
+    _follow(c, masses, unknowns, wanted, state, planned.moving, planned.columns, planned.loads, yields)
+    if len(unknowns.x) > g + 24:
+        _add_gear_errors(gears, unknowns, g, wanted.step, planned, state, yields)
+    for i in range(6):
+        yields[i] += wanted.left * state.start_yield[i]
+    columns, history = planned.columns, state.yields
+    _motors(planned.moving, state.wander, yields, history, wanted.step, gears.lag, columns, planned.motion)
 
 
 @compiled

@@ -17,6 +17,24 @@ def largest_change(x, y, first):
     return largest
 
 
+@compiled
+def largest_step(xi, before, sigma, first):
+    """The same of unknowns in units of their spreads."""
+    largest = 0.0
+    for k in range(first):
+        largest = max(largest, abs((xi[k] - before[k]) * sigma[k]))
+    return largest
+
+
+@compiled
+def stay_near(x, x_geometry, step, of):
+    """Makes x the geometry where it is further than a step away; says whether it is the one ``of`` still."""
+    if largest_change(x, x_geometry, len(of)) > step:
+        for k in range(len(x)):
+            x_geometry[k] = x[k]
+    return largest_change(of, x_geometry, len(of)) == 0.0
+
+
 @inner
 def deflect(unknowns, g, loads, unit, yields):
     """Deflections in rad for a factor of one, and with the factors of now, (18,) each."""

@@ -127,19 +127,15 @@ class Probe:
         """How far the joints may go from q (rad, (6,)) without coming near their limits, rad, (6,)."""
         return _MARGIN * np.maximum(0.0, np.minimum(self._upper - q, q - self._lower))
 
-    def at(
-        self, time: float, path_start: float, amplitude: np.ndarray
-    ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Displacement of the joints and its two derivatives at a time in s, (6,) each."""
+    def at(self, time: float, path_start: float, amplitude: np.ndarray) -> np.ndarray:
+        """Displacement of the joints in rad and its two derivatives at a time in s, (3, 6)."""
         begin, length = self.window(path_start)
         if 0.0 < time - _KNOCK_BEGIN < _KNOCK_LENGTH:
             # sin^4: a step of the acceleration would be a step of the gears' deflection.
             s, w = 2.0 * np.pi * (time - _KNOCK_BEGIN) / _KNOCK_LENGTH, 2.0 * np.pi / _KNOCK_LENGTH
             u, du, ddu = 0.5 - 0.5 * np.cos(s), 0.5 * w * np.sin(s), 0.5 * w * w * np.cos(s)
-            size = amplitude[0]
-            return size * u * u, 2.0 * size * u * du, 2.0 * size * (du * du + u * ddu)
+            return np.outer((u * u, 2.0 * u * du, 2.0 * (du * du + u * ddu)), amplitude[0])
         if not 0.0 < time - begin < length:
-            return np.zeros(NUM_JOINTS), np.zeros(NUM_JOINTS), np.zeros(NUM_JOINTS)
+            return np.zeros((3, NUM_JOINTS))
         pattern = self.pattern._replace(size=amplitude[1])
-        displacement, velocity, acceleration = pattern.at(np.array([time - begin]), length)
-        return displacement[0], velocity[0], acceleration[0]
+        return np.concatenate(pattern.at(np.array([time - begin]), length))

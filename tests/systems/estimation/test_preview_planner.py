@@ -11,7 +11,7 @@ from systems.reference.paths import ReferenceConfig, make_path
 from tests.systems.estimation.arms import tip_model, true_unknowns
 
 PERIOD = 4e-3
-NO_MOTION = (np.zeros(6), np.zeros(6), np.zeros(6))
+NO_MOTION = np.zeros((3, 6))
 START = np.array([0.91, 0.35, 0.12, 0.0, 1.1, 0.9])
 
 
