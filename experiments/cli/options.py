@@ -1,5 +1,6 @@
 """Options that several commands have."""
 
+from collections.abc import Iterable
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -9,8 +10,37 @@ from systems.cell.cameras import CAMERAS
 from systems.feedforward import FEEDFORWARDS
 from systems.servo import LAWS
 
+
+def _scenarios(incomplete: str) -> list[str]:
+    # Imported where a shell asks for names, so that no other command waits for it.
+    from diagrams.scenario.scenario_file import shipped_scenarios
+
+    return _beginning_with(incomplete, shipped_scenarios())
+
+
+def _robots(incomplete: str) -> list[str]:
+    from robots.description.model import shipped_robots
+
+    return _beginning_with(incomplete, shipped_robots())
+
+
+def _laws(incomplete: str) -> list[str]:
+    return _beginning_with(incomplete, LAWS)
+
+
+def _beginning_with(incomplete: str, names: Iterable[str]) -> list[str]:
+    """Where no name fits, shells go on with files."""
+    return [name for name in names if name.startswith(incomplete)]
+
+
 ScenarioOption = Annotated[
-    str, typer.Option("--scenario", metavar="NAME|FILE", help="A shipped scenario or a YAML file.")
+    str,
+    typer.Option(
+        "--scenario",
+        metavar="NAME|FILE",
+        help="A shipped scenario or a YAML file.",
+        autocompletion=_scenarios,
+    ),
 ]
 # Without a name the command chooses one that fits.
 AnyScenarioOption = Annotated[
@@ -20,6 +50,7 @@ AnyScenarioOption = Annotated[
         metavar="NAME|FILE",
         help="A shipped scenario or a YAML file.",
         show_default="misaligned; on a station cell",
+        autocompletion=_scenarios,
     ),
 ]
 StationOption = Annotated[
@@ -43,6 +74,7 @@ LawOption = Annotated[
         metavar="NAME|FILE:CLASS",
         help=f"One of {', '.join(LAWS)}, or my_law.py:MyLaw.",
         show_default="the scenario's",
+        autocompletion=_laws,
     ),
 ]
 SetOption = Annotated[
@@ -59,11 +91,18 @@ RobotOption = Annotated[
         "--robot",
         metavar="NAME|FILE",
         help="A robot in place of the scenario's, or a calibrated one for the controller.",
+        autocompletion=_robots,
     ),
 ]
 # Of a study that takes a robot and no scenario.
 StudiedRobotOption = Annotated[
-    str, typer.Option("--robot", metavar="NAME|FILE", help="A shipped robot, a YAML file or a URDF.")
+    str,
+    typer.Option(
+        "--robot",
+        metavar="NAME|FILE",
+        help="A shipped robot, a YAML file or a URDF.",
+        autocompletion=_robots,
+    ),
 ]
 PayloadOption = Annotated[
     float | None,

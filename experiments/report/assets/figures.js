@@ -24,6 +24,8 @@ function saveText(text, name) {
   link.click();
   URL.revokeObjectURL(link.href);
 }
+/* Plotly prefers an angle that it once chose itself to one of exactly 0. */
+const level = 1e-6;
 /* Three columns of axes or more have no room on a narrow screen: there all axes stand above each other. */
 function stacked(layout) {
   const named = letter => Object.keys(layout).filter(name => new RegExp(`^${letter}axis\\d*$`).test(name));
@@ -35,7 +37,7 @@ function stacked(layout) {
   columns.forEach((name, i) => {
     const top = 1 - i * (high + gap);
     change[`${name}.domain`] = [0, layout.coloraxis ? 0.92 : 1];
-    Object.assign(change, {[`${name}.nticks`]: 5, [`${name}.tickangle`]: 0});
+    Object.assign(change, {[`${name}.nticks`]: 5, [`${name}.tickangle`]: level});
     change[`${rows[i]}.domain`] = [Math.max(0, top - high), top];
     change[`${rows[i]}.showticklabels`] = true;
     if ((layout.annotations || []).length === count) Object.assign(change, {[`annotations[${i}].x`]: 0.5, [`annotations[${i}].y`]: top});
@@ -73,7 +75,7 @@ function colorFigures() {
       if (change.height) plot.style.height = plot.parentElement.style.height = change.height + "px";
       else for (const [name, axis] of Object.entries(plot._fullLayout)) if (/^xaxis/.test(name)
           && axis.domain[1] - axis.domain[0] < 0.6) Object.assign(change, {[`${name}.nticks`]: 4,
-        [`${name}.tickangle`]: 0, [`${name}.tickfont.size`]: 11, [`${name}.title.font.size`]: 11});
+        [`${name}.tickangle`]: level, [`${name}.tickfont.size`]: 11, [`${name}.title.font.size`]: 11});
       (plot.layout.annotations || []).forEach((_, i) => { change[`annotations[${i}].font.size`] = 11; });
     }
     Plotly.relayout(plot, change);

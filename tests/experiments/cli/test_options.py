@@ -1,6 +1,9 @@
 """One word, one meaning: an option is the same in every command, and the help speaks of what is typed."""
 
+import os
 import re
+import subprocess
+import sys
 from collections import defaultdict
 from typing import Any
 
@@ -69,3 +72,28 @@ def test_the_help_names_values_as_they_are_typed_and_says_where_files_are_descri
     takes_files = any(re.search("FILE|DIR", each.metavar or "") for each in COMMANDS[command].params)
     groups = getattr(COMMANDS[command], "commands", None)  # shows its commands and takes no file itself
     assert (" ".join(FILES_HELP.split()) in " ".join(text.split())) == (takes_files and not groups)
+
+
+@pytest.mark.slow  # each starts a command, as a shell does
+@pytest.mark.parametrize(
+    ("words", "offered"),
+    [
+        ("comp", ["compare", "compensate"]),
+        ("compare --scenario mis", ["misaligned"]),
+        ("compare --robot kr1", ["kr16", "kr16-realistic"]),
+        ("run --law pb", ["pbvs"]),
+        ("compare --scenario mine", []),
+    ],
+)
+def test_a_shell_is_offered_commands_and_names(words: str, offered: list[str]):
+    typed = f"truetip {words}"
+    shell = {
+        "COMP_WORDS": typed,
+        "COMP_CWORD": str(words.count(" ") + 1),
+        "_TRUETIP_COMPLETE": "complete_bash",
+    }
+    code = "import sys; sys.argv = ['truetip']; from experiments.main import main; main()"
+    run = subprocess.run(
+        [sys.executable, "-c", code], env={**os.environ, **shell}, capture_output=True, text=True
+    )
+    assert run.stdout.split() == offered
