@@ -1,8 +1,9 @@
 """The unknowns of an elastic arm by name: springs, dampers, play and hysteresis of gears, ripple of ratios.
 
 Springs, times and widths are given by their logarithm, so that they stay positive and a step of 0.1 is a
-tenth of any of them. Dampers are springs times a retardation time, one time for a group of springs: motion
-shows little more. Play, hysteresis and ripple count in units of which one is much.
+tenth of any of them. Dampers are springs times a retardation time, one time for a gear, and one for a group
+of bearings or beams: motion shows little more. Play, hysteresis and ripple count in units of which one is
+much.
 """
 
 from collections.abc import Sequence
@@ -15,7 +16,9 @@ from robots.description.variation import Factors
 from robots.identification.arm_along_motion import ElasticArm
 
 _ARM = 3  # axes of the arm; those behind them are of the wrist
-GROUPS = ("gears_1_3", "gears_4_6", "bearings_1_3", "bearings_4_6", "beams")
+# Of dampers: those of a group have the same retardation time. Gears yield most, so that each has its own: a
+# hundredth of theirs would be a tenth of the others'.
+GROUPS = (*(f"gear_{joint + 1}" for joint in range(NUM_JOINTS)), "bearings_1_3", "bearings_4_6", "beams")
 DIRECTIONS = {"gear": ("",), "bearing": ("a", "b"), "beam": ("x", "y", "z")}  # in which a part yields
 PLAY, RIPPLE = 1e-4, 1e-5  # rad, units
 RIPPLES_PER_TURN = 2.0  # of the motor, of the ripple that harmonic drives and cycloids have first of all
@@ -55,7 +58,9 @@ class Spring:
         """Of `GROUPS`."""
         if self.part == "beam":
             return GROUPS.index("beams")
-        return GROUPS.index(f"{self.part}s_{'1_3' if self.joint < _ARM else '4_6'}")
+        if self.part == "gear":
+            return GROUPS.index(f"gear_{self.joint + 1}")
+        return GROUPS.index(f"bearings_{'1_3' if self.joint < _ARM else '4_6'}")
 
 
 @dataclass(frozen=True)

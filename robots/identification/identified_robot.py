@@ -80,7 +80,7 @@ def _times(fit: ArmFit, true: "_True | None") -> list[FoundParameter]:
     rows = []
     for place in parameters.of_kind("time"):
         group = parameters.names[place].removeprefix("time_")
-        with_oil = group.startswith("gears") and len(share) > 0
+        with_oil = group.startswith("gear") and len(share) > 0
         gradient = np.zeros(len(parameters))
         gradient[place], factor = 1.0, 1.0
         if with_oil:
@@ -119,8 +119,8 @@ class _True:
         self.times = {}
         for name, value in zip([parameters.names[i] for i in parameters.of_kind("time")], times, strict=True):
             group = name.removeprefix("time_")
-            if group.startswith("gears"):
-                value += oil[:3].mean() if group.endswith("1_3") else oil[3:].mean()
+            if group.startswith("gear_"):
+                value += oil[int(group.removeprefix("gear_")) - 1]
             self.times[group] = float(value)
 
 

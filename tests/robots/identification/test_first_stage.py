@@ -86,7 +86,7 @@ def test_a_lag_of_the_sensors_is_found_with_the_dampers(arm: ElasticArm):
     found, shift = problem.solve(true, np.full(3 * len(SENSORS), 2e-3), 10, 1e-4)
     # Later readings are those of an earlier time; gears and bearings of one posture take a part of it.
     np.testing.assert_allclose(shift, 0.1, atol=0.05)
-    gears = parameters.names.index("time_gears_1_3")
+    gears = parameters.names.index("time_gear_1")
     assert np.exp(found[gears] - true[gears]) == pytest.approx(1.0, abs=0.25)
 
 
