@@ -5,6 +5,7 @@ import json
 import os
 import re
 import signal
+import socket
 import subprocess
 import sys
 import time
@@ -121,6 +122,15 @@ def dask_process(*arguments: str) -> Iterator[subprocess.Popen[bytes]]:
         process.wait()
 
 
+def wait_until_it_listens(port: int) -> None:
+    """A scheduler begins within a second, on a busy machine within twenty."""
+    for _ in range(600):
+        with contextlib.suppress(OSError), socket.create_connection(("127.0.0.1", port), timeout=1.0):
+            return
+        time.sleep(0.1)
+    raise AssertionError(f"no process listens on port {port}")
+
+
 @pytest.mark.slow
 def test_a_worker_that_is_killed_loses_nothing(tmp_path):
     """On a scheduler and two workers in processes of their own the rows are those of this process."""
@@ -138,6 +148,7 @@ def test_a_worker_that_is_killed_loses_nothing(tmp_path):
         dask_process(*worker, "--no-nanny") as first,
         dask_process(*worker, "--no-nanny"),
     ):
+        wait_until_it_listens(18786)
         cluster = DaskCluster(address)
         cluster.check()
         killed = []
