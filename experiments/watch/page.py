@@ -131,7 +131,7 @@ def run_verdict(run: WatchRun) -> str:
     if nearest is None:
         seen = "nobody was seen"
     elif nearest < _AT_THE_ROBOT:
-        seen = "somebody was seen at the robot, without any distance"
+        seen = "somebody was seen so near that no distance to the robot was left"
     else:
         seen = f"the nearest was seen {nearest:.2f} m from the robot"
     return (
@@ -229,7 +229,7 @@ def _plan(run: WatchRun, ground: Surroundings) -> go.Figure:
     figure.add_trace(
         go.Scatter(x=line.place[:, 0], y=line.place[:, 1], mode="markers", name="person",
                    marker={"color": line.rate, "colorscale": "RdYlGn", "cmin": 0, "cmax": 1, "size": 6,
-                           "colorbar": {"title": "share of<br>the speed"}})
+                           "colorbar": {"title": {"text": "share of the speed", "side": "right"}}})
     )  # fmt: skip
     return figure
 

@@ -200,12 +200,12 @@ document.addEventListener("keydown", event => {
 });
 
 let isStale = true, before = null, drawn = 0, told = 0;
-/* Without a graphics card pixels get coarser until it draws thirty frames a second; several robots that one sees
-   through begin with coarser ones. */
+/* Without a graphics card pixels in motion get coarser until it draws thirty frames a second; several robots that one
+   sees through begin with coarser ones. What stands still is fine. */
 const wantedRate = 31, coarsest = 0.4, watched = 15;
-let watchedFrom = null, watchedFrames = 0;
+let inMotion = 1, watchedFrom = null, watchedFrames = 0;
 function beginAnew() {
-  setFineness(isSoft && state.robot === "all" ? 0.6 : 1);
+  inMotion = isSoft && state.robot === "all" ? 0.6 : 1;
   watchedFrom = null;
 }
 function keepPace(now) {
@@ -214,7 +214,7 @@ function keepPace(now) {
   if (++watchedFrames < watched) return;
   const rate = 1000 * watchedFrames / (now - watchedFrom);
   watchedFrom = null;
-  if (rate < wantedRate && fineness > coarsest) setFineness(Math.max(coarsest, 0.8 * fineness));
+  if (rate < wantedRate) inMotion = Math.max(coarsest, 0.8 * inMotion);
 }
 function fit() {
   renderer.setSize(holder.clientWidth, holder.clientHeight);
@@ -234,6 +234,8 @@ function tick(now) {
     isStale = true;
   }
   before = now;
+  const wanted = state.isPlaying ? inMotion : 1;
+  if (fineness !== wanted) { setFineness(wanted); isStale = true; }
   if (isStale) {
     show();
     /* Numbers that change thirty times a second nobody can read. */
