@@ -8,7 +8,7 @@ import numpy as np
 from systems.estimation import kernels
 from systems.estimation.arm_geometry import Constants
 from systems.estimation.gear_errors import NUM_SHAPES
-from systems.estimation.kernels.arrays import GEARS, MOTION, SHAPES, THETA, TIME, TWIST
+from systems.estimation.kernels.arrays import GEARS, MOTION, SHAPES, THETA, TIME, TWIST, OpenKeyframe
 from systems.estimation.memory import Layout
 from systems.estimation.tip_model import Prediction, TipModel
 
@@ -154,6 +154,12 @@ class Keyframes:
         shapes = rows[:, SHAPES:].reshape(-1, NUM_SHAPES, 6) if model.has_gear_errors else None
         seen = rows[:, TWIST:TIME], shapes, rows[:, TIME]
         return model.predict_anew(constants, model.full(xi), configuration, motion, *seen)
+
+
+def open_keyframe(memory: SimpleNamespace) -> OpenKeyframe:
+    """The keyframe that a `TipEstimator` adds samples to, as views of its memory."""
+    sums = memory.A_open, memory.b_open, memory.samples, memory.weight
+    return OpenKeyframe(*sums, memory.first_theta, memory.sums, memory.sum_y, memory.sum_H)
 
 
 def keyframe_row(means: np.ndarray, seen: tuple[np.ndarray, float]) -> np.ndarray:

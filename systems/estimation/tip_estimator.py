@@ -22,8 +22,7 @@ from systems.estimation.events import (
     Innovations,
 )
 from systems.estimation.gear_errors import NUM_SHAPES, NUM_STATES
-from systems.estimation.kernels.arrays import OpenKeyframe
-from systems.estimation.keyframes import Keyframes, keyframe_row
+from systems.estimation.keyframes import Keyframes, keyframe_row, open_keyframe
 from systems.estimation.memory import Layout
 from systems.estimation.tip_model import NO_SHAPES, Prediction, Spread, TipModel, moved
 
@@ -33,10 +32,8 @@ _DOUBT = 3.0  # times wider, what is known of everything, where it does not hold
 _TRUST = 0.02  # m or rad, the largest step from where the past was read
 _KEEP_EVERY = 10  # samples, between two notes of what is known
 _DRIFT_EVERY = 50  # samples, between two looks whether the clock drifts, halfway between two such notes
-_LEAST_DRIFT, _DRIFT_SIGMAS = (
-    1e-4,
-    8.0,
-)  # s/s; and how sure it has to be, as what no parameter describes adds up
+# s/s; and how sure it has to be, as what no parameter describes adds up.
+_LEAST_DRIFT, _DRIFT_SIGMAS = 1e-4, 8.0
 _CLOSE_AT = (5, 20, 60)  # samples: the first linearisations are poor
 
 
@@ -98,9 +95,8 @@ class TipEstimator:
             samples=(1,),
             weight=(1,),
             first_theta=(6,),
-            sums=(
-                31 + 6 * NUM_SHAPES * model.has_gear_errors,
-            ),  # of theta, gears, motion, twist, time, shapes
+            # Of theta, gears, motion, twist, time and shapes.
+            sums=(31 + 6 * NUM_SHAPES * model.has_gear_errors,),
             first_time=(1,),  # of the camera's clock
             last_time=(1,),
             sum_y=(6,),
@@ -275,16 +271,7 @@ class TipEstimator:
         is_closing = is_long or int(memory.count[0]) in _CLOSE_AT
         since_first = self._since_first(memory, pair.time)
         seen = pair.theta, pair.motion, pair.twist, since_first, NO_SHAPES if shapes is None else shapes
-        keyframe = OpenKeyframe(
-            memory.A_open,
-            memory.b_open,
-            memory.samples,
-            memory.weight,
-            memory.first_theta,
-            memory.sums,
-            memory.sum_y,
-            memory.sum_H,
-        )
+        keyframe = open_keyframe(memory)
         past, model = memory.keyframes, self.model
         sums = past.A, past.b, past.xi_sum, model.sigma, model.K.start
         limits = -1.0 if is_closing else self._config.keyframe_step, _TRUST
