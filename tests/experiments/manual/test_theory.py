@@ -17,7 +17,7 @@ SOURCE = re.compile(r"Source: (?P<source>.+?) Code: `(?P<code>[\w.]+)`\. Test: `
 KNOWN = (
     r"\b[PRW] (\(\d+(\.\d+)?[a-z]?\)|section|sections|chapter|appendix|figure)",
     r"\((19|20)\d\d\)",
-    r"ISO/TS 15066:2016, section",
+    r"ISO/TS 15066:2016, section|ISO 9283",
     r"JCGM 100:2008, section",
     r"[Oo]wn derivation",
     r"inverse dynamics|Dahl's model|chi squared|[Cc]hain rule|[Rr]ecursive least squares",
