@@ -1,6 +1,6 @@
 """A robot as what a viewer needs to draw it: its frames, and the shapes of its bodies."""
 
-from pathlib import Path
+import math
 from typing import Any
 
 import numpy as np
@@ -8,10 +8,13 @@ from pydrake.math import RigidTransform
 
 from experiments.report.curves import coded, rounded
 from robots.description.model import NUM_JOINTS, Link, RobotModel
-from robots.description.placement import Picture
+from robots.description.pictures.mesh_file import MeshError
+from robots.description.pictures.picture import Picture
 
 MOST_FACES = 40000  # of all meshes of a robot, so that a page stays small and quick
-_CELLS = (0.0, 0.002, 0.004, 0.006, 0.01, 0.02)  # m, within which points of a mesh become one
+_FINEST = 1.0 / 500.0  # of the width of a mesh: cubes within which its points become one
+_COARSER = 1.2  # until it is coarse enough
+_BODIES = NUM_JOINTS + 1
 _DIGITS = 7
 LINK, BASE, FLANGE, TOOL = "link", "base", "flange", "tool"
 
@@ -33,8 +36,10 @@ def robot_shapes(robot: RobotModel) -> dict[str, Any]:
     links = [robot.base_link, *robot.links]
     tips = [*ends, np.zeros(3)]
     meshes: list[dict[str, Any]] = []
+    count = sum(picture.shape == "mesh" for link in links for picture in link.pictures)
+    most_faces = MOST_FACES // max(_BODIES, count)
     bodies = [
-        _body(number, link, np.asarray(tip), meshes)
+        _body(number, link, np.asarray(tip), meshes, most_faces)
         for number, (link, tip) in enumerate(zip(links, tips, strict=True))
     ]
     X_FE = robot.tool.pose()
@@ -53,9 +58,11 @@ def robot_shapes(robot: RobotModel) -> dict[str, Any]:
     }
 
 
-def _body(number: int, link: Link, tip: np.ndarray, meshes: list[dict[str, Any]]) -> list[dict[str, Any]]:
+def _body(
+    number: int, link: Link, tip: np.ndarray, meshes: list[dict[str, Any]], most_faces: int
+) -> list[dict[str, Any]]:
     pictures, part = link.pictures, LINK if number else BASE
-    if not pictures or any(p.shape == "mesh" and not Path(p.file).is_file() for p in pictures):
+    if not pictures:
         return _capsule(number, tip, link.radius, part)
     shapes: list[dict[str, Any]] = []
     for picture in pictures:
@@ -65,8 +72,9 @@ def _body(number: int, link: Link, tip: np.ndarray, meshes: list[dict[str, Any]]
             "part": part,
         }
         if picture.shape == "mesh":
-            mesh = _mesh(picture)
-            if mesh is None:
+            try:
+                mesh = _mesh(picture, most_faces)
+            except MeshError:  # it has changed since the robot was loaded
                 return _capsule(number, tip, link.radius, part)
             shapes.append(shape | {"mesh": len(meshes)})
             meshes.append(mesh)
@@ -93,37 +101,41 @@ def _capsule(number: int, tip: np.ndarray, radius: float, part: str) -> list[dic
     return [_between(np.zeros(3), tip, radius, part, "capsule")]
 
 
-def _mesh(picture: Picture) -> dict[str, Any] | None:
-    """Points and faces of a mesh file, coarse enough for a page; None if its format cannot be read here."""
-    import trimesh  # here, because it takes a tenth of a second that only meshes need
-
-    try:
-        mesh: Any = trimesh.load(picture.file, force="mesh")
-    except (ValueError, NotImplementedError, ImportError):  # such as COLLADA without a reader for it
-        return None
-    points, faces = np.asarray(mesh.vertices) * np.array(picture.size), np.asarray(mesh.faces)
-    for cell in _CELLS:
-        coarse, kept = _merged(points, faces, cell)
-        if len(kept) <= MOST_FACES // 7:
-            break
+def _mesh(picture: Picture, most_faces: int) -> dict[str, Any]:
+    """Points and triangles of a mesh file, coarse enough for a page."""
+    points, faces = fine = picture.triangles()
+    a, b, c = (points[faces[:, corner]] for corner in range(3))
+    surface = 0.5 * float(np.linalg.norm(np.cross(b - a, c - a), axis=1).sum())
+    cell = max(_FINEST * float(np.ptp(points, axis=0).max()), math.sqrt(surface / max(1, most_faces)))
+    while len(faces) > most_faces:
+        points, faces = _merged(*fine, cell)
+        cell *= _COARSER
     return {
-        "points": [coded(coarse[:, axis]) for axis in range(3)],
-        "faces": coded(kept.reshape(-1), is_whole=True),
+        "points": [coded(points[:, axis]) for axis in range(3)],
+        "faces": coded(faces.reshape(-1), is_whole=True),
     }
 
 
 def _merged(points: np.ndarray, faces: np.ndarray, cell: float) -> tuple[np.ndarray, np.ndarray]:
     """A mesh whose points within a cube of edge ``cell`` are one, in the middle of them."""
-    if cell == 0.0:
-        return points, faces
     _, member, count = np.unique(
-        np.floor(points / cell).astype(int), axis=0, return_inverse=True, return_counts=True
+        _keys(np.floor((points - points.min(axis=0)) / cell)), return_inverse=True, return_counts=True
     )
-    member = member.reshape(-1)
     sums = np.stack([np.bincount(member, points[:, axis]) for axis in range(3)], -1)
     faces = member[faces]
     a, b, c = faces.T
-    return sums / count[:, None], faces[(a != b) & (b != c) & (a != c)]
+    faces = faces[(a != b) & (b != c) & (a != c)]
+    # Many small triangles become the same one, whichever corner is the first; its other side is another one.
+    turns = (np.argmin(faces, axis=1)[:, None] + np.arange(3)) % 3
+    faces = np.take_along_axis(faces, turns, axis=1)
+    _, different = np.unique(_keys(faces), return_index=True)
+    return sums / count[:, None], faces[different]
+
+
+def _keys(rows: np.ndarray) -> np.ndarray:
+    """A number for each row (n, 3) of whole numbers from zero on, the same only for the same rows."""
+    rows = rows.astype(int)
+    return np.ravel_multi_index(tuple(rows.T), tuple(rows.max(axis=0, initial=0) + 1))
 
 
 def _between(start: np.ndarray, end: np.ndarray, radius: float, part: str, kind: str) -> dict[str, Any]:

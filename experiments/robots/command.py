@@ -65,8 +65,8 @@ def import_command(
             raise ConfigurationError(f"'{urdf}' is no URDF: its name must end in .urdf or .xacro")
         found = read_urdf(Path(urdf), f"URDF {urdf}", base, tip, _folders(package or []))
         robot = robot_of(found.nodes)
-        if target:
-            write_text(target, robot_text(robot))
+        if write and target:
+            write_text(target, robot_text(robot, beside=Path(write)))
     _describe(console, robot, found)
     if write:
         console.print(escape(write), soft_wrap=True)
@@ -102,4 +102,10 @@ def _describe(console: Console, robot: RobotModel, found: UrdfRobot) -> None:
             console,
             f"{len(found.missing_meshes)} meshes were not found, for example {found.missing_meshes[0]}; "
             "name their folder with --package NAME=DIR",
+        )
+    if found.unreadable_meshes:
+        print_note(
+            console,
+            f"{len(found.unreadable_meshes)} meshes are left out, for example: {found.unreadable_meshes[0]}; "
+            "shapes for collision stand in for them where there are any",
         )

@@ -27,7 +27,8 @@ from robots.description.calibration import Calibration
 from robots.description.counterbalance_spring import CounterbalanceSpring
 from robots.description.drive_train import DriveLimits, DriveTrain, Tilting, drive_trains
 from robots.description.measuring import MeasuringRange
-from robots.description.placement import Picture, Placement
+from robots.description.pictures.picture import Picture, with_paths_from
+from robots.description.placement import Placement
 from robots.description.urdf_in.reader import is_urdf, read_urdf
 from robots.drivetrain.counterbalance import Counterbalance
 from robots.drivetrain.stiffness import SpringRow
@@ -261,7 +262,9 @@ def robot_of(node: Node) -> RobotModel:
 
 
 def _read(path: Path, label: str) -> Node:
-    return read_urdf(path, label).nodes if is_urdf(path.name) else read_nodes(path, label)
+    if is_urdf(path.name):
+        return read_urdf(path, label).nodes
+    return with_paths_from(path.parent, read_nodes(path, label))
 
 
 def _find(name: str, beside: Path) -> tuple[Path, str]:

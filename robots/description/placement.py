@@ -1,14 +1,11 @@
-"""A frame in another one as a robot file says it, and what pictures a body."""
+"""A frame in another one as a robot file says it."""
 
 from dataclasses import dataclass, field
 
 import numpy as np
 from pydrake.math import RigidTransform, RotationMatrix
 
-from robots.configuration.quantity import choice, numbers
 from robots.pose import rotation_from_zyx, zyx_from_rotation
-
-SHAPES = {"mesh": 3, "box": 3, "cylinder": 2, "sphere": 1}  # and how many numbers say their size
 
 
 @dataclass
@@ -25,25 +22,6 @@ class Placement:
         """The placement as a transform, child in parent."""
         R = RotationMatrix(rotation_from_zyx(np.deg2rad(self.zyx_deg)))
         return RigidTransform(R, self.translation)
-
-
-@dataclass
-class Picture:
-    """A shape that a viewer shows for a link, in place of a capsule."""
-
-    shape: str = choice("mesh", SHAPES)  # what is drawn
-    file: str = ""  # of a mesh: .obj, .gltf, .glb, .dae or .stl
-    # m: edges of a box, radius and length of a cylinder, radius of a sphere; factors of a mesh along x, y, z
-    size: list[float] = numbers([1.0, 1.0, 1.0], (1, 2, 3))
-    placement: Placement = field(default_factory=Placement)  # in the frame of the link
-
-    def problem(self) -> str:
-        """Why there is no such shape, or an empty string."""
-        if len(self.size) != SHAPES[self.shape]:
-            return f"the size of a {self.shape} needs {SHAPES[self.shape]} numbers, got {self.size}"
-        if self.shape == "mesh" and not self.file:
-            return "a mesh needs a file"
-        return ""
 
 
 def placement_entry(X: RigidTransform, source: str) -> dict:

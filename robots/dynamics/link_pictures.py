@@ -9,7 +9,7 @@ from pydrake.multibody.plant import MultibodyPlant
 from pydrake.multibody.tree import RigidBody
 
 from robots.description.model import Link
-from robots.description.placement import Picture
+from robots.description.pictures.picture import Picture
 
 
 def add_pictures(plant: MultibodyPlant, body: RigidBody, link: Link, color: Rgba) -> bool:
@@ -41,14 +41,15 @@ def _shape(picture: Picture) -> Shape:
         return Cylinder(*size)
     if picture.shape == "sphere":
         return Sphere(size[0])
-    return _mesh(Path(picture.file), np.array(size))
+    return drakes_mesh(picture)
 
 
-def _mesh(path: Path, scale: np.ndarray) -> Mesh:
-    """A mesh; Meshcat shows no STL, so that one is handed on as OBJ."""
-    if path.suffix.lower() != ".stl":
-        return Mesh(path, scale)
-    import trimesh  # here, because it takes a tenth of a second that only STL needs
-
-    text = str(trimesh.load_mesh(path).export(file_type="obj"))
-    return Mesh(InMemoryMesh(mesh_file=MemoryFile(text, ".obj", path.name)), scale)
+def drakes_mesh(picture: Picture) -> Mesh:
+    """A mesh; only OBJ, which may have colours, is read by Meshcat: it takes no STL and no GLB."""
+    path = Path(picture.file)
+    if path.suffix.lower() == ".obj":
+        return Mesh(path, np.array(picture.size))
+    points, faces = picture.triangles()
+    lines = [f"v {x!r} {y!r} {z!r}" for x, y, z in points.tolist()]
+    lines += [f"f {a} {b} {c}" for a, b, c in (faces + 1).tolist()]
+    return Mesh(InMemoryMesh(mesh_file=MemoryFile("\n".join(lines), ".obj", path.name)))

@@ -11,10 +11,10 @@ from pathlib import Path
 import numpy as np
 from pydrake.math import RigidTransform, RollPitchYaw
 
+from robots.description.pictures.picture import Picture
 from robots.description.placement import placement_entry
 from robots.description.urdf_in.chain import UrdfText
 
-_SHOWN = (".obj", ".gltf", ".glb", ".dae", ".stl")
 _PACKAGE = "package://"
 
 
@@ -25,6 +25,7 @@ class Pictures:
         """``packages`` are folders of packages by their names; others are looked for above the file."""
         self._text, self._packages = text, dict(packages)
         self.missing: list[str] = []  # meshes that were not found
+        self.unreadable: list[str] = []  # why those that were found are left out
 
     def of(self, link: str, X_LB: RigidTransform) -> list[dict]:
         """Of a link that is fixed at X_LB to its body; shapes for collision where it has no others."""
@@ -56,9 +57,12 @@ class Pictures:
         if file is None:
             self.missing.append(uri)
             return None
-        if file.suffix.lower() not in _SHOWN:
+        size = _floats(shape.get("scale", "1 1 1"), 3)
+        problem = Picture("mesh", str(file), size).problem()
+        if problem:
+            self.unreadable.append(problem)
             return None
-        return entry | {"file": str(file), "size": _floats(shape.get("scale", "1 1 1"), 3)}
+        return entry | {"file": str(file), "size": size}
 
     def _file(self, uri: str) -> Path | None:
         """The file that a URI names, or None if there is none."""

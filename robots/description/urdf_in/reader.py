@@ -49,6 +49,7 @@ class UrdfRobot:
     chain: Chain
     assumed: list[str] = field(default_factory=list)  # what the URDF does not say
     missing_meshes: list[str] = field(default_factory=list)
+    unreadable_meshes: list[str] = field(default_factory=list)  # and why
 
 
 def is_urdf(name: str) -> bool:
@@ -76,7 +77,7 @@ def read_urdf(
     pictures = Pictures(text, packages or {})
     tree = arm.entries(pictures)
     assumed = ["gears, motors and friction", "bearings", "payload", *arm.assumed]
-    return UrdfRobot(_node(tree, label), chain, assumed, pictures.missing)
+    return UrdfRobot(_node(tree, label), chain, assumed, pictures.missing, pictures.unreadable)
 
 
 class _Arm:

@@ -1,13 +1,18 @@
 """The replay as a reader uses it: what it shows, its controls and its keys."""
 
+from pathlib import Path
+
 import numpy as np
 import pytest
+import trimesh
 
 from experiments.metrics.run_metrics import pose_errors
 from experiments.replay.replay import watchers, write_replay
 from experiments.replay.replay_data import frame_times, replay_data
 from experiments.report.style import law_title
 from robots.description.model import load_robot
+from robots.description.pictures.picture import Picture
+from robots.kinematics.forward import Kinematics
 from systems.cell.marker_camera import MarkerFeaturesConfig
 from tests.experiments.browser_session import browser
 from tests.experiments.report.test_curves import decoded
@@ -85,3 +90,44 @@ def test_controls_and_keys_do_what_they_say(logs, tmp_path):
         assert not tab.complaints
         assert all(address.startswith(("file:", "data:", "blob:")) for address in tab.requests)
         assert all(law_title(law) in tab.run("document.body.textContent") for law in logs)
+
+
+# The corners of the first shape of the last link in the world, as three.js draws them.
+CORNERS = """(() => {
+  show();
+  scene.updateMatrixWorld(true);
+  const link = laws.find(each => each.id === "pbvs").arm.joints[5].link, mesh = link.children[0];
+  const places = mesh.geometry.attributes.position, found = [];
+  for (let i = 0; i < places.count; i++)
+    found.push(new THREE.Vector3().fromBufferAttribute(places, i).applyMatrix4(mesh.matrixWorld).toArray());
+  return found;
+})()"""
+
+
+@pytest.mark.slow
+def test_a_page_with_fine_meshes_is_small_and_draws_them_where_the_robot_is(logs, tmp_path: Path):
+    """Angles have steps of 1/200000 and corners of 1/20000 of the largest: some micrometres at the tip."""
+    trimesh.creation.icosphere(subdivisions=6, radius=0.12).export(tmp_path / "ball.stl")  # 81,920 faces
+    box = trimesh.creation.box((0.04, 0.08, 0.2))
+    box.export(tmp_path / "hand.obj")
+    robot = load_robot("irb1200")
+    for link in robot.links[:5]:
+        link.pictures = [Picture("mesh", str(tmp_path / "ball.stl"))]
+    robot.links[5].pictures = [Picture("mesh", str(tmp_path / "hand.obj"))]
+    page = tmp_path / "replay.html"
+    write_replay(page, robot, logs, shown_law="pbvs")
+    assert page.stat().st_size < 5e6
+    log = logs["pbvs"]
+    X_WF = Kinematics(robot).forward(log.link_position[-1]) @ robot.tool.pose().inverse().GetAsMatrix4()
+    expected = (X_WF @ np.c_[box.vertices, np.ones(8)].T)[:3].T
+    with browser() as tab:
+        tab.view(1280, 720)
+        tab.open(page)
+        tab.run("document.dispatchEvent(new KeyboardEvent('keydown', {key: 'End'}))")
+        corners = np.array(tab.run(CORNERS))
+        assert corners.shape == (36, 3)  # of twelve triangles
+        apart = np.linalg.norm(corners[:, None] - expected, axis=-1)
+        assert apart.min(axis=1).max() < 5e-5
+        assert apart.min(axis=0).max() < 5e-5
+        tab.picture(tmp_path / "replay.png")
+        assert not tab.complaints
