@@ -8,6 +8,8 @@ from robots.description.model import load_robot
 from tests.experiments.commands import files, refusal, truetip
 from tests.robots.urdfs import arm, joint, link, published
 
+MESHES = {"shapes/hand.obj": "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n", "shapes/hand.dae": "<COLLADA/>"}
+
 
 @pytest.fixture(autouse=True)
 def _wide_terminal_in_an_empty_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
@@ -36,6 +38,22 @@ def test_held_joints_and_lost_meshes_are_named():
     result = truetip("robots", "import", "arm.urdf")
     assert "taken as fixed at zero: slide" in result.stdout
     assert "1 meshes were not found, for example package://lost/tool.obj" in result.stdout
+
+
+def test_a_folder_with_urdf_meshes_and_robot_file_can_be_moved(tmp_path: Path):
+    shapes = {name: f'<visual><geometry><mesh filename="{name}"/></geometry></visual>' for name in MESHES}
+    more = "".join(link(f"hand{k}", shape=shapes[name]) for k, name in enumerate(MESHES))
+    more += "".join(joint(f"mount{k}", "l6", f"hand{k}", "fixed") for k in range(len(MESHES)))
+    Path("arm/shapes").mkdir(parents=True)
+    for name, text in MESHES.items():
+        Path("arm", name).write_text(text)
+    Path("arm/arm.urdf").write_text(arm(more=more))
+    result = truetip("robots", "import", "arm/arm.urdf", "--write=arm/arm.yaml", "--tip-link=l6")
+    assert result.exit_code == 0, result.output
+    assert "1 meshes are left out, for example: " in result.stdout
+    Path("arm").rename("moved")
+    (picture,) = load_robot("moved/arm.yaml").links[5].pictures
+    assert picture.file == str(tmp_path / "moved/shapes/hand.obj")
 
 
 REFUSED = {
