@@ -135,7 +135,7 @@ def _merged(points: np.ndarray, faces: np.ndarray, cell: float) -> tuple[np.ndar
 def _keys(rows: np.ndarray) -> np.ndarray:
     """A number for each row (n, 3) of whole numbers from zero on, the same only for the same rows."""
     rows = rows.astype(int)
-    return np.ravel_multi_index(tuple(rows.T), tuple(rows.max(axis=0, initial=0) + 1))
+    return np.asarray(np.ravel_multi_index(tuple(rows.T), tuple(rows.max(axis=0, initial=0) + 1)))
 
 
 def _between(start: np.ndarray, end: np.ndarray, radius: float, part: str, kind: str) -> dict[str, Any]:
