@@ -11,7 +11,7 @@ from robots.description.model import NUM_JOINTS, Link, RobotModel
 from robots.description.pictures.mesh_file import MeshError
 from robots.description.pictures.picture import Picture
 
-MOST_FACES = 12000  # of all meshes of a robot: browsers without a graphics card draw no more in time
+MOST_FACES = 12000  # of all meshes of a robot: without a graphics card each one costs a browser time
 _FINEST = 1.0 / 500.0  # of the width of a mesh: cubes within which its points become one
 _COARSER = 1.2  # until it is coarse enough
 _BODIES = NUM_JOINTS + 1
