@@ -138,7 +138,7 @@ def test_a_worker_that_is_killed_loses_nothing(tmp_path):
     study = Study(
         laws=["open_loop"],
         settings=[*settings, "station.elasticity=rigid"],
-        factors={"station.payload": Levels([float(mass) for mass in range(6)])},
+        factors={"station.payload": Levels([float(mass) for mass in range(4)])},
     )
     rows = study_rows(study)
     address = "tcp://127.0.0.1:18786"
@@ -160,9 +160,11 @@ def test_a_worker_that_is_killed_loses_nothing(tmp_path):
 
         found = in_order(cluster, run_row, rows, kill_first)
     assert killed
-    alone = run_row(rows[3], lambda share: None)
-    assert {**found[3], "wall_s": 0.0} == {**alone, "wall_s": 0.0} | {"settling_s": found[3]["settling_s"]}
-    assert [row["failure"] for row in found] == [""] * len(rows)
+    for row, of_cluster in zip(rows, found, strict=True):
+        alone = run_row(row, lambda share: None)
+        assert alone["failure"] == ""
+        # As text: a metric that a run does not have is NaN.
+        assert str({**of_cluster, "wall_s": 0.0}) == str({**alone, "wall_s": 0.0})
 
 
 def test_the_file_that_comes_with_the_documentation_is_a_study():
