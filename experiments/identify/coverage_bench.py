@@ -29,7 +29,7 @@ ROBOT, SPREAD, TIMES = "kr210", 0.2, 0.4  # logarithms of springs and of retarda
 OFF = 2.0  # times
 OFFSET, DRIFT = 0.02, 2e-5  # s and relative, of the clock of the sensors, either way
 WITHIN = 1.96  # standard deviations
-KINDS = {"stiffness_": 0.03, "damping_": 0.25}  # allowed errors
+KINDS = {"stiffness_": 0.03, "damping_": 0.25, "play_": 0.3, "hysteresis_": 0.3}  # allowed errors
 
 
 def drawn(nominal: RobotModel, rng: np.random.Generator) -> RobotModel:
@@ -136,6 +136,8 @@ def report(lines: list[dict]) -> None:
     """Prints what all robots say."""
     for kind, allowed in KINDS.items():
         rows = [row for each in lines for row in each["parameters"] if row["name"].startswith(kind)]
+        if not rows:
+            continue
         known = [row for row in rows if row["identifiable"]]
         inside = [abs(row["error"]) < WITHIN * row["sigma"] for row in rows]
         errors = np.abs([row["error"] for row in known])

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from robots.identification.arm_fit import part_of, scatter
+from robots.identification.arm_fit import part_of, scatter, widest
 
 ROWS, PARTS, DRAWS = 40, 6, 4000
 
@@ -49,3 +49,10 @@ def test_what_is_wrong_alike_within_a_part_counts():
 def test_a_single_part_disagrees_with_none():
     J = np.eye(3)
     assert not scatter([part_of(J, np.ones(3))], np.eye(3)).any()
+
+
+def test_of_several_scatters_each_unknown_has_the_widest_and_they_stay_a_covariance():
+    ways = [M @ M.T for M in np.random.default_rng(4).normal(size=(3, 5, 5))]
+    found = widest(ways)
+    np.testing.assert_allclose(np.diagonal(found), np.max([np.diagonal(way) for way in ways], axis=0))
+    assert np.linalg.eigvalsh(found).min() > 0.0
