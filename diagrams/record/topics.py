@@ -12,7 +12,8 @@ from pydrake.math import RigidTransform, RotationMatrix
 JOINTS, POSE, DESIRED = "/joint_sample", "/pose_sample", "/desired_pose"
 COMMAND, CORRECTION, EVENT = "/command", "/correction", "/guard_event"
 TRUE_POSE, TRUE_LINKS = "/truth/tip_pose", "/truth/link_position"
-MOTION, INERTIAL = "/motion", "/inertial_sample"  # of recordings for `truetip identify`
+# Of recordings for `truetip identify`
+MOTION, INERTIAL, TOLD = "/motion", "/inertial_sample", "/drive_command"
 
 _NUMBER, _TEXT = {"type": "number"}, {"type": "string"}
 _SIX = {"type": "array", "items": _NUMBER, "minItems": 6, "maxItems": 6}
@@ -47,6 +48,7 @@ SCHEMAS: dict[str, dict[str, Any]] = {
     TRUE_POSE: _POSE_IN_FRAME,
     TRUE_LINKS: _record("truetip.LinkPosition", position=_SIX),
     MOTION: _record("truetip.Motion", name=_TEXT),  # begins here
+    TOLD: _record("truetip.DriveCommand", position=_SIX, velocity=_SIX, torque=_SIX),  # side of the links
     # ``stamp``: the sensors' clock, s; x, y, z of each sensor, rad/s or m/s^2
     INERTIAL: _record("truetip.InertialSample", stamp=_NUMBER, readings={"type": "array", "items": _NUMBER}),
 }

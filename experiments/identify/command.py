@@ -26,6 +26,7 @@ from experiments.cli.staging import PAGE, TABLE, YAML, staged_file
 from experiments.cli.workers import Executor
 from experiments.feedforward.command import realistic_robot
 from experiments.identify.cases import MotionCases, default_cases, load_cases
+from experiments.identify.closed_loop.drives import driven_motions
 from experiments.identify.excitation import (
     designed_slow_motion,
     excitation_json,
@@ -49,11 +50,13 @@ from experiments.identify.study import (
     IdentifyStudy,
     identify_json,
     study_recording,
+    with_drives,
     with_rectangle,
 )
 from experiments.report.files import write_text
 from robots.description.model import RobotFileError, RobotModel, load_robot
 from robots.description.robot_file import robot_text
+from systems.cell.drive import DriveConfig
 
 
 def identify_command(
@@ -103,6 +106,13 @@ def identify_command(
     gear_parts: Annotated[
         bool, typer.Option(help="Gears may have play, hysteresis and ripple, or are linear.")
     ] = True,
+    drives: Annotated[
+        bool,
+        typer.Option(
+            "--drives",
+            help="Refine drives, friction and dampers in closed loop; needs commands and torques.",
+        ),
+    ] = False,
     rectangle: Annotated[
         bool, typer.Option(help="Drive a rectangle with the identified inverse model; needs --plant.")
     ] = True,
@@ -178,9 +188,15 @@ def identify_command(
             recorded = _simulated(model, truth, motions, seed, where)
             if table:
                 write_recording(table, recorded)
+        if drives:
+            driven_motions(recorded)  # refuses before the identification takes its time
         of_slow = identify_slow_recording(slow, model) if slow else None
         with progress_bar(f"identification from {count(len(recorded.cases), 'motion')}") as progress:
             study = study_recording(model, truth, recorded, gear_parts, of_slow, progress)
+        if drives:
+            of_plant = None if recording is not None else DriveConfig()
+            with progress_bar("drives in closed loop") as progress:
+                study = with_drives(study, recorded, DriveConfig(), of_plant, progress)
         if rectangle and truth is not None:
             with progress_bar("rectangle") as progress:
                 study = with_rectangle(study, where, progress)

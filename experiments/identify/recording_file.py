@@ -64,6 +64,10 @@ def read_recording(path: Path, columns: Path | None = None, needs_sensors: bool 
     theta = plan.angle_factor * table.numbers(plan.position)
     rate = plan.angle_factor * table.numbers(plan.speed) if plan.speed else None
     torque = table.numbers(plan.torque) if plan.torque else None
+    commands = None
+    if plan.command:
+        units = np.array([plan.angle_factor, plan.angle_factor, 1.0])[:, None]
+        commands = units * table.numbers(plan.command).reshape(-1, 3, NUM_JOINTS)
     readings = np.zeros((len(time), len(plan.sensors), 3))
     for i, sensor in enumerate(plan.sensors):
         readings[:, i] = sensor.factor * table.numbers(sensor.columns)
@@ -75,11 +79,12 @@ def read_recording(path: Path, columns: Path | None = None, needs_sensors: bool 
             rate[rows] if rate is not None else CubicSpline(time[rows], theta[rows]).derivative()(time[rows])
         )
         torques = torque[rows] if torque is not None else np.zeros((0, NUM_JOINTS))
+        told = commands[rows] if commands is not None else None
         cases.append(
-            RecordedCase(name, time[rows], theta[rows], speed, torques, stamps[rows], readings[rows])
+            RecordedCase(name, time[rows], theta[rows], speed, torques, stamps[rows], readings[rows], told)
         )
     check_periods(path, cases)
-    return Recording(plan.payload, cases, places(plan))
+    return Recording(plan.payload, cases, places(plan), plan.command_period)
 
 
 def write_recording(path: Path, recording: Recording) -> None:
@@ -92,14 +97,16 @@ def write_recording(path: Path, recording: Recording) -> None:
         write_mcap(path, recording)
         return
     has_torque = all(len(case.torque) for case in recording.cases)
-    plan = map_of(recording, has_torque)
-    head = [plan.time, plan.stamp, *plan.position, *plan.speed, *plan.torque]
+    has_command = all(case.commands is not None for case in recording.cases)
+    plan = map_of(recording, has_torque, has_command)
+    head = [plan.time, plan.stamp, *plan.position, *plan.speed, *plan.torque, *plan.command]
     head += [column for sensor in plan.sensors for column in sensor.columns]
     names, blocks = [], []
     for case in recording.cases:
         n = min(len(case.time), len(case.stamps))
         parts = [case.time[:n, None], case.stamps[:n, None], case.theta[:n], case.rate[:n]]
         parts += [case.torque[:n]] if has_torque else []
+        parts += [case.commands[:n].reshape(n, -1)] if case.commands is not None and has_command else []
         blocks.append(np.hstack([*parts, case.readings[:n].reshape(n, -1)]))
         names += n * [case.name]
     rows = np.concatenate(blocks)

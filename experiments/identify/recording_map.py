@@ -15,6 +15,7 @@ from robots.pose import rotation_from_zyx, zyx_from_rotation
 
 _UNEVEN = 0.01  # of the period, by which samples of the robot may be off an even grid
 _LEAST = 50  # samples of a case
+_COMMANDS = ("position", "speed", "torque")
 
 
 @dataclass
@@ -44,6 +45,9 @@ class RecordingMap:
     position: list[str] = field(default_factory=list)  # six columns, motors on the side of the links
     speed: list[str] = field(default_factory=list)  # six columns; empty: differentiated
     torque: list[str] = field(default_factory=list)  # six columns, N m on the side of the links; may be empty
+    # What the drives were told last: 18 columns, six positions, six speeds, six torques (N m); may be empty
+    command: list[str] = field(default_factory=list)
+    command_period: float = positive(4e-3, "s")  # from one command to the next; the first row has a new one
     sensors: list[RecordedSensor] = field(default_factory=list)
 
 
@@ -54,9 +58,10 @@ class Recording:
     payload: float | None  # kg
     cases: list[RecordedCase]
     sensors: list[SensorPlace]
+    command_period: float = 4e-3  # s
 
 
-def map_of(recording: Recording, has_torque: bool) -> RecordingMap:
+def map_of(recording: Recording, has_torque: bool, has_command: bool) -> RecordingMap:
     """The map of a table of a recording, with names for all columns."""
     joints = range(1, NUM_JOINTS + 1)
     return RecordingMap(
@@ -65,6 +70,8 @@ def map_of(recording: Recording, has_torque: bool) -> RecordingMap:
         position=[f"position_{i}" for i in joints],
         speed=[f"speed_{i}" for i in joints],
         torque=[f"torque_{i}" for i in joints] if has_torque else [],
+        command=[f"command_{kind}_{i}" for kind in _COMMANDS for i in joints] if has_command else [],
+        command_period=recording.command_period,
         sensors=[
             RecordedSensor(
                 place.name,
@@ -107,10 +114,11 @@ def check_map(plan: RecordingMap, node: Node, needs_sensors: bool) -> None:
         ("position", (NUM_JOINTS,)),
         ("speed", (0, NUM_JOINTS)),
         ("torque", (0, NUM_JOINTS)),
+        ("command", (0, len(_COMMANDS) * NUM_JOINTS)),
     ):
         columns = getattr(plan, name)
         if len(columns) not in wanted:
-            raise node.at([name]).refuse(f"{name} must be {NUM_JOINTS} columns, got {len(columns)}")
+            raise node.at([name]).refuse(f"{name} must be {wanted[-1]} columns, got {len(columns)}")
     if not plan.sensors and needs_sensors:
         raise node.refuse("sensors: needs one or more, each with name, kind, body and three columns")
     for i, sensor in enumerate(plan.sensors):

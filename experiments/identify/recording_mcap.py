@@ -2,7 +2,7 @@
 
 A run has ``/joint_sample``: positions and torques of its motors. A recording of several motions has
 ``/motion`` where each of them begins, and ``/inertial_sample`` with what the sensors showed; where these sit
-stands in its metadata, as in the map of a table.
+stands in its metadata, as in the map of a table. ``/drive_command`` has what the drives were told.
 """
 
 from pathlib import Path
@@ -13,7 +13,7 @@ from scipy.interpolate import CubicSpline
 
 from diagrams.record.read_record import Contents, Topic, read_record
 from diagrams.record.run_record import RunRecord
-from diagrams.record.topics import INERTIAL, JOINTS, MOTION
+from diagrams.record.topics import INERTIAL, JOINTS, MOTION, TOLD
 from experiments.identify.recording_map import (
     Recording,
     RecordingMap,
@@ -30,6 +30,7 @@ from robots.identification.recording import RecordedCase, RecordingError
 MCAP = ".mcap"
 _PAUSE = 1.0  # s, between motions in the file
 _SENSORS = "sensors"  # of the metadata
+_TOLD: tuple[str, ...] = ("position", "velocity", "torque")
 _WITHIN = 1e-6  # s, to which stamps are sure
 
 
@@ -71,9 +72,10 @@ def read_mcap(path: Path, needs_sensors: bool = True) -> Recording:
         stamps, readings = _readings(shown, begin, end, len(plan.sensors), time)
         rate = CubicSpline(time, theta).derivative()(time)
         known = torque if np.isfinite(torque).all() else np.zeros((0, NUM_JOINTS))
-        cases.append(RecordedCase(name, time, theta, rate, known, stamps, readings))
+        told = _told(contents.topics.get(TOLD), joints.time[inside], begin)
+        cases.append(RecordedCase(name, time, theta, rate, known, stamps, readings, told))
     check_periods(path, cases)
-    return Recording(plan.payload, cases, places(plan))
+    return Recording(plan.payload, cases, places(plan), plan.command_period)
 
 
 def write_mcap(path: Path, recording: Recording) -> None:
@@ -91,11 +93,20 @@ def write_mcap(path: Path, recording: Recording) -> None:
             torque = case.torque[n] if len(case.torque) else unknown
             message = {"stamp": time, "position": theta.tolist(), "effort": _numbers(torque)}
             record.write(JOINTS, begin + time - case.time[0], message)
+        before = None
+        for time, told in zip(
+            case.time.tolist(), () if case.commands is None else case.commands, strict=False
+        ):
+            if before is None or (told != before).any():
+                message = dict(zip(_TOLD, told.tolist(), strict=True))
+                record.write(TOLD, begin + time - case.time[0], message)
+            before = told
         for stamp, shown in zip(case.stamps.tolist(), case.readings, strict=True):
             at = begin + stamp - case.stamps[0]
             record.write(INERTIAL, at, {"stamp": stamp, "readings": shown.ravel().tolist()})
         begin += max(np.ptp(case.time), np.ptp(case.stamps)) + _PAUSE
-    record.close(**{_SENSORS: str(yaml_dump_typed(map_of(recording, has_torque=True)))})
+    plan = map_of(recording, has_torque=True, has_command=False)
+    record.close(**{_SENSORS: str(yaml_dump_typed(plan))})
     if record.problem:
         raise OSError(record.problem)
 
@@ -126,6 +137,16 @@ def _readings(
         return time, np.zeros((len(time), 0, 3))
     inside = _between(shown.time, begin, end)
     return shown.columns["stamp"][inside, 0], shown.columns["readings"][inside].reshape(-1, sensors, 3)
+
+
+def _told(told: Topic | None, times: np.ndarray, begin: float) -> np.ndarray | None:
+    """What the drives were told last at times of a motion that begins at some time in s, (n, 3, 6)."""
+    if told is None:
+        return None
+    last = np.searchsorted(told.time, times + _WITHIN, side="right") - 1
+    if last[0] < 0 or told.time[last[0]] < begin - _WITHIN:
+        return None
+    return np.stack([told.columns[name][last] for name in _TOLD], axis=1)
 
 
 def _numbers(values: np.ndarray) -> list[float | None]:

@@ -1,7 +1,7 @@
 """Recordings of a simulated robot: the full nonlinear plant with drives and all parts of drive trains."""
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from pydrake.systems.analysis import Simulator
@@ -18,11 +18,13 @@ from experiments.identify.recording_map import Recording
 from robots.description.model import NUM_JOINTS, RobotModel
 from robots.identification.motion import SensorPlace
 from robots.identification.recording import RecordedCase
+from systems.cell.drive import DriveConfig
 from systems.cell.inertial_sensors import InertialLoggerConfig
 from systems.feedforward import FeedforwardConfig
 
 _STEP = 1e-3  # s, of the integrator and of the robot's log
 _ACCURACY = 2e-3  # relative, of one step
+_WITHIN = 1e-6  # of a tick
 
 
 @dataclass(frozen=True)
@@ -34,6 +36,7 @@ class CaseRun:
     logger: InertialLoggerConfig
     ringing: float  # s
     seed: int
+    drive: DriveConfig = field(default_factory=DriveConfig)  # of the robot that moves
 
     def run(self, progress: Progress | None = None) -> RecordedCase:
         """Simulates it.
@@ -42,7 +45,7 @@ class CaseRun:
             SimulationError: if the integration breaks off.
         """
         trial = self.trial
-        config = StationConfig(elasticity="structure", payload=trial.payload)
+        config = StationConfig(elasticity="structure", payload=trial.payload, drive=self.drive)
         period, ahead = config.period, config.drive.command_delay + config.drive.dead_time
         end = trial.settle + trial.profile.duration + self.ringing
         told = commands(trial, np.arange(0.0, end, period) + ahead, period)
@@ -81,6 +84,7 @@ class CaseRun:
         samples = samples[1:]
         if progress:
             progress(1.0)
+        issued = np.minimum(np.floor(time / period + _WITHIN), len(told) - 1).astype(int)
         return RecordedCase(
             self.name,
             time,
@@ -89,6 +93,7 @@ class CaseRun:
             torque,
             samples[:, 0],
             samples[:, 1:].reshape(len(samples), -1, 3),
+            told[issued],
         )
 
 

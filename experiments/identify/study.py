@@ -9,6 +9,8 @@ import numpy as np
 
 from experiments.cli.workers import Executor, Progress, SimulationError, in_order
 from experiments.feedforward.rectangle import RectangleTrial
+from experiments.identify.closed_loop.drives import RefinedDrives, refined_drives
+from experiments.identify.closed_loop.fit import GAINS
 from experiments.identify.recording_map import Recording
 from experiments.identify.slow import slow_json, with_slow_motion
 from robots.description.model import RobotModel
@@ -17,6 +19,7 @@ from robots.identification.identified_robot import FoundParameter, found_paramet
 from robots.identification.motion import SensorPlace
 from robots.identification.recording import RecordedCase, RecordingError
 from robots.identification.slow_motion import SlowIdentification
+from systems.cell.drive import DriveConfig
 from systems.feedforward import FeedforwardConfig
 
 _STIFFNESS, _DAMPING = "stiffness_", "damping_"
@@ -35,6 +38,7 @@ class IdentifyStudy:
     seconds: float  # from the recording to the parameters
     slow: SlowIdentification | None  # of slow motions, where there were some
     rectangle_ratio: dict[str, float] | None  # deviation with `elastic_structure` over that with `rigid`
+    drives: RefinedDrives | None = None  # of closed loop
 
     def errors(self, kind: str) -> np.ndarray:
         """Relative errors of identifiable parameters of a kind, ``"stiffness_"`` or ``"damping_"``."""
@@ -116,6 +120,19 @@ def study_recording(
     return study_identification(robot, plant, payload, cases, sensors, gear_parts, progress, slow)
 
 
+def with_drives(
+    study: IdentifyStudy,
+    recording: Recording,
+    believed: DriveConfig,
+    true: DriveConfig | None,
+    progress: Callable[[float], None] | None = None,
+) -> IdentifyStudy:
+    """The study with drives, friction and dampers refined in closed loop; see `refined_drives`."""
+    fit = study.found.fit
+    drives = refined_drives(study.robot, study.plant, study.payload, fit, recording, believed, true, progress)
+    return replace(study, drives=drives, parameters=drives.parameters, identified=drives.identified)
+
+
 def with_rectangle(
     study: IdentifyStudy, executor: Executor, progress: Callable[[float], None]
 ) -> IdentifyStudy:
@@ -169,6 +186,10 @@ def identify_json(study: IdentifyStudy) -> dict[str, Any]:
             errors = np.abs(study.errors(kind))
             numbers[f"worst_{label}_error"] = float(errors.max()) if len(errors) else None
             numbers[f"median_{label}_error"] = float(np.median(errors)) if len(errors) else None
+    if study.drives is not None:
+        drive = study.drives.drive
+        gains = {f"{name}_1_s": getattr(drive.cascade, name) for name in GAINS}
+        numbers["drive"] = gains | {"command_delay_s": drive.command_delay}
     if study.slow is not None:
         numbers["slow_motion"] = slow_json(study.slow)
     if study.rectangle_ratio is not None:

@@ -158,7 +158,8 @@ class ElasticArm:
         acceleration = case.acceleration
         for row, k in enumerate(at_base):
             q, v, vdot = self._joints(case.theta[k], case.rate[k], acceleration[k], moved[k, 0])
-            v[self.sprung], vdot[self.sprung] = moved[k, 1:]
+            v[self.sprung] += moved[k, 1]
+            vdot[self.sprung] += moved[k, 2]
             torques[row], shown[row] = self.evaluate(q, v, vdot)
         yielded[:, 0] -= rest
         terms = (motion.stiffness, motion.coriolis, motion.mass)
@@ -181,7 +182,7 @@ class ElasticArm:
     ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         q, v, vdot = np.zeros((3, self.size))
         q[self.motors], v[self.motors], vdot[self.motors] = theta, rate, acceleration
-        q[self.sprung] = x_0
+        q[self.sprung] += x_0  # of a motor: beyond where it was measured
         return q, v, vdot
 
     def _linearised(
@@ -189,7 +190,8 @@ class ElasticArm:
     ) -> tuple[np.ndarray, ...]:
         """Mass, Coriolis, stiffness, rest and the derivatives of the readings at an instant."""
         still = np.zeros(len(self.sprung))
-        x_0 = -self._at(theta, 0.0 * rate, 0.0 * rate, still)[0] / self._springs
+        torques, _ = self._at(theta, 0.0 * rate, 0.0 * rate, still)
+        x_0 = np.divide(-torques, self._springs, out=still, where=self._springs > 0.0)
         q, v, vdot = self._joints(theta, rate, acceleration, x_0)
         torques, shown = self.evaluate(q, v, vdot)
         n = len(self.sprung)

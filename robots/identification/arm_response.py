@@ -82,7 +82,8 @@ class ArmResponse:
         self._low_pass = np.stack([corner / (1.0 + corner), (1.0 - corner) / (1.0 + corner)])
         turns = RIPPLES_PER_TURN * gear_ratio
         shares = np.zeros((len(cases), NUM_JOINTS)) if rests is None else rests
-        self._cases = [_Case(m, c, turns, grid, s) for m, c, s in zip(motions, cases, shares, strict=True)]
+        each = zip(motions, cases, shares, strict=True)
+        self._cases = [CaseOnGrid(motion, case, turns, grid, share) for motion, case, share in each]
         self._base = [_filtered(m.readings, self._low_pass, grid) for m in motions]
         self._columns = _columns(parameters)
 
@@ -95,7 +96,7 @@ class ArmResponse:
         """Which gears carry nothing before a case begins, (cases, 6) bool."""
         numbers = self._parameters.numbers(p)
         springs = np.stack([numbers.stiffness, numbers.stiffness * numbers.time])
-        gears = _gears(numbers)
+        gears = gears_of(numbers)
         return np.array([case.at_rest(springs, gears, numbers.ripple)[1] == 0.0 for case in self._cases])
 
     def __call__(self, p: np.ndarray, sensitivity: bool = True) -> Response:
@@ -104,7 +105,7 @@ class ArmResponse:
 
         numbers = self._parameters.numbers(p)
         springs = np.stack([numbers.stiffness, numbers.stiffness * numbers.time])
-        gears = _gears(numbers)
+        gears = gears_of(numbers)
         n = len(self._parameters) if sensitivity else 0
         size = len(self.kept), len(self._cases), self._low_pass.shape[1]
         readings, derived = np.empty(size), np.zeros((*size, n))
@@ -134,7 +135,7 @@ class ArmResponse:
         return Response(readings, derived if sensitivity else None, moved)
 
 
-class _Case:
+class CaseOnGrid:
     """One case on the grid of the integration: what does not depend on the unknowns."""
 
     def __init__(
@@ -178,7 +179,7 @@ class _Case:
         x, sign, side = np.zeros_like(load), np.zeros(NUM_JOINTS), self.rest
         for _ in range(6):
             carried = -load - K @ (x - rest)
-            x = carried / springs[0]
+            x = np.divide(carried, springs[0], out=np.zeros_like(x), where=springs[0] > 0.0)
             sign = np.where(np.abs(x[_G]) < _UNLOADED, 0.0, np.sign(x[_G]))
             side = np.where(sign == 0.0, self.rest, sign)
             x[_G] = carried[_G] / gears[:, 0] + side * gears[:, 2] + offset
@@ -227,7 +228,7 @@ def _columns(parameters: ElasticParameters) -> tuple[np.ndarray, np.ndarray, int
     return of_joint, of_gear, *others
 
 
-def _gears(numbers: ArmNumbers) -> np.ndarray:
+def gears_of(numbers: ArmNumbers) -> np.ndarray:
     """Of six gears what `response_kernels.gear_step` takes, (6, 6)."""
     spring = numbers.stiffness[_G]
     damper = spring * numbers.time[_G]

@@ -30,6 +30,8 @@ class RecordedCase:
     torque: np.ndarray  # (n, 6) N m on the side of the links, or (0, 6) where it is not known
     stamps: np.ndarray  # (m,) s, by the logger's clock
     readings: np.ndarray  # (m, sensors, 3) rad/s or m/s^2
+    # (n, 3, 6) rad, rad/s, N m: what the drives were told last; None where it is not known
+    commands: np.ndarray | None = None
 
     @property
     def period(self) -> float:

@@ -91,6 +91,29 @@ def _solve_gears(gears, before, z, predicted, offset, free, S, stiff, a, h, foun
 
 
 @compiled
+def accelerate(a, free, S, gears, turn, z, ripple, springs, x_p, v_p, h, found):
+    """Puts accelerations into `a` (e,), whose first six were those before, and what gears carry into `found`.
+
+    Args:
+        free: accelerations in rad/s^2 were the gears linear, (e,).
+        S: what torques accelerate, (e, e).
+        gears, turn, z, ripple, found: of the gears, see `_solve_gears`.
+        springs: springs and dampers, linear, (2, e).
+        x_p, v_p: deflections and their rates at the end of the step without these accelerations, (e,).
+        h: step in s.
+    """
+    predicted, of_gears = np.empty((2, _GEARS)), a[:_GEARS].copy()
+    predicted[0], predicted[1] = x_p[:_GEARS], v_p[:_GEARS]
+    _solve_gears(gears, turn, z, predicted, ripple, free[:_GEARS], S, springs, of_gears, h, found)
+    a[:] = free
+    for j in range(_GEARS):
+        x_j, v_j = x_p[j] + BETA * h * h * of_gears[j], v_p[j] + GAMMA * h * of_gears[j]
+        extra = found[j, 0] - springs[0, j] * x_j - springs[1, j] * v_j
+        for i in range(len(a)):
+            a[i] -= S[i, j] * extra
+
+
+@compiled
 def _subtract_explicit(rhs, gears, found, carried, columns, by, z, state):
     """Takes d(springs, dampers) / d(unknowns), with the motion as it is, from `rhs` (e, n).
 
@@ -128,7 +151,7 @@ def _subtract_explicit(rhs, gears, found, carried, columns, by, z, state):
 
 
 @compiled
-def _between(values, knot, share, out):
+def between(values, knot, share, out):
     """Between a knot and the next one, (k, rows, columns) into (rows, columns)."""
     for i in range(out.shape[0]):
         for j in range(out.shape[1]):
@@ -242,7 +265,7 @@ def go_through(steps, posture, course, springs, gears, columns, start, low_pass,
     S, motion_now, rest_now = np.empty((e, e)), np.empty((e, 2 * e)), np.empty((1, e))
     channels = shown.shape[1]
     levers_now = np.empty((channels, 3 * e))
-    found, carried, predicted = np.zeros((_GEARS, 10)), np.empty((2, e)), np.empty((2, _GEARS))
+    found, carried = np.zeros((_GEARS, 10)), np.empty((2, e))
     reading, last = np.empty((channels, 1)), np.empty((channels, 1))
     derivative, last_derivative = np.empty((channels, n)), np.empty((channels, n))
     place = np.empty(2 * e)
@@ -251,30 +274,20 @@ def go_through(steps, posture, course, springs, gears, columns, start, low_pass,
         while knot < len(at) - 2 and step >= at[knot + 1]:
             knot += 1
         share = min((step - at[knot]) / (at[knot + 1] - at[knot]), 1.0)
-        _between(rest, knot, share, rest_now)
+        between(rest, knot, share, rest_now)
         if step:
             while last_close < len(close) - 2 and step >= close[last_close + 1]:
                 last_close += 1
             gone = min((step - close[last_close]) / (close[last_close + 1] - close[last_close]), 1.0)
-            _between(inverse, last_close, gone, S)
-            _between(motion, knot, share, motion_now)
+            between(inverse, last_close, gone, S)
+            between(motion, knot, share, motion_now)
             for j in range(e):
                 place[j] = x[j] + h * v[j] + (0.5 - BETA) * h * h * a[j]
                 place[e + j] = v[j] + (1.0 - GAMMA) * h * a[j]
             x_p, v_p = place[:e].copy(), place[e:].copy()
             place[:e] -= rest_now[0]
             free = np.dot(S, -load[step] - springs[0] * x_p - springs[1] * v_p - np.dot(motion_now, place))
-            predicted[0], predicted[1] = x_p[:_GEARS], v_p[:_GEARS]
-            of_gears = a[:_GEARS].copy()
-            _solve_gears(
-                gears, turn, z, predicted, ripple[step], free[:_GEARS], S, springs, of_gears, h, found
-            )
-            a[:] = free
-            for j in range(_GEARS):
-                x_j, v_j = x_p[j] + BETA * h * h * of_gears[j], v_p[j] + GAMMA * h * of_gears[j]
-                extra = found[j, 0] - springs[0, j] * x_j - springs[1, j] * v_j
-                for i in range(e):
-                    a[i] -= S[i, j] * extra
+            accelerate(a, free, S, gears, turn, z, ripple[step], springs, x_p, v_p, h, found)
             for j in range(e):
                 x[j], v[j] = x_p[j] + BETA * h * h * a[j], v_p[j] + GAMMA * h * a[j]
                 carried[0, j], carried[1, j] = springs[0, j] * x[j], springs[1, j] * v[j]
@@ -289,7 +302,7 @@ def go_through(steps, posture, course, springs, gears, columns, start, low_pass,
             now_at[:e], now_at[e : 2 * e], now_at[2 * e :] = x, v, a
         if step % every:
             continue
-        _between(levers, knot, share, levers_now)
+        between(levers, knot, share, levers_now)
         yielded = np.concatenate((x - rest_now[0], v, a))
         now = np.dot(levers_now, yielded).reshape(channels, 1)
         now_derived = np.dot(levers_now, Y)

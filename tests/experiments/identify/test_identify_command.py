@@ -1,6 +1,7 @@
 """truetip identify: springs of a robot that moved are found, wrong input is one line."""
 
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -48,7 +49,8 @@ def resting(folder: Path) -> Path:
     time = 1e-3 * np.arange(ROWS)
     theta = np.tile(np.deg2rad([0.0, -60.0, 40.0, 0.0, 30.0, 0.0]), (ROWS, 1))
     shown = GYRO.sigma * np.random.default_rng(2).normal(size=(ROWS, 1, 3))
-    case = RecordedCase("rest", time, theta, 0.0 * theta, 0.0 * theta, time, shown)
+    told = np.stack([theta, 0.0 * theta, 0.0 * theta], axis=1)
+    case = RecordedCase("rest", time, theta, 0.0 * theta, 0.0 * theta, time, shown, told)
     path = folder / "rest.csv"
     write_recording(path, Recording(100.0, [case], [GYRO]))
     return path
@@ -61,6 +63,10 @@ def test_a_recording_is_read_as_it_was_written(tmp_path: Path, suffix: str):
     found = read_recording(path)
     assert (found.payload, [case.name for case in found.cases]) == (100.0, ["rest"])
     assert found.cases[0].readings.shape == (ROWS, 1, 3)
+    commands = found.cases[0].commands
+    assert commands is not None
+    np.testing.assert_allclose(commands[:, 0], found.cases[0].theta, atol=1e-9)
+    assert commands.shape == (ROWS, 3, 6)
     assert found.cases[0].period == pytest.approx(1e-3)
     np.testing.assert_allclose(found.sensors[0].position, GYRO.position)
     assert (found.sensors[0].kind, found.sensors[0].sigma) == ("gyro", 2e-3)
@@ -74,16 +80,29 @@ def test_motions_in_one_mcap_file_keep_their_own_times_and_clocks(tmp_path: Path
     for name in ("up", "down"):
         theta = np.outer(np.sin(3.0 * time), rng.normal(size=6))
         rate = np.outer(3.0 * np.cos(3.0 * time), theta[1] / np.sin(3.0 * time[1]))
-        cases.append(RecordedCase(name, time, theta, rate, 10.0 * rate, stamps, rng.normal(size=(150, 1, 3))))
-    write_recording(path, Recording(None, cases, [GYRO]))
+        told = rng.normal(size=(200, 3, 6)).repeat(2, axis=0)[:200]
+        shown = rng.normal(size=(150, 1, 3))
+        cases.append(RecordedCase(name, time, theta, rate, 10.0 * rate, stamps, shown, told))
+    write_recording(path, Recording(None, cases, [GYRO], 8e-3))
     for found, written in zip(read_recording(path).cases, cases, strict=True):
         assert found.name == written.name
         np.testing.assert_allclose(found.time, written.time)
         np.testing.assert_allclose(found.stamps, written.stamps)
         np.testing.assert_allclose(found.torque, written.torque)
         np.testing.assert_allclose(found.readings, written.readings)
+        assert found.commands is not None
+        assert written.commands is not None
+        np.testing.assert_allclose(found.commands, written.commands)
         # Velocities are not in the file; a spline through the positions has them but for its ends.
         np.testing.assert_allclose(found.rate[5:-5], written.rate[5:-5], atol=1e-5)
+
+
+def test_drives_without_commands_are_refused_before_anything_is_identified(tmp_path: Path):
+    recording = read_recording(resting(tmp_path))
+    silent = [replace(case, commands=None) for case in recording.cases]
+    write_recording(tmp_path / "silent.csv", replace(recording, cases=silent))
+    message = refusal(run(tmp_path, f"--recording={tmp_path / 'silent.csv'}", "--drives"))
+    assert "case rest has no commands" in message
 
 
 def run_record(path: Path, time: np.ndarray, theta: np.ndarray, torque: np.ndarray) -> Path:
