@@ -23,6 +23,8 @@ from robots.description.model import NUM_JOINTS, RobotModel
 from systems.controller_model import ControllerModel
 from systems.feedforward import FEEDFORWARDS
 from systems.feedforward.feedforward import Feedforward
+from systems.feedforward.predictive.config import PredictiveConfig
+from systems.feedforward.predictive.correction import PredictiveCorrection
 from systems.guard.guard import CommandGuard, GuardConfig
 from systems.reference.reference import Reference
 from systems.servo import LAWS, LawConfig
@@ -124,6 +126,9 @@ class Servo(Diagram):
             ahead = builder.AddNamedSystem("feedforward", self._feedforward(scenario))
             builder.ConnectInput(joints, ahead.GetInputPort("joint_sample"))
             self._add_feedforward(builder, ahead, commands)
+        if feedforward.predictive.kind != "none":
+            correction = self._add_predictive_correction(builder, feedforward.predictive, commands)
+            builder.ConnectInput(joints, correction.GetInputPort("joint_sample"))
         if self.obeys_controller:
             builder.ExportInput(
                 self.reference.GetInputPort("speed_share_controller"), "speed_share_controller"
@@ -244,6 +249,25 @@ class Servo(Diagram):
             )
             said["correction"] = nothing.get_output_port()
         return said
+
+    def _add_predictive_correction(
+        self, builder: DiagramBuilder, config: PredictiveConfig, commands: dict[str, OutputPort]
+    ) -> PredictiveCorrection:
+        """Puts a correction on top of the torques. Raises ScenarioError where the drives take none."""
+        if self.drive != "cascade" or "torque_feedforward" not in commands:
+            raise ScenarioError(
+                f"servo.feedforward.predictive.kind={config.kind} corrects the torques that a feedforward tells "
+                "cascades: choose servo.feedforward.kind and the law's drive=cascade"
+            )
+        correction = builder.AddNamedSystem("predictive_correction", PredictiveCorrection(self.model, config))
+        builder.Connect(self.reference.GetOutputPort("reference"), correction.GetInputPort("reference"))
+        for name in ("position_command", "velocity_command"):
+            builder.Connect(self.guard.GetOutputPort(name), correction.GetInputPort(name))
+        total = builder.AddNamedSystem("corrected_torque", Adder(2, NUM_JOINTS))
+        builder.Connect(commands["torque_feedforward"], total.get_input_port(0))
+        builder.Connect(correction.GetOutputPort("torque"), total.get_input_port(1))
+        commands["torque_feedforward"] = total.get_output_port()
+        return correction
 
     def _add_feedforward(
         self, builder: DiagramBuilder, ahead: System, commands: dict[str, OutputPort]

@@ -3,6 +3,7 @@
 from dataclasses import dataclass, field
 
 from robots.configuration.quantity import choice, quantity
+from systems.feedforward.predictive.config import PredictiveConfig
 from systems.feedforward.prefilter import PrefilterConfig
 
 
@@ -30,3 +31,4 @@ class FeedforwardConfig:
     rough_path: str = choice("refuse", ("refuse", "accept"))
     correction: CorrectionConfig = field(default_factory=CorrectionConfig)
     prefilter: PrefilterConfig = field(default_factory=PrefilterConfig)
+    predictive: PredictiveConfig = field(default_factory=PredictiveConfig)

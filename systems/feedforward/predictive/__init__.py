@@ -1,0 +1,1 @@
+"""What friction leaves of a motion, corrected ahead of time from the motors' encoders alone."""
