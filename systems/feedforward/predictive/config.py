@@ -11,8 +11,9 @@ class PredictiveConfig:
 
     kind: str = choice("none", ("none", "motors"))  # motors: by torques on top of the feedforward's
     horizon: float = quantity(0.064, 0.008, 0.5, "s")  # that is looked ahead, beyond the delay of commands
-    # How much a change of the torque from tick to tick costs against an error of the motors: lambda_u of (5.12)
-    smoothness: float = quantity(1e-3, 1e-5, 1.0, "s^2", is_open=True)
+    # How much a change of the torque from tick to tick costs against an error of the motors: lambda_u of (5.12);
+    # empty: 1.3 / w^2, with the lowest angular frequency w of the stretched arm, which then is hardly excited
+    smoothness: float | None = quantity(None, 1e-5, 1.0, "s^2")
     # Of the correction, as a share of the Coulomb friction that is believed
     limit: float = quantity(2.0, 0.0, 10.0)
     # Of the cascades in the drives: speed per position error, torque per speed error and inertia, integral

@@ -6,6 +6,7 @@ from pydrake.multibody.plant import MultibodyPlant
 from pydrake.systems.framework import Context, DiscreteValues, LeafSystem
 
 from robots.description.model import NUM_JOINTS
+from robots.dynamics.modes import ModalAnalysis, stretched
 from robots.dynamics.plant import add_robot
 from robots.kinematics.forward import Kinematics, robust_solve
 from systems.controller_model import ControllerModel
@@ -16,6 +17,7 @@ from systems.reference.reference import PathAhead
 from systems.samples import JointSample
 
 _FADING = 0.8  # of the correction, at every tick without a sample to go by: half of it is gone after three
+_SLOWER = 1.3  # of 1 / w^2: a correction that is as quick as the arm makes it ring
 _FOLLOWS = 0.01  # rad: a motor farther from its command is not held back by friction
 _OWN = 3 * NUM_JOINTS  # what the integral gives, error and its rate at the last tick
 
@@ -59,7 +61,8 @@ class PredictiveCorrection(LeafSystem):
         cascade = Cascade(stiffness, config.velocity, config.velocity * config.position * config.integral)
         ticks = self.delay + max(2, round(config.horizon / period))
         self._cascade = cascade
-        self._program = CorrectionProgram(cascade, config.smoothness, period, ticks)
+        smoothness = config.smoothness or _smoothness(model)
+        self._program = CorrectionProgram(cascade, smoothness, period, ticks)
         self._plant = MultibodyPlant(0.0)
         add_robot(self._plant, robot, "rigid", model.payload)
         self._plant.Finalize()
@@ -94,14 +97,9 @@ class PredictiveCorrection(LeafSystem):
         told = np.concatenate([command[None], told[:-1]])
         due = self._due(told)
         error = due - np.stack([sample.position, sample.velocity])
-        is_usable = (
-            sample.running
-            and abs(time - sample.time) < 0.5 * self._period
-            and bool(np.all(np.abs(error[0]) < _FOLLOWS))  # not so if there was no command
-        )
         correction = None
         own = context.get_discrete_state(self._own).value().copy()
-        if is_usable:
+        if self._is_usable(time, sample, error[0]):
             speed = self._planned_speed(self._reference.Eval(context), time, told[0, 0])
             inertia = self._inertia(sample.position)
             own, parts = self._observed(context, error, speed[0], sent[-1], inertia)
@@ -121,6 +119,11 @@ class PredictiveCorrection(LeafSystem):
         discrete_state.set_value(int(self._sent), np.concatenate([correction, sent[:-1].ravel()]))
         discrete_state.set_value(int(self._commands), told.ravel())
         discrete_state.set_value(int(self._own), own)
+
+    def _is_usable(self, time: float, sample: JointSample, error: np.ndarray) -> bool:
+        """Whether a sample at a time in s tells what friction does; errors in rad, NaN without a command."""
+        is_of_now = sample.running and abs(time - sample.time) < 0.5 * self._period
+        return is_of_now and bool(np.all(np.abs(error) < _FOLLOWS))
 
     def _due(self, told: np.ndarray) -> np.ndarray:
         """Position and velocity at which the motors should be now, (2, 6): between the commands that were."""
@@ -177,3 +180,10 @@ class PredictiveCorrection(LeafSystem):
         moved = inertia * (error[1] - last[1]) / T + (c.derivative + self._observer.slope(speed)) * rate
         needed = moved + c.proportional * e + 0.5 * (integral + grown) + acted
         return np.concatenate([grown, *error]), self._observer.updated(parts, needed, speed)
+
+
+def _smoothness(model: ControllerModel) -> float:
+    """lambda_u in s^2 for an arm with this load."""
+    elasticity = "joints" if model.elasticity == "rigid" else model.elasticity
+    modes = ModalAnalysis(model.robot, elasticity, model.payload).at(stretched(model.robot))
+    return _SLOWER / float(modes.angular_frequency[0]) ** 2

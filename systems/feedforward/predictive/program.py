@@ -97,7 +97,7 @@ class CorrectionProgram:
         lower, upper = self._bounds(forecast)
         self._solver.update(Ax=self._values(forecast.inertia, forecast.friction_slope), l=lower, u=upper)
         self._solver.warm_start(*self._nothing)
-        found = self._solver.solve()
+        found = self._solver.solve(raise_error=False)
         if found.info.status_val != osqp.SolverStatus.OSQP_SOLVED:
             return None
         u = self._unit * found.x.reshape(NUM_JOINTS, self.ticks, _PER_TICK)[:, :, 2].T
