@@ -256,8 +256,8 @@ class Servo(Diagram):
         """Puts a correction on top of the torques. Raises ScenarioError where the drives take none."""
         if self.drive != "cascade" or "torque_feedforward" not in commands:
             raise ScenarioError(
-                f"servo.feedforward.predictive.kind={config.kind} corrects the torques that a feedforward tells "
-                "cascades: choose servo.feedforward.kind and the law's drive=cascade"
+                f"servo.feedforward.predictive.kind={config.kind} corrects the torques that a feedforward "
+                "tells cascades: choose servo.feedforward.kind and the law's drive=cascade"
             )
         correction = builder.AddNamedSystem("predictive_correction", PredictiveCorrection(self.model, config))
         builder.Connect(self.reference.GetOutputPort("reference"), correction.GetInputPort("reference"))

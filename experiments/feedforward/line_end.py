@@ -33,6 +33,7 @@ from systems.samples import JointSample
 _SETTLE, _DWELL = 0.6, 0.6  # s at rest: the arm is first wound up, then comes to rest
 _JUST_AFTER = 0.2  # s
 _TIMED = 600  # ticks
+_BEHIND, _WAVES = 1e-4, 20.0  # rad and rad/s: how motors stray while a tick is timed
 _EDGES = 4
 _ROBOTS = ("kr16", "kr210")
 KIND = "elastic_structure"  # of the inverse model
@@ -101,10 +102,12 @@ def tick_time(trial: RectangleTrial) -> float:
     own = correction.GetMyMutableContextFromRoot(context)
     correction.GetInputPort("position_command").FixValue(own, home)
     correction.GetInputPort("velocity_command").FixValue(own, np.zeros(NUM_JOINTS))
-    seconds, random = [], np.random.default_rng(0)
+    seconds, phases = [], np.arange(NUM_JOINTS)
     for tick in range(round(scenario.reference.settle / period), _TIMED):
         context.SetTime(tick * period)
-        sample = JointSample(tick * period, home + random.normal(0.0, 1e-4, NUM_JOINTS), running=True)
+        angle = _WAVES * tick * period + phases
+        theta, speed = home + _BEHIND * np.sin(angle), _BEHIND * _WAVES * np.cos(angle)
+        sample = JointSample(tick * period, theta, speed, running=True)
         correction.GetInputPort("joint_sample").FixValue(own, Value(sample))
         started = time.perf_counter()
         own.SetDiscreteState(correction.EvalUniquePeriodicDiscreteUpdate(own))
@@ -118,7 +121,7 @@ def _rest(gap: np.ndarray, soon: np.ndarray) -> Rest:
 
 
 def trials(name: str, plant: str | None = None) -> tuple[RectangleTrial, RectangleTrial]:
-    """Without and with the predictive correction: a robot with its largest payload, another one in the station.
+    """Without and with the predictive correction, with the largest payload and another robot in the station.
 
     Args:
         name: of the robot that the controller believes in.

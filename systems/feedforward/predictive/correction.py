@@ -34,8 +34,8 @@ class PredictiveCorrection(LeafSystem):
 
     From the errors of the motors at two ticks, and from what the drives make of them, comes what the motors
     needed in between beyond the feedforward. `FrictionObserver` parts it into what ends with the motion and
-    what stays, `CorrectionProgram` finds the torques with which the motors stay closest to their commands, and
-    the first one is added.
+    what stays, `CorrectionProgram` finds the torques with which the motors stay closest to their commands,
+    and the first one is added.
 
     Only what encoders of the motors see is corrected: not that gears and links bend otherwise than believed,
     nor play. The correction is never above a share of the believed Coulomb friction. Without a sample of this
@@ -80,7 +80,7 @@ class PredictiveCorrection(LeafSystem):
         self._joints = self.DeclareAbstractInputPort("joint_sample", Value(JointSample()))
         self._torque = self.DeclareDiscreteState(NUM_JOINTS)
         self.DeclareStateOutputPort("torque", self._torque)
-        # Torques of the last ticks in rad/s^2, and positions and velocities of the commands, the newest first.
+        # Torques of the last ticks in rad/s^2, positions and velocities of the commands; the newest first.
         self._sent = self.DeclareDiscreteState((self.delay + 1) * NUM_JOINTS)
         self._commands = self.DeclareDiscreteState(np.full((self.delay + 1) * 2 * NUM_JOINTS, np.nan))
         unknown = np.full(_OWN, np.nan)
@@ -108,7 +108,7 @@ class PredictiveCorrection(LeafSystem):
             lower = -upper
             lower[: self.delay] = upper[: self.delay] = sent[: self.delay][::-1]
             slope, needed = self._observer.slope(speed[1:]), self._observer.ahead(parts, speed[1:])
-            forecast = Forecast(*error, own[:NUM_JOINTS], inertia, slope, needed, lower, upper)
+            forecast = Forecast(error[0], error[1], own[:NUM_JOINTS], inertia, slope, needed, lower, upper)
             found = self._program.solve(forecast)
             correction = None if found is None else found[self.delay]
         else:
@@ -149,7 +149,7 @@ class PredictiveCorrection(LeafSystem):
         return robust_solve(J, twists.T).T
 
     def _inertia(self, q: np.ndarray) -> np.ndarray:
-        """What each motor has to turn at joint positions in rad, as a share of what its drive is tuned for."""
+        """What each motor has to turn at positions in rad, as a share of what its drive is tuned for."""
         self._plant.SetPositions(self._context, q)
         return np.diag(self._plant.CalcMassMatrix(self._context)) / self._tuned_for
 

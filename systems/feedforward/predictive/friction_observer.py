@@ -30,7 +30,7 @@ class FrictionObserver:
     """
 
     def __init__(self, coulomb: np.ndarray, viscous: np.ndarray, width: np.ndarray) -> None:
-        """Takes friction in rad/s^2 and 1/s, as `Forecast` has it, and the speed in rad/s of Coulomb friction."""
+        """Takes friction in rad/s^2 and 1/s, as `Forecast` has it, and the width of its jump in rad/s."""
         self._coulomb, self._viscous, self._width = coulomb, viscous, width
         units = np.stack([coulomb, viscous, np.ones(NUM_JOINTS)], axis=1)
         doubt, wander = units * _DOUBT, units * _WANDER

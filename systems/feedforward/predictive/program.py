@@ -10,7 +10,7 @@ from robots.description.model import NUM_JOINTS
 
 _ERROR_UNIT = 1e-4  # rad, so that the solver sees numbers of about one
 _PER_TICK = 3  # unknowns: error, what the integral gives, correction
-_ACCURACY = 1e-4  # in these units
+_ACCURACY = 5e-4  # in these units
 _STEP_SIZE = 0.01  # of the solver; found by trial, and fixed, for its own choice depends on the clock
 _MOST_STEPS = 400
 
@@ -50,8 +50,8 @@ class CorrectionProgram:
         m e'' + (D + b) e' + P e + w + u = d,    w' = I e,
 
     in implicit steps of a tick, and the corrections u are within bounds. e is a motor's error, w what the
-    drive's integral gives, b the slope of friction at the planned speed and d the disturbance. All unknowns of
-    a tick are tied to the two ticks before alone, so the matrices are banded, and a solver for sparse
+    drive's integral gives, b the slope of friction at the planned speed and d the disturbance. All unknowns
+    of a tick are tied to the two ticks before alone, so the matrices are banded, and a solver for sparse
     problems takes time in proportion to the ticks. It begins from nothing each time: what comes out depends
     on the forecast alone.
     """
@@ -87,7 +87,7 @@ class CorrectionProgram:
             eps_rel=_ACCURACY,
             rho=_STEP_SIZE,
             adaptive_rho=False,
-            check_termination=10,
+            check_termination=5,
             max_iter=_MOST_STEPS,
         )
         self._nothing = np.zeros(size), np.zeros(matrix.shape[0])

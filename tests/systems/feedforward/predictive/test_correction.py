@@ -7,7 +7,7 @@ import pytest
 from pydrake.common.value import Value
 from pydrake.systems.analysis import Simulator
 from pydrake.systems.framework import Context, DiagramBuilder, LeafSystem
-from pydrake.systems.primitives import ConstantValueSource, ConstantVectorSource
+from pydrake.systems.primitives import ConstantVectorSource
 
 from experiments.feedforward.rectangle import working_position
 from robots.description.model import NUM_JOINTS, load_robot
