@@ -10,7 +10,7 @@ class PredictiveConfig:
     """Whether motors are corrected for what friction leaves, and what is believed of the drives."""
 
     kind: str = choice("none", ("none", "motors"))  # motors: by torques on top of the feedforward's
-    horizon: float = quantity(0.048, 0.008, 0.5, "s")  # that is looked ahead, beyond the delay of commands
+    horizon: float = quantity(0.064, 0.008, 0.5, "s")  # that is looked ahead, beyond the delay of commands
     # What a change of the torque from tick to tick costs against an error of the motors, lambda_u of (5.12);
     # empty: 1.3 / w^2, with the lowest angular frequency w of the stretched arm, which then is hardly excited
     smoothness: float | None = quantity(None, 1e-5, 1.0, "s^2")

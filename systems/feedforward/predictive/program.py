@@ -1,6 +1,6 @@
 """The quadratic program of the predictive correction: six motors under their drives over some ticks."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import osqp
@@ -13,6 +13,7 @@ _PER_TICK = 3  # unknowns: error, what the integral gives, correction
 _ACCURACY = 5e-4  # in these units
 _STEP_SIZE = 0.01  # of the solver; found by trial, and fixed, for its own choice depends on the clock
 _MOST_STEPS = 400
+_STEP = 0.02  # to which the matrices are rounded, for they hardly change and are costly to factorise
 
 
 @dataclass(frozen=True)
@@ -74,31 +75,39 @@ class CorrectionProgram:
         change = smoothness * self._unit / _ERROR_UNIT * differences @ picks[2]
         cost = sparse.block_diag([picks[0].T @ picks[0] + change.T @ change] * NUM_JOINTS)
         inertia, slope = np.ones(NUM_JOINTS), np.zeros((ticks, NUM_JOINTS))
-        matrix = sparse.csc_matrix((self._values(inertia, slope), self._indices, self._starts))
+        matrix = sparse.csc_matrix(
+            (self._values(inertia, slope), self._indices, self._starts), shape=self._shape
+        )
         self._solver = osqp.OSQP()
         self._solver.setup(
             sparse.triu(cost, format="csc"),
             np.zeros(size),
             matrix,
-            np.zeros(matrix.shape[0]),
-            np.zeros(matrix.shape[0]),
+            np.zeros(self._shape[0]),
+            np.zeros(self._shape[0]),
             verbose=False,
             eps_abs=_ACCURACY,
             eps_rel=_ACCURACY,
             rho=_STEP_SIZE,
             adaptive_rho=False,
+            warm_starting=False,
             check_termination=5,
             max_iter=_MOST_STEPS,
         )
-        self._nothing = np.zeros(size), np.zeros(matrix.shape[0])
+        self._laid_out = matrix.data  # what the solver has
 
     def solve(self, forecast: Forecast) -> np.ndarray | None:
         """The corrections in rad/s^2 at all ticks, (n, 6); None if the solver finds none."""
-        lower, upper = self._bounds(forecast)
-        self._solver.update(Ax=self._values(forecast.inertia, forecast.friction_slope), l=lower, u=upper)
-        self._solver.warm_start(*self._nothing)
+        inertia = _in_steps(forecast.inertia, 1.0)
+        slope = _in_steps(forecast.friction_slope, self._cascade.derivative)
+        lower, upper = self._bounds(replace(forecast, inertia=inertia, friction_slope=slope))
+        values = self._values(inertia, slope)
+        if not np.array_equal(values, self._laid_out):
+            self._laid_out = values
+            self._solver.update(Ax=values)
+        self._solver.update(l=lower, u=upper)
         found = self._solver.solve(raise_error=False)
-        if found.info.status_val != osqp.SolverStatus.OSQP_SOLVED:
+        if found.info.status != "solved":
             return None
         u = self._unit * found.x.reshape(NUM_JOINTS, self.ticks, _PER_TICK)[:, :, 2].T
         return np.clip(u, forecast.lower, forecast.upper)
@@ -133,6 +142,7 @@ class CorrectionProgram:
         order = np.lexsort((rows, columns))
         self._constant, self._per_inertia, self._per_slope = table[order, 2:5].T
         self._ticks_of, self._joints_of = table[order, 5:].astype(int).T
+        self._shape = 3 * NUM_JOINTS * n, _PER_TICK * NUM_JOINTS * n
         self._indices = rows[order]
         self._starts = np.searchsorted(columns[order], np.arange(_PER_TICK * n * NUM_JOINTS + 1))
 
@@ -154,3 +164,7 @@ class CorrectionProgram:
             for bound in (forecast.lower, forecast.upper)
         )
         return lower, upper
+
+
+def _in_steps(values: np.ndarray, unit: float) -> np.ndarray:
+    return _STEP * unit * np.round(values / (_STEP * unit))

@@ -11,7 +11,10 @@ CASCADE, T, TICKS, SMOOTHNESS = Cascade(3500.0, 100.0, 25000.0), 4e-3, 12, 1e-3
 
 
 def forecast(rng: np.random.Generator, limit: float) -> Forecast:
-    """Motors somewhere, of which the correction of the next tick is under way already."""
+    """Motors somewhere, of which the correction of the next tick is under way already.
+
+    Inertia and slope are those to which the program rounds.
+    """
     upper = np.full((TICKS, NUM_JOINTS), limit)
     lower = -upper
     lower[0] = upper[0] = rng.uniform(-0.1, 0.1, NUM_JOINTS)
@@ -19,8 +22,8 @@ def forecast(rng: np.random.Generator, limit: float) -> Forecast:
         error=rng.normal(0.0, 1e-4, NUM_JOINTS),
         error_rate=rng.normal(0.0, 1e-3, NUM_JOINTS),
         integral=rng.normal(0.0, 0.1, NUM_JOINTS),
-        inertia=rng.uniform(0.5, 3.0, NUM_JOINTS),
-        friction_slope=rng.uniform(0.0, 100.0, (TICKS, NUM_JOINTS)),
+        inertia=0.02 * rng.integers(25, 150, NUM_JOINTS),
+        friction_slope=2.0 * rng.integers(0, 50, (TICKS, NUM_JOINTS)),
         disturbance=np.cumsum(rng.normal(0.0, 0.1, (TICKS, NUM_JOINTS)), axis=0),
         lower=lower,
         upper=upper,
