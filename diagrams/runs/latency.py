@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -15,6 +15,8 @@ from systems.link.protocols import PoseSource, RobotLink
 
 _FREQUENCIES = (0.15, 0.25, 0.4)  # Hz: so slow that no filter or controller of the drives adds a millisecond
 _RISE = 1.0  # s, in which the motion begins and ends
+_LOOK = 50  # messages, after which the clocks are looked at
+_PATIENCE = 3.0  # times the duration, in which the clocks may be set anew
 
 
 @dataclass
@@ -83,6 +85,9 @@ def measure_latency(
 ) -> LatencyRecord:
     """Moves a joint of a station where it stands, and measures its delays.
 
+    Where a clock was set anew, as that of a virtual cell is which has fallen behind, what came before cannot
+    be compared with what follows: the motion goes on until it has lasted as long as wanted since then.
+
     Args:
         scenario: which station.
         robot: whose joint is moved.
@@ -93,7 +98,7 @@ def measure_latency(
         now: the clock of the client's arrivals, in s.
 
     Raises:
-        StationError: if the station is not there or falls silent.
+        StationError: if the station is not there or falls silent, or its clocks are set anew again and again.
         ValueError: if there is no such joint, or the motion would leave its range.
     """
     config.check()
@@ -110,8 +115,10 @@ def measure_latency(
         )
     rows, frames = [], []
     before = client.counters()
-    while (time := report.time - began) < config.duration:
-        displacement, speed = motion(config, time)
+    course, steps = config, 0
+    sessions = _sessions(wire, camera)
+    while (time := report.time - began) < course.duration:
+        displacement, speed = motion(course, time)
         position, velocity = start.copy(), np.zeros(NUM_JOINTS)
         position[axis] += displacement
         velocity[axis] = speed
@@ -120,8 +127,21 @@ def measure_latency(
         sample = wire.poses.newest
         if sample.valid and (not frames or sample.time != frames[-1][0]):
             frames.append((sample.time, *sample.X_WE.translation()))
-        if progress and len(rows) % 50 == 0:
-            progress(time / config.duration)
+        if len(rows) % _LOOK == 0:
+            if progress:
+                progress(1.0 - (course.duration - time) / config.duration)
+            sessions, previous = _sessions(wire, camera), sessions
+            if sessions != previous:
+                steps += 1
+                course = replace(config, duration=time + config.duration)
+                if course.duration > _PATIENCE * config.duration:
+                    wire.stop_smoothly()
+                    raise StationError(
+                        f"the clocks of the station were set anew {steps} times in {time:.0f} s"
+                        + wire.host.reason(began_here)
+                    )
+                rows.clear()
+                frames.clear()
         following = wire.next_report()
         if following is None or not following.is_ready:
             wire.stop_smoothly()
@@ -144,3 +164,9 @@ def measure_latency(
         camera.report().clock if camera else None,
         {name: number - before[name] for name, number in counters.items()},
     )
+
+
+def _sessions(wire: HardwareLink, camera: PoseSource | None) -> tuple[int, int]:
+    """How often the clocks of controller and camera were set anew."""
+    seen = camera.report().clock if camera else None
+    return wire.robot_clock.quality().sessions, seen.sessions if seen else 0

@@ -49,7 +49,7 @@ AnyScenarioOption = Annotated[
         "--scenario",
         metavar="NAME|FILE",
         help="A shipped scenario or a YAML file.",
-        show_default="misaligned; on a station cell",
+        show_default="misaligned; on a station cell or cell-kuka",
         autocompletion=_scenarios,
     ),
 ]

@@ -44,7 +44,7 @@ def health_command(
             "--scenario",
             metavar="NAME|FILE",
             help="A shipped scenario or a YAML file.",
-            show_default="nominal; on a station cell",
+            show_default="nominal; on a station cell or cell-kuka",
         ),
     ] = None,
     settings: SetOption = None,

@@ -123,6 +123,7 @@ def _print(human: Console, study: Study, rows: Rows) -> None:
     failed = int((rows["failure"] != "").sum())
     if failed:
         human.print(f"[red]{count(failed, 'run')} failed; the reasons are in the report[/red]")
+    human.print(escape(study_verdict(study, rows)))
 
 
 def _spread_lines(study: Study, rows: Rows, metric: str) -> list[list[str]]:
@@ -189,7 +190,7 @@ def study_verdict(study: Study, rows: Rows) -> str:
         f"Over {count(len(rows['row']), 'run')} {law_title(best)} has the best worst run: "
         f"{metric_name(metric)} {found[best]['worst']:.3g}, in the median {found[best]['median']:.3g}, "
         f"{metric_unit(metric)}."
-        + (f" Of what is varied, {strongest} changes it most." if strongest else "")
+        + (f" Of what is varied, {strongest} changes its mean most." if strongest else "")
         + (f" {count(failed, 'run')} failed." if failed else "")
     )
 

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from scipy.signal import lfilter
 
+from diagrams.hardware_link import StationError
 from diagrams.runs.latency import LatencyConfig, LatencyRecord, measure_latency, motion
 from diagrams.scenario.scenario import load_scenario
 from experiments.station.latency import ImpossibleDelayError, Latency, delay_between, evaluate
@@ -49,6 +50,30 @@ def test_lost_and_late_messages_only_add_what_they_cost():
         "station.drive.dead_time=0.052", "station.faults.loss=0.02", "station.faults.jitter=0.003"
     )
     assert 0.052 - 5e-4 < found.dead_time < 0.052 + 3e-3
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("halts", "refused"), [([3.0], None), ([3.0, 6.0, 9.0, 12.0, 15.0], "set anew")])
+def test_a_clock_that_is_set_anew_begins_the_measurement_again(halts: list[float], refused: str | None):
+    """The cell stands still for 0.06 s and stays behind; often enough, and there is nothing to measure."""
+    scenario = load_scenario("cell", ["station.drive.dead_time=0.052"])
+    wire = Lockstep(scenario)
+    wire.halts = [(time, 0.06, False) for time in halts]
+
+    def record() -> LatencyRecord:
+        return measure_latency(
+            scenario, ROBOT, LatencyConfig(duration=6.0), wire.link, wire.camera(), now=wire.now
+        )
+
+    if refused:
+        with pytest.raises(StationError, match=refused):
+            record()
+    else:
+        undisturbed_since = record()
+        # Whole, but for two cycles; noticed within two seconds, each of which is one bin of the clock.
+        assert 6.0 <= undisturbed_since.stamp[-1] - undisturbed_since.stamp[0] + 0.0081 < 6.1
+        assert 3.0 < undisturbed_since.stamp[0] - wire.stamps[0] < 5.3
+        assert evaluate(undisturbed_since).dead_time == pytest.approx(0.052, abs=5e-4)
 
 
 def test_the_standard_error_of_a_delay_is_how_far_it_is_off():
