@@ -222,17 +222,21 @@ class Innovations:
             return 0
         return 1 + int(memory.outliers[0])
 
-    def measure_noise(self, memory: SimpleNamespace, r: np.ndarray) -> None:
+    def measure_noise(self, memory: SimpleNamespace, r: np.ndarray) -> bool:
         """Takes the innovation of a sample that counts, (6,), into the measured noise of the camera.
 
         What model and estimate are wrong by is nearly the same in the sample before: half of the square of
         the change is noise alone.
+
+        Returns:
+            Whether enough has come for `noise_factor`.
         """
         if memory.changes[0] == 0.0:
             memory.last[:] = r
         share = 1.0 / min(max(float(memory.changes[0]), 1.0), _SCATTER)
         kernels.innovations.scatter(r, memory.last, memory.scatter, share)
         memory.changes[0] += 1.0
+        return bool(memory.changes[0] >= _LEAST_SCATTER)
 
     def noise_factor(self, memory: SimpleNamespace) -> float:
         """The camera's variance as it is measured in units of the one that is believed.

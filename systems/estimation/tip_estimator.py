@@ -25,6 +25,7 @@ from systems.estimation.gear_errors import NUM_SHAPES, NUM_STATES
 from systems.estimation.keyframes import Keyframes, keyframe_row, open_keyframe
 from systems.estimation.memory import Layout
 from systems.estimation.tip_model import NO_SHAPES, Prediction, Spread, TipModel, moved
+from systems.estimation.unmodelled import Unmodelled
 
 _AGAIN = 500  # samples, in which a second event says that the first was explained wrongly
 _OF_THE_LOAD = 0.1  # of its spread, when a tool was displaced
@@ -79,7 +80,7 @@ class TipEstimator:
         variances = np.repeat([config.rotation_sigma, config.position_sigma], 3) ** 2
         self.weights = 1.0 / variances
         self._keyframes = Keyframes(model, self.weights)
-        self._innovations = Innovations(variances)
+        self._innovations, self._unmodelled = Innovations(variances), Unmodelled(variances)
         self._camera_or_tool = CameraOrTool(variances, model.size)
         self._camera = CameraMoves(model.world_directions())
         n = model.size
@@ -103,6 +104,7 @@ class TipEstimator:
             sum_H=(6, n),
             keyframes=self._keyframes.layout,
             innovations=self._innovations.layout,
+            unmodelled=self._unmodelled.layout,
             camera=self._camera.layout,
             after_step=self._camera_or_tool.layout,
         )
@@ -181,13 +183,15 @@ class TipEstimator:
     def tip_covariance(self, memory: SimpleNamespace, pair: Pair) -> np.ndarray:
         """Covariance of the predicted tip, rotation (rad^2) first, shape (6, 6).
 
-        To what the unknowns may be wrong by, H P H^T, the steps of the encoders add J S J^T. As long as
+        To what the unknowns may be wrong by, H P H^T, the steps of the encoders add J S J^T, and the camera
+        what it sees that no unknown describes. As long as
         nothing tells a displaced tool from a camera that was moved, the tip is where it is seen or, as
         likely, where it would be without the step: with the way d from there, that adds d d^T / 2.
         """
         H = self.predict(memory, pair).H[0]
         J = self._jacobian(memory, pair) * pair.rounding
         covariance = H @ self.covariance_of_robot(memory) @ H.T + J @ J.T
+        covariance += np.diag(self._unmodelled.variances(memory.unmodelled))
         if memory.after_step.is_open[0]:
             d = H @ (memory.xi - memory.after_step.xi_before)
             covariance += 0.5 * np.outer(d, d)
@@ -220,7 +224,10 @@ class TipEstimator:
             verdict = self._innovations.judge(innovations, r, H, lambda: self._solve_columns(memory, H))
             if verdict.is_outlier:
                 return None
-            self._innovations.measure_noise(innovations, r)
+            if self._innovations.measure_noise(innovations, r):
+                self._unmodelled.add(memory.unmodelled, r, lambda: self._doubts(memory, H))
+            if verdict.has_jumped or verdict.has_drifted:
+                self._unmodelled.rest(memory.unmodelled)
             if verdict.is_calm:
                 memory.was_settled[0] = self._keyframes.is_settled(memory.keyframes, memory.xi)
             if verdict.is_doubtful and memory.was_settled[0]:
@@ -340,6 +347,10 @@ class TipEstimator:
         if not kernels.information.solve(memory.keyframes.A, memory.A_open, columns, out):
             return np.linalg.solve(memory.keyframes.A + memory.A_open, columns)
         return out
+
+    def _doubts(self, memory: SimpleNamespace, H: np.ndarray) -> tuple[float, np.ndarray]:
+        """`variance_factor`, and what the estimate may be wrong by, variances of the tip, (6,)."""
+        return self.variance_factor(memory), np.einsum("ij,ji->i", H, self._solve_columns(memory, H))
 
     def _doubt(self, memory: SimpleNamespace) -> None:
         """What was learnt does not hold where the robot is now, though nothing happened: it weighs less."""

@@ -1,0 +1,49 @@
+"""What a model lacks is told from the noise of a camera, however little it is of a single sample."""
+
+import numpy as np
+import pytest
+
+from systems.estimation.unmodelled import Unmodelled
+
+SIGMA = np.repeat([2e-4, 6e-5], 3)  # rad and m, of a sample
+NUMBER = 5000  # samples: 20 s
+
+
+def found(lacking: float, noise: float = 1.0, known: float = 0.0, events: tuple[int, ...] = ()) -> np.ndarray:
+    """Deviations that are found, (6,), in those of the camera, where all have a sine of ``lacking``."""
+    rng = np.random.default_rng(3)
+    unmodelled = Unmodelled(SIGMA**2)
+    memory = unmodelled.layout.view(np.zeros(unmodelled.layout.size))
+    wave = np.sqrt(2.0) * lacking * np.sin(2.0 * np.pi * np.arange(NUMBER)[:, None] / 400.0 + np.arange(6.0))
+    shown = SIGMA * (noise * rng.normal(size=(NUMBER, 6)) + wave)
+    for k, r in enumerate(shown):
+        if k in events:
+            r = r + 20.0 * SIGMA
+        unmodelled.add(memory, r, lambda: (noise**2, (known * SIGMA) ** 2 + 1e-20))
+        if k in events:
+            unmodelled.rest(memory)
+    return np.sqrt(unmodelled.variances(memory)) / SIGMA
+
+
+@pytest.mark.parametrize("lacking", [0.2, 1.0])
+def test_a_slow_error_is_found_below_the_noise(lacking: float):
+    """Its variance to some thousandths of the noise, as below, and to a tenth of its own."""
+    np.testing.assert_allclose(found(lacking) ** 2, lacking**2, atol=0.012 + 0.1 * lacking**2)
+
+
+@pytest.mark.parametrize("noise", [0.5, 1.0, 3.0])
+def test_noise_alone_adds_next_to_nothing(noise: float):
+    """The variance of means over 24 samples is 1/24 of the noise; 300 of them show it to 8 %.
+
+    That is 0.0034 of the variance of a sample; three times as much is let pass.
+    """
+    assert (found(0.0, noise) ** 2).max() < 0.01 * noise**2
+
+
+def test_what_the_estimate_knows_it_may_be_wrong_by_is_not_added_again():
+    """Innovations whose variance is half the camera's and half the estimate's."""
+    assert found(0.0, noise=1.0, known=3.0).max() == 0.0
+
+
+def test_a_sample_in_which_something_happened_does_not_count():
+    np.testing.assert_allclose(found(0.2, events=(2000, 2001, 2002)), found(0.2), rtol=0.1)
