@@ -26,10 +26,8 @@ _MS = 1e-3
 # Standard deviations of what is believed: logarithms of gains and friction, delay and lag in ms. A hump stays
 # the share of Coulomb's friction that is believed: motions that pass it in milliseconds hardly show it.
 _GAIN, _DELAY, _LAG, _FRICTION = 0.5, 2.0, 2.0, 0.7
-_ROUNDS = (
-    7,
-    4,
-)  # steps of the fit, between which the equations are brought near to what moves, and residuals weighed again
+# Steps of the fit, between which the equations are brought near to what moves, and residuals weighed again.
+_ROUNDS = 7, 4
 _NEAR = 1e-4  # relative
 _DIFFERENCE = 1e-2  # of the derivatives, standard deviations of what is believed
 _ORIGIN = 3.0  # scipy's first step is as long as the vector that it begins with
