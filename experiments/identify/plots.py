@@ -186,7 +186,8 @@ def write_identify_page(path: Path, study: IdentifyStudy, searches: SearchCompar
     parameters = Section(
         "Parameters",
         "Dampers as retardation times, damper over spring. Sigma contains what cases and sensors "
-        "disagree about; known is what is sure to 3 % (springs) or 25 % (dampers).",
+        "disagree about; known is what is sure to 3 % (springs), 25 % (dampers), 5 % (gains of drives), 10 % "
+        "(friction) or 0.2 ms (delays).",
         html_table(table_head(study), table_rows(study)),
     )
     spectra = Section(
