@@ -108,11 +108,7 @@ def measure_latency(
     report = wire.last
     assert report is not None
     start, began, began_here = report.position.copy(), report.time, now()
-    reach = np.array([-1.0, 1.0]) * math.radians(config.amplitude_deg) + start[axis]
-    if reach[0] < robot.lower[axis] or reach[1] > robot.upper[axis]:
-        raise ValueError(
-            f"latency: joint {config.joint} has no room to move by {config.amplitude_deg} deg here"
-        )
+    _check_room(config, robot, start)
     rows, frames = [], []
     before = client.counters()
     course, steps = config, 0
@@ -170,3 +166,13 @@ def _sessions(wire: HardwareLink, camera: PoseSource | None) -> tuple[int, int]:
     """How often the clocks of controller and camera were set anew."""
     seen = camera.report().clock if camera else None
     return wire.robot_clock.quality().sessions, seen.sessions if seen else 0
+
+
+def _check_room(config: LatencyConfig, robot: RobotModel, start: np.ndarray) -> None:
+    """Raises ValueError if the motion would leave the range of the joint."""
+    axis = config.joint - 1
+    reach = np.array([-1.0, 1.0]) * math.radians(config.amplitude_deg) + start[axis]
+    if reach[0] < robot.lower[axis] or reach[1] > robot.upper[axis]:
+        raise ValueError(
+            f"latency: joint {config.joint} has no room to move by {config.amplitude_deg} deg here"
+        )
