@@ -151,6 +151,14 @@ def _subtract_explicit(rhs, gears, found, carried, columns, by, z, state):
 
 
 @compiled
+def place_of(at, knot, step):
+    """The last knot before a step, sought from `knot` on, and the share of the way to the next one."""
+    while knot < len(at) - 2 and step >= at[knot + 1]:
+        knot += 1
+    return knot, min((step - at[knot]) / (at[knot + 1] - at[knot]), 1.0)
+
+
+@compiled
 def between(values, knot, share, out):
     """Between a knot and the next one, (k, rows, columns) into (rows, columns)."""
     for i in range(out.shape[0]):
@@ -271,14 +279,10 @@ def go_through(steps, posture, course, springs, gears, columns, start, low_pass,
     place = np.empty(2 * e)
     knot, last_close = 0, 0
     for step in range(len(load)):
-        while knot < len(at) - 2 and step >= at[knot + 1]:
-            knot += 1
-        share = min((step - at[knot]) / (at[knot + 1] - at[knot]), 1.0)
+        knot, share = place_of(at, knot, step)
         between(rest, knot, share, rest_now)
         if step:
-            while last_close < len(close) - 2 and step >= close[last_close + 1]:
-                last_close += 1
-            gone = min((step - close[last_close]) / (close[last_close + 1] - close[last_close]), 1.0)
+            last_close, gone = place_of(close, last_close, step)
             between(inverse, last_close, gone, S)
             between(motion, knot, share, motion_now)
             for j in range(e):

@@ -3,7 +3,7 @@
 import numpy as np
 
 from robots.identification.motion import BETA, GAMMA
-from robots.identification.response_kernels import accelerate, between, compiled
+from robots.identification.response_kernels import accelerate, between, compiled, place_of
 
 _GEARS = 6
 _PASSES = 3  # a motor turns so little in a step that each pass gains two digits
@@ -53,13 +53,9 @@ def drive_through(h, in_sample, posture, load, ripple, springs, gears, start, dr
     outer = np.zeros(E)
     knot, last = 0, 0
     for step in range(len(load)):
-        while knot < len(at) - 2 and step >= at[knot + 1]:
-            knot += 1
-        share = min((step - at[knot]) / (at[knot + 1] - at[knot]), 1.0)
+        knot, share = place_of(at, knot, step)
         if step:
-            while last < len(close) - 2 and step >= close[last + 1]:
-                last += 1
-            gone = min((step - close[last]) / (close[last + 1] - close[last]), 1.0)
+            last, gone = place_of(close, last, step)
             between(inverse, last, gone, S)
             between(motion, knot, share, motion_now)
             between(rest, knot, share, rest_now)

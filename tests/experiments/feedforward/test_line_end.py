@@ -38,7 +38,9 @@ def test_a_robot_that_is_as_believed_is_left_alone():
 
 
 @pytest.mark.slow
-def test_a_third_of_the_samples_lost_is_never_worse_than_none_corrected(monkeypatch: pytest.MonkeyPatch):
+def test_with_a_third_of_the_samples_lost_hardly_more_is_left_than_uncorrected(
+    monkeypatch: pytest.MonkeyPatch,
+):
     """By a twentieth, for the arm rings a little otherwise."""
     is_usable = PredictiveCorrection._is_usable
 
