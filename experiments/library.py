@@ -13,10 +13,11 @@ from experiments.cli.workers import Executor, LocalProcesses
 from experiments.comparison.compare import compare as run_laws
 from experiments.comparison.compare import compared_laws
 from experiments.identify.cases import MotionCases, default_cases
+from experiments.identify.fine_tuning.tuning import SHARE
 from experiments.identify.recording_map import Recording
 from experiments.identify.simulated import simulated_recording
 from experiments.identify.slow import identify_slow_motions
-from experiments.identify.study import IdentifyStudy, study_recording
+from experiments.identify.study import IdentifyStudy, study_recording, with_fine_tuning
 from experiments.metrics.run_metrics import best_law, judged_by, summary
 from experiments.report.report import verdict
 from robots.calibration.identification import IdentificationConfig
@@ -253,6 +254,35 @@ def identify(
     model, truth = _robot(robot), None if plant is None else _robot(plant)
     of_slow = None if slow is None else identify_slow_motions(slow, model)
     return study_recording(model, truth, recording, gear_parts, of_slow, progress)
+
+
+def fine_tune(
+    study: IdentifyStudy,
+    share: float = SHARE,
+    seed: int = 0,
+    processes: int | None = None,
+    progress: Progress | None = None,
+) -> IdentifyStudy:
+    """Tunes what the inverse model believes on the robot of a study, by how its tip follows a rectangle.
+
+    In a script it belongs below ``if __name__ == "__main__":``, because the processes import it.
+
+    Args:
+        study: of `identify`, with the plant that is driven.
+        share: numbers stay between this share of what was identified and its inverse, in (0, 1).
+        seed: of the camera's noise.
+        processes: how many simulate motions at a time; None for one per core.
+        progress: as of `simulate`.
+
+    Returns:
+        The study with ``fine_tuning``; ``final`` is the robot for the inverse model, tuned where another
+        rectangle is not driven worse with it.
+
+    Raises:
+        ValueError: if the share makes no sense, the study has no plant, or it cannot follow a rectangle.
+        experiments.cli.workers.SimulationError: if the robot did not get to the end of a motion.
+    """
+    return with_fine_tuning(study, LocalProcesses(processes), share, seed, progress)
 
 
 def _scenario(scenario: Scenario | str) -> Scenario:

@@ -33,6 +33,13 @@ from experiments.identify.excitation import (
     told_of,
     write_excitation,
 )
+from experiments.identify.fine_tuning.report import (
+    MOTIONS_HEAD,
+    NUMBERS_HEAD,
+    motion_rows,
+    number_rows,
+)
+from experiments.identify.fine_tuning.tuning import SHARE
 from experiments.identify.plots import table_head, table_rows, verdict, write_identify_page
 from experiments.identify.recording_file import RECORDINGS, read_recording, write_recording
 from experiments.identify.recording_map import Recording
@@ -51,6 +58,7 @@ from experiments.identify.study import (
     identify_json,
     study_recording,
     with_drives,
+    with_fine_tuning,
     with_rectangle,
 )
 from experiments.report.files import write_text
@@ -113,6 +121,20 @@ def identify_command(
             help="Refine drives, friction and dampers in closed loop; needs commands and torques.",
         ),
     ] = False,
+    tuned_on_robot: Annotated[
+        bool,
+        typer.Option(
+            "--fine-tune",
+            help="Then tune the inverse model on the robot, by how its tip follows a rectangle.",
+        ),
+    ] = False,
+    tuning_share: Annotated[
+        float,
+        typer.Option(
+            metavar="SHARE",
+            help="Tuned numbers stay between this share of what was identified and its inverse.",
+        ),
+    ] = SHARE,
     rectangle: Annotated[
         bool, typer.Option(help="Drive a rectangle with the identified inverse model; needs --plant.")
     ] = True,
@@ -159,6 +181,10 @@ def identify_command(
             raise ValueError(
                 "--excite only designs a motion: no recording, no motions and no --write go with it"
             )
+        if not 0.0 < tuning_share < 1.0:
+            raise ValueError(f"--tuning-share must be between 0 and 1, got {tuning_share:g}")
+        if tuned_on_robot and recording is not None and plant is None:
+            raise ValueError("--fine-tune needs a robot to drive: say what was recorded by --plant NAME|FILE")
         if recording is None and slow is not None:
             raise ValueError("--slow says more of what was recorded, and there is no --recording")
         if recording is None and columns is not None:
@@ -197,6 +223,9 @@ def identify_command(
             of_plant = None if recording is not None else DriveConfig()
             with progress_bar("drives in closed loop") as progress:
                 study = with_drives(study, recorded, DriveConfig(), of_plant, progress)
+        if tuned_on_robot:
+            with progress_bar("fine tuning on the robot") as progress:
+                study = with_fine_tuning(study, where, tuning_share, seed, progress)
         if rectangle and truth is not None:
             with progress_bar("rectangle") as progress:
                 study = with_rectangle(study, where, progress)
@@ -206,9 +235,12 @@ def identify_command(
                 searches = compare_searches(study, search, search_evaluations, seed, where, progress)
         write_identify_page(page, study, searches)
         if robot_file:
-            write_text(robot_file, robot_text(study.identified))
+            write_text(robot_file, robot_text(study.final))
         output.write(identify_json(study) | ({"searches": search_json(searches)} if searches else {}))
     _print(human, study)
+    if study.fine_tuning is not None:
+        human.print(_table(MOTIONS_HEAD, motion_rows(study.fine_tuning)))
+        human.print(_table(NUMBERS_HEAD, number_rows(study.fine_tuning)))
     if searches:
         human.print(_table(SEARCH_HEAD, search_rows(searches)))
     print_files(human, report, write, write_table)
@@ -243,7 +275,7 @@ def _print(human: Console, study: IdentifyStudy) -> None:
 def _table(head: list[str], rows: list[list[str]]) -> Table:
     table = Table(box=box.SIMPLE_HEAD, padding=(0, 1, 0, 0))
     for name in head:
-        left = name in ("parameter", "unit", "method")
+        left = name in ("parameter", "unit", "method", "number", "motion")
         table.add_column(name, justify="left" if left else "right", no_wrap=True)
     for row in rows:
         table.add_row(*map(escape, row))

@@ -7,6 +7,7 @@ import plotly.graph_objects as go
 from plotly.subplots import make_subplots
 
 from experiments.cli.console import count
+from experiments.identify.fine_tuning.report import fine_tuning_sections, outcome
 from experiments.identify.search import SEARCH_HEAD, SearchComparison, search_rows
 from experiments.identify.study import IdentifyStudy
 from experiments.report.plot_page import Section, html_table, sortable_table, write_plot_page
@@ -68,6 +69,8 @@ def verdict(study: IdentifyStudy) -> str:
             f"On a rectangle the inverse model leaves {study.rectangle_ratio['identified']:.2f} of the "
             f"deviation of the rigid one, with the former beliefs {study.rectangle_ratio['nominal']:.2f}."
         )
+    if study.fine_tuning is not None:
+        said.append(outcome(study.fine_tuning))
     return " ".join(said)
 
 
@@ -198,6 +201,8 @@ def write_identify_page(path: Path, study: IdentifyStudy, searches: SearchCompar
         420,
     )
     sections = [spectra, parameters]
+    if study.fine_tuning is not None:
+        sections += fine_tuning_sections(study.fine_tuning)
     height, cases = _ROW * len(study.found.sensors), study.found.cases
     for case in np.unique(np.linspace(0, len(cases) - 1, _SHOWN_CASES).astype(int)):
         title = f"Case {cases[case].name}: measured, and modelled before and after"

@@ -11,9 +11,11 @@ from experiments.cli.workers import Executor, Progress, SimulationError, in_orde
 from experiments.feedforward.rectangle import RectangleTrial
 from experiments.identify.closed_loop.drives import RefinedDrives, refined_drives
 from experiments.identify.closed_loop.fit import GAINS
+from experiments.identify.fine_tuning.report import fine_tuning_json
+from experiments.identify.fine_tuning.tuning import SHARE, FineTuning, fine_tune
 from experiments.identify.recording_map import Recording
 from experiments.identify.slow import slow_json, with_slow_motion
-from robots.description.model import RobotModel
+from robots.description.model import NUM_JOINTS, RobotModel
 from robots.identification.arm_identification import ArmIdentification, identify_arm
 from robots.identification.identified_robot import FoundParameter, found_parameters, identified_robot
 from robots.identification.motion import SensorPlace
@@ -23,6 +25,7 @@ from systems.cell.drive import DriveConfig
 from systems.feedforward import FeedforwardConfig
 
 _STIFFNESS, _DAMPING = "stiffness_", "damping_"
+_SLOW_FRICTION = 0.03  # relative standard deviation of friction that slow motions have shown
 
 
 @dataclass(frozen=True)
@@ -39,6 +42,12 @@ class IdentifyStudy:
     slow: SlowIdentification | None  # of slow motions, where there were some
     rectangle_ratio: dict[str, float] | None  # deviation with `elastic_structure` over that with `rigid`
     drives: RefinedDrives | None = None  # of closed loop
+    fine_tuning: FineTuning | None = None  # of the inverse model, on the robot
+
+    @property
+    def final(self) -> RobotModel:
+        """The identified robot, with what fine tuning has changed where that is taken over."""
+        return self.identified if self.fine_tuning is None else self.fine_tuning.robot
 
     def errors(self, kind: str) -> np.ndarray:
         """Relative errors of identifiable parameters of a kind, ``"stiffness_"`` or ``"damping_"``."""
@@ -133,6 +142,36 @@ def with_drives(
     return replace(study, drives=drives, parameters=drives.parameters, identified=drives.identified)
 
 
+def with_fine_tuning(
+    study: IdentifyStudy,
+    executor: Executor,
+    share: float = SHARE,
+    seed: int = 0,
+    progress: Callable[[float], None] | None = None,
+) -> IdentifyStudy:
+    """The study with its inverse model tuned on the robot; arguments and errors as of `fine_tune`."""
+    if study.plant is None:
+        raise ValueError(
+            "fine tuning needs a robot to drive, and nobody knows what was recorded: give its plant"
+        )
+    found = study.parameters
+    if study.slow is not None:
+        of_joints = range(1, NUM_JOINTS + 1)
+        found = [row for row in found if "_friction_" not in row.name]
+        found += [FoundParameter(f"slow_friction_{i}", "", 1.0, _SLOW_FRICTION, True) for i in of_joints]
+    tuning = fine_tune(
+        study.identified,
+        study.plant,
+        study.payload,
+        executor,
+        found,
+        share,
+        seed=seed,
+        progress=progress,
+    )
+    return replace(study, fine_tuning=tuning)
+
+
 def with_rectangle(
     study: IdentifyStudy, executor: Executor, progress: Callable[[float], None]
 ) -> IdentifyStudy:
@@ -142,13 +181,15 @@ def with_rectangle(
         SimulationError: if a run broke off.
     """
     rigid, elastic = (FeedforwardConfig(kind, rough_path="accept") for kind in ("rigid", "elastic_structure"))
-    trials = [
-        RectangleTrial(robot, study.payload, config, study.plant)
-        for robot, config in ((study.robot, rigid), (study.robot, elastic), (study.identified, elastic))
-    ]
-    of_rigid, nominal, identified = in_order(executor, _integral, trials, progress)
+    driven = {"rigid": (study.robot, rigid), "nominal": (study.robot, elastic)}
+    driven["identified"] = study.identified, elastic
+    if study.fine_tuning is not None and study.fine_tuning.is_taken_over:
+        driven["fine_tuned"] = study.final, elastic
+    trials = [RectangleTrial(robot, study.payload, config, study.plant) for robot, config in driven.values()]
+    of_rigid, *others = in_order(executor, _integral, trials, progress)
     return replace(
-        study, rectangle_ratio={"nominal": nominal / of_rigid, "identified": identified / of_rigid}
+        study,
+        rectangle_ratio={name: each / of_rigid for name, each in zip(list(driven)[1:], others, strict=True)},
     )
 
 
@@ -190,6 +231,8 @@ def identify_json(study: IdentifyStudy) -> dict[str, Any]:
         drive = study.drives.drive
         gains = {f"{name}_1_s": getattr(drive.cascade, name) for name in GAINS}
         numbers["drive"] = gains | {"command_delay_s": drive.command_delay}
+    if study.fine_tuning is not None:
+        numbers["fine_tuning"] = fine_tuning_json(study.fine_tuning)
     if study.slow is not None:
         numbers["slow_motion"] = slow_json(study.slow)
     if study.rectangle_ratio is not None:

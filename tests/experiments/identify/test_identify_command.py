@@ -236,6 +236,8 @@ REFUSED = {
     "report": (["--report=identify.txt"], "its name must end in .html"),
     "search": (["--search=0"], "--search must be at least 1, got 0"),
     "evaluations": (["--search=1", "--search-evaluations=9"], "--search-evaluations must be at least 60"),
+    "share": (["--fine-tune", "--tuning-share=1.2"], "--tuning-share must be between 0 and 1, got 1.2"),
+    "no robot": (["--recording=none.csv", "--fine-tune"], "--fine-tune needs a robot to drive"),
     "scheduler": (["--scheduler=tcp://127.0.0.1:1"], "no Dask scheduler at tcp://127.0.0.1:1"),
     "jobs": (["--jobs=0"], "--jobs must be at least 1, got 0"),
 }  # fmt: skip

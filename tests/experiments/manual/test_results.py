@@ -21,6 +21,7 @@ WRITERS = {
     "cameras/sweeps.py": ("as_dict",),
     "compensate/report.py": ("compensation_json",),
     "feedforward/study.py": ("study_json",),
+    "identify/fine_tuning/report.py": ("fine_tuning_json", "_motion_json"),
     "identify/slow.py": ("slow_json",),
     "identify/study.py": ("identify_json",),
     "invert/study.py": ("invert_json",),
