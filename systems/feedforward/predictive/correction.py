@@ -11,8 +11,9 @@ from robots.dynamics.plant import add_robot
 from robots.kinematics.forward import Kinematics, robust_solve
 from systems.controller_model import ControllerModel
 from systems.feedforward.predictive.config import PredictiveConfig
+from systems.feedforward.predictive.forecast import Cascade, Forecast
 from systems.feedforward.predictive.friction_observer import FrictionObserver, believed_friction
-from systems.feedforward.predictive.program import Cascade, CorrectionProgram, Forecast
+from systems.feedforward.predictive.program import CorrectionProgram
 from systems.reference.reference import PathAhead
 from systems.samples import JointSample
 
@@ -61,8 +62,8 @@ class PredictiveCorrection(LeafSystem):
         cascade = Cascade(stiffness, config.velocity, config.velocity * config.position * config.integral)
         ticks = self.delay + max(2, round(config.horizon / period))
         self._cascade = cascade
-        smoothness = config.smoothness or _smoothness(model)
-        self._program = CorrectionProgram(cascade, smoothness, period, ticks)
+        weight = config.smoothness or smoothness(model)
+        self._program = CorrectionProgram(cascade, weight, period, ticks)
         self._plant = MultibodyPlant(0.0)
         add_robot(self._plant, robot, "rigid", model.payload)
         self._plant.Finalize()
@@ -144,7 +145,11 @@ class PredictiveCorrection(LeafSystem):
 
     def _planned_speed(self, reference: PathAhead, time: float, q: np.ndarray) -> np.ndarray:
         """Of the motors now and at the ticks ahead in rad/s, (n + 1, 6), with the Jacobian of now."""
-        twists = reference.sample(time + self._late + self._ahead)[1]
+        times = time + self._late + self._ahead
+        if reference.time is None:  # then a tick's twist is known already
+            twists = np.array([reference.moment(t, self._late).V_WE for t in times])
+        else:
+            twists = reference.sample(times)[1]
         J = self._kinematics.jacobian(q)
         return robust_solve(J, twists.T).T
 
@@ -182,7 +187,7 @@ class PredictiveCorrection(LeafSystem):
         return np.concatenate([grown, *error]), self._observer.updated(parts, needed, speed)
 
 
-def _smoothness(model: ControllerModel) -> float:
+def smoothness(model: ControllerModel) -> float:
     """lambda_u in s^2 for an arm with this load."""
     elasticity = "joints" if model.elasticity == "rigid" else model.elasticity
     modes = ModalAnalysis(model.robot, elasticity, model.payload).at(stretched(model.robot))

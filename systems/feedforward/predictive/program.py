@@ -1,12 +1,14 @@
 """The quadratic program of the predictive correction: six motors under their drives over some ticks."""
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 import osqp
 from scipy import sparse
 
 from robots.description.model import NUM_JOINTS
+from systems.feedforward.predictive.forecast import Cascade, Forecast
+from systems.feedforward.predictive.free_optimum import FreeOptimum
 
 _ERROR_UNIT = 1e-4  # rad, so that the solver sees numbers of about one
 _PER_TICK = 3  # unknowns: error, what the integral gives, correction
@@ -14,32 +16,6 @@ _ACCURACY = 5e-4  # in these units
 _STEP_SIZE = 0.01  # of the solver; found by trial, and fixed, for its own choice depends on the clock
 _MOST_STEPS = 400
 _STEP = 0.02  # to which the matrices are rounded, for they hardly change and are costly to factorise
-
-
-@dataclass(frozen=True)
-class Cascade:
-    """What a drive gives per inertia that it is tuned for: accelerations for an error."""
-
-    proportional: float  # 1/s^2
-    derivative: float  # 1/s
-    integral: float  # 1/s^3
-
-
-@dataclass(frozen=True)
-class Forecast:
-    """The next n ticks of six motors; torques are divided by the inertia that the drives are tuned for.
-
-    An error is the command less the motor.
-    """
-
-    error: np.ndarray  # rad now, (6,)
-    error_rate: np.ndarray  # rad/s now, (6,)
-    integral: np.ndarray  # rad/s^2, what the integrals of the drives give now, (6,)
-    inertia: np.ndarray  # share of the one that drives are tuned for, (6,)
-    friction_slope: np.ndarray  # 1/s, by which friction damps deviations, at each tick, (n, 6)
-    disturbance: np.ndarray  # rad/s^2, what the motors need beyond the feedforward, (n, 6)
-    lower: np.ndarray  # rad/s^2, of the correction; as the upper one where it is under way already, (n, 6)
-    upper: np.ndarray  # rad/s^2, (n, 6)
 
 
 class CorrectionProgram:
@@ -54,7 +30,7 @@ class CorrectionProgram:
     drive's integral gives, b the slope of friction at the planned speed and d the disturbance. All unknowns
     of a tick are tied to the two ticks before alone, so the matrices are banded, and a solver for sparse
     problems takes time in proportion to the ticks. It begins from nothing each time: what comes out depends
-    on the forecast alone.
+    on the forecast alone. It is asked only where `FreeOptimum`, which is quicker, is out of bounds.
     """
 
     def __init__(self, cascade: Cascade, smoothness: float, period: float, ticks: int) -> None:
@@ -68,6 +44,7 @@ class CorrectionProgram:
         """
         self.ticks, self._period, self._cascade = ticks, period, cascade
         self._unit = _ERROR_UNIT * cascade.proportional  # rad/s^2, of torques
+        self._free = FreeOptimum(cascade, smoothness, period, ticks)
         self._layout()
         size = _PER_TICK * ticks * NUM_JOINTS
         differences = sparse.eye(ticks - 1, ticks, k=1) - sparse.eye(ticks - 1, ticks)
@@ -98,6 +75,13 @@ class CorrectionProgram:
 
     def solve(self, forecast: Forecast) -> np.ndarray | None:
         """The corrections in rad/s^2 at all ticks, (n, 6); None if the solver finds none."""
+        free = self._free.solve(forecast)
+        if ((free >= forecast.lower) & (free <= forecast.upper)).all():
+            return free
+        return self.bounded(forecast)
+
+    def bounded(self, forecast: Forecast) -> np.ndarray | None:
+        """The same, by the solver whether a bound is in the way or not."""
         inertia = _in_steps(forecast.inertia, 1.0)
         slope = _in_steps(forecast.friction_slope, self._cascade.derivative)
         lower, upper = self._bounds(replace(forecast, inertia=inertia, friction_slope=slope))

@@ -5,7 +5,8 @@ import pytest
 from scipy.optimize import lsq_linear
 
 from robots.description.model import NUM_JOINTS
-from systems.feedforward.predictive.program import Cascade, CorrectionProgram, Forecast
+from systems.feedforward.predictive.forecast import Cascade, Forecast
+from systems.feedforward.predictive.program import CorrectionProgram
 
 CASCADE, T, TICKS, SMOOTHNESS = Cascade(3500.0, 100.0, 25000.0), 4e-3, 12, 1e-3
 
@@ -72,6 +73,17 @@ def test_the_banded_solution_is_the_dense_one(limit: float):
         if limit < 1.0:
             assert (np.abs(wanted) > 0.99 * limit).any()
         assert found == pytest.approx(wanted, abs=5e-3)
+
+
+def test_without_bounds_in_the_way_no_solver_is_needed():
+    """The free optimum is what the solver finds, to its accuracy, and is the dense one to rounding."""
+    program, rng = CorrectionProgram(CASCADE, SMOOTHNESS, T, TICKS), np.random.default_rng(2)
+    for _ in range(10):
+        of = forecast(rng, 100.0)
+        free, bounded = program.solve(of), program.bounded(of)
+        assert free == pytest.approx(bounded, abs=5e-3)
+        wanted = np.array([dense_solution(of, joint) for joint in range(NUM_JOINTS)]).T
+        assert free == pytest.approx(wanted, abs=1e-7)
 
 
 def test_motors_on_their_commands_are_left_alone():
