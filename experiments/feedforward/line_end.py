@@ -1,6 +1,10 @@
-"""What is left when a straight line ends: how far motors and tip still are from where they come to rest."""
+"""What is left when a straight line ends: how far motors and tip still are from where they come to rest.
 
-import sys
+``python -m experiments.feedforward.line_end [--payload SHARE] [--draws N] [ROBOT...]`` drives the realistic
+robots, with the plain ones believed and with what an identification may find of the true ones.
+"""
+
+import argparse
 import time
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
@@ -13,6 +17,7 @@ from pydrake.systems.framework import DiagramBuilder
 from diagrams.runs.simulation import run
 from diagrams.scenario.controller_model import controller_model
 from diagrams.scenario.scenario import Scenario
+from experiments.feedforward.identified_beliefs import believed
 from experiments.feedforward.rectangle import (
     LAW,
     RectangleTrial,
@@ -21,7 +26,7 @@ from experiments.feedforward.rectangle import (
     rectangle_scenario,
     working_position,
 )
-from robots.description.model import NUM_JOINTS, load_robot
+from robots.description.model import NUM_JOINTS, RobotModel, load_robot
 from robots.kinematics.forward import Kinematics
 from systems.feedforward import FeedforwardConfig
 from systems.feedforward.predictive.config import PredictiveConfig
@@ -30,13 +35,14 @@ from systems.reference.reference import Reference
 from systems.reference.shapes import Rectangle
 from systems.samples import JointSample
 
-_SETTLE, _DWELL = 0.6, 0.6  # s at rest: the arm is first wound up, then comes to rest
+_SETTLE, _DWELL = 1.0, 0.6  # s at rest: the arm is first wound up, then comes to rest
 _JUST_AFTER = 0.2  # s
 _TIMED = 600  # ticks
 _BEHIND, _WAVES = 1e-4, 20.0  # rad and rad/s: how motors stray while a tick is timed
 _EDGES = 4
 _ROBOTS = ("kr16", "kr210")
-KIND = "elastic_structure"  # of the inverse model
+KIND, CORRECTED = "elastic_structure", "corrected"  # of inverse models
+_DRAWS = 4  # of what an identification may find
 PACE = 40.0  # 1/s^2, k_a, where joints are quick enough for it
 
 
@@ -54,6 +60,7 @@ class LineEnd:
 
     motors: Rest  # of a rigid robot's tip on the motors from where the commands have it
     tip: Rest  # of the true tip from where it comes to rest
+    path: Rest  # of the true tip from the end of its path
 
 
 def line_scenario(trial: RectangleTrial, edge: int, pace: float = PACE) -> Scenario:
@@ -82,7 +89,8 @@ def line_end(trial: RectangleTrial, scenario: Scenario) -> LineEnd:
     motors = np.array([kinematics.forward(theta)[:3, 3] for theta in log.joint_position[after]])
     tip = log.X_WE_true[after, :3, 3]
     soon = log.time[after] <= log.dwell_start + scenario.reference.preview + _JUST_AFTER
-    return LineEnd(_rest(motors - wanted, soon), _rest(tip - tip[-1], soon))
+    gap = tip - log.X_WE_desired[after, :3, 3]
+    return LineEnd(_rest(motors - wanted, soon), _rest(tip - tip[-1], soon), _rest(gap, soon))
 
 
 def tick_time(trial: RectangleTrial) -> float:
@@ -121,32 +129,71 @@ def _rest(gap: np.ndarray, soon: np.ndarray) -> Rest:
 
 
 def trials(name: str, plant: str | None = None) -> tuple[RectangleTrial, RectangleTrial]:
-    """Without and with the predictive correction, with the largest payload and another robot in the station.
+    """Without and with the predictive correction of the motors, with the largest payload.
 
     Args:
         name: of the robot that the controller believes in.
         plant: of the true one; None for its realistic variant.
     """
-    robot, true = load_robot(name), load_robot(plant or f"{name}-realistic")
-    configs = (FeedforwardConfig(KIND), FeedforwardConfig(KIND, predictive=PredictiveConfig("motors")))
-    without, corrected = (RectangleTrial(robot, robot.payload.largest_mass, each, true) for each in configs)
+    true = load_robot(plant or f"{name}-realistic")
+    without, corrected = (trial(load_robot(name), true, KIND, kind) for kind in ("none", "motors"))
     return without, corrected
 
 
-def rows(name: str) -> Iterator[str]:
-    """A line of text for each edge, without and with the correction, then the time of a tick."""
-    pair = trials(name)
+def trial(
+    believed: RobotModel, true: RobotModel, kind: str, predictive: str, share: float = 1.0
+) -> RectangleTrial:
+    """A trial with a share of the largest payload.
+
+    Args:
+        believed: the robot of the controller.
+        true: the one in the station.
+        kind: of the inverse model.
+        predictive: kind of the predictive correction beside it.
+        share: of the largest payload.
+    """
+    config = FeedforwardConfig(kind, predictive=PredictiveConfig(predictive))
+    return RectangleTrial(believed, share * true.payload.largest_mass, config, true)
+
+
+def rows(name: str, share: float = 1.0, draws: int = _DRAWS) -> Iterator[str]:
+    """A line of text for each edge, belief and inverse model, the worst of the draws, the time of a tick."""
+    true = load_robot(f"{name}-realistic")
+    plain = load_robot(name)
     for edge in range(_EDGES):
-        for label, trial in zip(("alone", "corrected"), pair, strict=True):
-            found = line_end(trial, line_scenario(trial, edge))
-            values = (found.motors.largest, found.motors.effective, found.tip.largest, found.tip.effective)
-            text = "".join(f"{1e3 * value:9.3f}" for value in values)
-            yield f"{name:6} line {edge + 1} {label:10} {text} mm"
-    yield f"{name:6} a tick of the correction {1e3 * tick_time(pair[1]):.2f} ms"
+        for label, kind in (("alone", "none"), ("motors", "motors")):
+            yield _row(name, edge, "plain", label, _values(trial(plain, true, KIND, kind, share), edge))
+        worst = {}
+        for draw in range(1, draws + 1):
+            belief = believed(true, draw)
+            for label, kind, beside in (("alone", KIND, "none"), ("corrected", CORRECTED, "motors")):
+                values = _values(trial(belief, true, kind, beside, share), edge)
+                worst[label] = np.maximum(worst.get(label, 0.0), values)
+                yield _row(name, edge, f"draw {draw}", label, values)
+        for label, values in worst.items():
+            yield _row(name, edge, "worst", label, values)
+    yield f"{name:6} a tick of the correction {1e3 * tick_time(trials(name)[1]):.2f} ms"
+
+
+def _values(trial: RectangleTrial, edge: int) -> np.ndarray:
+    found = line_end(trial, line_scenario(trial, edge))
+    return np.array(
+        [[each.largest, each.effective] for each in (found.motors, found.tip, found.path)]
+    ).ravel()
+
+
+def _row(name: str, edge: int, belief: str, label: str, values: np.ndarray) -> str:
+    text = "".join(f"{1e3 * value:9.3f}" for value in values)
+    return f"{name:6} line {edge + 1} {belief:7} {label:10} {text} mm"
 
 
 if __name__ == "__main__":
-    print(f"{'':25}{'motors: largest, effective':>20}{'tip: largest, effective':>26}")
-    for robot in sys.argv[1:] or _ROBOTS:
-        for row in rows(robot):
+    parser = argparse.ArgumentParser()
+    parser.add_argument("robots", nargs="*", default=_ROBOTS)
+    parser.add_argument("--payload", type=float, default=1.0, help="share of the largest one")
+    parser.add_argument("--draws", type=int, default=_DRAWS, help="of what an identification may find")
+    chosen = parser.parse_args()
+    print(f"{'largest and effective':30}{'of the motors':>18}{'of the tip':>18}{'from its path':>18}")
+    for robot in chosen.robots:
+        for row in rows(robot, chosen.payload, chosen.draws):
             print(row, flush=True)

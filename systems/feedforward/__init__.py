@@ -10,6 +10,7 @@ FEEDFORWARDS = NamedClasses(
         "rigid": "systems.feedforward.rigid:RigidFeedforward",
         "flexible_joint": "systems.feedforward.flexible_joint:FlexibleJointFeedforward",
         "elastic_structure": "systems.feedforward.elastic_structure:ElasticStructureFeedforward",
+        "corrected": "systems.feedforward.corrected_inverse.corrected:CorrectedFeedforward",
         "stable": "systems.feedforward.stable_inverse.stable:StableFeedforward",
     },
 )

@@ -249,12 +249,14 @@ class Feedforward(LeafSystem):
         return q if self._sag is None else self._sag.link_positions(q)
 
     def _joint_reference(self, context: Context, q: np.ndarray) -> JointReference:
-        """Two derivatives of the path in joint positions, from its twist and acceleration."""
+        return self.moving_reference(q, self._V_WD.Eval(context), self._A_WD.Eval(context))
+
+    def moving_reference(self, q: np.ndarray, V_WE: np.ndarray, A_WE: np.ndarray) -> JointReference:
+        """Two derivatives of the path in joint positions (rad) from its twist and acceleration, (6,)."""
         J = self._kinematics.jacobian(q)
-        velocity = robust_solve(J, self._V_WD.Eval(context))
+        velocity = robust_solve(J, V_WE)
         change = (self._kinematics.jacobian(q + _SMALL_TURN * velocity) - J) @ velocity / _SMALL_TURN
-        acceleration = robust_solve(J, self._A_WD.Eval(context) - change)
-        return JointReference(q, velocity, acceleration)
+        return JointReference(q, velocity, robust_solve(J, A_WE - change))
 
     @staticmethod
     def _filtered(
