@@ -2,8 +2,10 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
+from scipy.linalg import cholesky, solve_triangular
 from scipy.optimize import least_squares
 
 from robots.identification.arm_response import ArmResponse, Response
@@ -125,32 +127,25 @@ class ArmProblem:
         # that is believed they are shares of a spring, whatever logarithms the dampers have.
         origin = np.append(prior.start, np.zeros(cases)) - 1.0
         sigma = np.append(prior.prior_sigma, np.full(cases, _SHIFT))
-        rows = self.measured.size
-        J = np.zeros((rows + n + cases, n + cases))
-        J[:rows, n:] = self._shift_columns(spread).reshape(rows, cases)
-        J[rows:] = np.diag(1.0 / sigma)
-
-        def residuals(x: np.ndarray) -> np.ndarray:
-            at = x + origin
-            left = self._shifted(at[:n], at[n:]) / spread
-            return np.concatenate([left.ravel(), (x - 1.0) / sigma])
-
-        def jacobian(x: np.ndarray) -> np.ndarray:
-            J[:rows, :n] = self._whitened((x + origin)[:n], spread).reshape(rows, n)
-            return J.copy()  # scipy weighs it in place
-
         lower, upper = (
             np.append(limit, np.full(cases, sign * np.inf))
             for limit, sign in ((prior.lower, -1.0), (prior.upper, 1.0))
         )
+
+        @lru_cache(maxsize=2)  # scipy asks for residuals and derivatives apart
+        def condensed(x: tuple[float, ...]) -> tuple[np.ndarray, np.ndarray]:
+            at = np.array(x) + origin
+            pull, information, cost = self._normal_equations(at[:n], at[n:], spread)
+            off = (np.array(x) - 1.0) / sigma
+            information += np.diag(1.0 / sigma**2)
+            return _condensed(pull + off / sigma, information, cost + off @ off)
+
         start = np.append(np.clip(p, prior.lower + 1e-9, prior.upper - 1e-9), np.zeros(cases))
         found = least_squares(
-            residuals,
+            lambda x: condensed(tuple(x))[0].copy(),
             start - origin,
-            jacobian,  # pyright: ignore[reportArgumentType]  # its stub knows names alone
+            lambda x: condensed(tuple(x))[1].copy(),  # pyright: ignore[reportArgumentType]  # its stub knows names alone
             bounds=(lower - origin, upper - origin),
-            loss="soft_l1",
-            f_scale=_ROBUST,
             max_nfev=steps,
             xtol=tolerance,
             ftol=0.01 * tolerance,  # of a sum that is noise for the most part
@@ -159,6 +154,37 @@ class ArmProblem:
         )
         values = found.x + origin
         return values[:n], values[n:]
+
+    def _normal_equations(
+        self, p: np.ndarray, shift: np.ndarray, spread: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray, float]:
+        """Gradient, Gauss and Newton's approximation of the Hessian, and sum of squares, by p and the lags.
+
+        Large residuals count less, as soft_l1 of scipy has it: a residual r in units of its spread is taken
+        for the g with g^2 = 2 c^2 (sqrt(1 + (r/c)^2) - 1). Case by case, so that no matrix is as long as all
+        readings.
+        """
+        sensitivity = self._response(p, True).sensitivity
+        assert sensitivity is not None
+        residuals = self._shifted(p, shift) / spread
+        root = np.sqrt(1.0 + np.square(residuals / _ROBUST))
+        # g / r, which does not cancel where r is small; then d(g) / d(r) = r / (root g).
+        ratio = np.sqrt(2.0 / (1.0 + root))
+        slope = 1.0 / (root * ratio)
+        weight = slope * self._known / spread
+        n, clocks = len(p), len(shift)
+        pull, information = np.zeros(n + clocks), np.zeros((n + clocks, n + clocks))
+        for case in range(residuals.shape[1]):
+            J = sensitivity[:, case] * weight[:, case, :, None]
+            J = J.reshape(-1, n)
+            columns = np.arange(n)
+            if clocks:
+                J = np.column_stack([J, -(weight[:, case] * self._by_shift[:, case]).ravel()])
+                columns = np.append(columns, n + case)
+            part = part_of(J, (ratio[:, case] * residuals[:, case]).ravel())
+            pull[columns] += part.pull
+            information[np.ix_(columns, columns)] += part.information
+        return pull, information, float(np.square(ratio * residuals).sum())
 
     def _shifted(self, p: np.ndarray, shift: np.ndarray) -> np.ndarray:
         """Residuals, with readings of each case later by a shift in samples."""
@@ -230,6 +256,17 @@ def part_of(J: np.ndarray, residuals: np.ndarray) -> DataPart:
     """From whitened sensitivities, (..., n), and residuals, (...)."""
     flat = J.reshape(-1, J.shape[-1])
     return DataPart(residuals.ravel() @ flat, flat.T @ flat)
+
+
+def _condensed(pull: np.ndarray, information: np.ndarray, squares: float) -> tuple[np.ndarray, np.ndarray]:
+    """Residuals (n + 1,) and derivatives (n + 1, n) with this gradient, information and sum of squares.
+
+    What a least-squares solver needs of 100,000 readings is in them; it would decompose all of those.
+    """
+    R = cholesky(information)
+    projected = solve_triangular(R, pull, trans="T")
+    left = max(squares - projected @ projected, 0.0)
+    return np.append(projected, np.sqrt(left)), np.vstack([R, np.zeros(len(R))])
 
 
 def widest(ways: Sequence[np.ndarray]) -> np.ndarray:
