@@ -133,18 +133,18 @@ class ArmProblem:
         )
 
         @lru_cache(maxsize=2)  # scipy asks for residuals and derivatives apart
-        def condensed(x: tuple[float, ...]) -> tuple[np.ndarray, np.ndarray]:
+        def at_point(x: tuple[float, ...]) -> tuple[np.ndarray, np.ndarray]:
             at = np.array(x) + origin
-            pull, information, cost = self._normal_equations(at[:n], at[n:], spread)
+            pull, information, squares = self._normal_equations(at[:n], at[n:], spread)
             off = (np.array(x) - 1.0) / sigma
             information += np.diag(1.0 / sigma**2)
-            return _condensed(pull + off / sigma, information, cost + off @ off)
+            return condensed(pull + off / sigma, information, squares + float(off @ off))
 
         start = np.append(np.clip(p, prior.lower + 1e-9, prior.upper - 1e-9), np.zeros(cases))
         found = least_squares(
-            lambda x: condensed(tuple(x))[0].copy(),
+            lambda x: at_point(tuple(x))[0].copy(),
             start - origin,
-            lambda x: condensed(tuple(x))[1].copy(),  # pyright: ignore[reportArgumentType]  # its stub knows names alone
+            lambda x: at_point(tuple(x))[1].copy(),  # pyright: ignore[reportArgumentType]  # its stub knows names alone
             bounds=(lower - origin, upper - origin),
             max_nfev=steps,
             xtol=tolerance,
@@ -258,13 +258,13 @@ def part_of(J: np.ndarray, residuals: np.ndarray) -> DataPart:
     return DataPart(residuals.ravel() @ flat, flat.T @ flat)
 
 
-def _condensed(pull: np.ndarray, information: np.ndarray, squares: float) -> tuple[np.ndarray, np.ndarray]:
+def condensed(pull: np.ndarray, information: np.ndarray, squares: float) -> tuple[np.ndarray, np.ndarray]:
     """Residuals (n + 1,) and derivatives (n + 1, n) with this gradient, information and sum of squares.
 
     What a least-squares solver needs of 100,000 readings is in them; it would decompose all of those.
     """
     R = cholesky(information)
-    projected = solve_triangular(R, pull, trans="T")
+    projected = solve_triangular(R.T, pull, lower=True)
     left = max(squares - projected @ projected, 0.0)
     return np.append(projected, np.sqrt(left)), np.vstack([R, np.zeros(len(R))])
 

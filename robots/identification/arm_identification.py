@@ -139,7 +139,10 @@ class _Data:
         for joint in np.flatnonzero(free.any(axis=0)):
             kept = self.rests[:, joint].copy()
             for place in _PLACES:
-                self.rests[:, joint] = np.where(free[:, joint], place, kept)
+                tried = np.where(free[:, joint], place, kept)
+                if np.array_equal(tried, kept):
+                    continue
+                self.rests[:, joint] = tried
                 problem.set_rests(self.rests)
                 cost = problem.cost(p, spread)
                 better = cost < best

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from robots.identification.arm_fit import part_of, scatter, widest
+from robots.identification.arm_fit import condensed, part_of, scatter, widest
 
 ROWS, PARTS, DRAWS = 40, 6, 4000
 
@@ -56,3 +56,15 @@ def test_of_several_scatters_each_unknown_has_the_widest_and_they_stay_a_covaria
     found = widest(ways)
     np.testing.assert_allclose(np.diagonal(found), np.max([np.diagonal(way) for way in ways], axis=0))
     assert np.linalg.eigvalsh(found).min() > 0.0
+
+
+def test_condensed_residuals_have_the_same_squares_gradient_and_information():
+    rng = np.random.default_rng(3)
+    J, residuals = rng.normal(size=(500, 4)) * [1.0, 1e3, 1e-3, 1.0], rng.normal(size=500)
+    whole = part_of(J, residuals)
+    short, derivatives = condensed(whole.pull, whole.information, float(residuals @ residuals))
+    assert short.shape == (5,)
+    # Columns differ by 1e6 in size, of which the Cholesky factor loses nothing.
+    np.testing.assert_allclose(short @ short, residuals @ residuals, rtol=1e-12)
+    np.testing.assert_allclose(derivatives.T @ short, whole.pull, rtol=1e-9)
+    np.testing.assert_allclose(derivatives.T @ derivatives, whole.information, rtol=1e-9, atol=1e-9)
