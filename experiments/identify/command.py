@@ -240,7 +240,8 @@ def identify_command(
     _print(human, study)
     if study.fine_tuning is not None:
         human.print(_table(MOTIONS_HEAD, motion_rows(study.fine_tuning)))
-        human.print(_table(NUMBERS_HEAD, number_rows(study.fine_tuning)))
+        tuned = number_rows(study.fine_tuning)[: len(study.fine_tuning.changed)]  # the page has the others
+        human.print(_table(NUMBERS_HEAD, tuned))
     if searches:
         human.print(_table(SEARCH_HEAD, search_rows(searches)))
     print_files(human, report, write, write_table)

@@ -11,7 +11,7 @@ from experiments.identify.fine_tuning.motions import Size, TipMotion
 from experiments.identify.fine_tuning.tuning import FineTuning
 from experiments.report.plot_page import Section, html_table
 
-NUMBERS_HEAD = ["number", "change", "sigma before", "sigma", "tip per sigma", "of the plant"]
+NUMBERS_HEAD = ["number", "change", "sigma was", "sigma", "tip per sigma", "true"]
 MOTIONS_HEAD = ["motion", "measured before", "measured", "true before", "true"]
 _BEFORE, _AFTER = "#e0a43a", "#2f7fd0"
 _SMOOTH = 5  # samples, over which a measured deviation is averaged in its figure
@@ -127,7 +127,7 @@ def fine_tuning_sections(tuning: FineTuning) -> list[Section]:
             "What was tuned",
             f"Within {tuning.share:g} of what was identified and its inverse. A number stays where the "
             "motion hardly shows it. The inverse model is approximate: what is best for it need not be what "
-            "the plant has.",
+            "the plant has, whose change is in the last column where it has such a number.",
             html_table(NUMBERS_HEAD, number_rows(tuning)),
         ),
         Section(
