@@ -114,6 +114,34 @@ def accelerate(a, free, S, gears, turn, z, ripple, springs, x_p, v_p, h, found):
 
 
 @compiled
+def advance(state, S, motion, rest, torques, turn, z, h, found):
+    """One step of an arm by the trapezoidal rule, in place; what gears carry at its end comes into `found`.
+
+    Args:
+        state: deflections, their rates and accelerations, (e,) each.
+        S: what torques accelerate, (e, e).
+        motion: stiffness and Coriolis terms of the motion, (e, 2 e).
+        rest: turns at rest, (e,).
+        torques: what gives them: load in N m, (e,), ripple, linear springs and gears, see `accelerate`.
+        turn, z, found: of the gears, see `_solve_gears`.
+        h: step in s.
+    """
+    x, v, a = state
+    load, ripple, springs, gears = torques
+    e = len(x)
+    place = np.empty(2 * e)
+    for j in range(e):
+        place[j] = x[j] + h * v[j] + (0.5 - BETA) * h * h * a[j]
+        place[e + j] = v[j] + (1.0 - GAMMA) * h * a[j]
+    x_p, v_p = place[:e].copy(), place[e:].copy()
+    place[:e] -= rest
+    free = np.dot(S, -load - springs[0] * x_p - springs[1] * v_p - np.dot(motion, place))
+    accelerate(a, free, S, gears, turn, z, ripple, springs, x_p, v_p, h, found)
+    for j in range(e):
+        x[j], v[j] = x_p[j] + BETA * h * h * a[j], v_p[j] + GAMMA * h * a[j]
+
+
+@compiled
 def _subtract_explicit(rhs, gears, found, carried, columns, by, z, state):
     """Takes d(springs, dampers) / d(unknowns), with the motion as it is, from `rhs` (e, n).
 
@@ -276,7 +304,6 @@ def go_through(steps, posture, course, springs, gears, columns, start, low_pass,
     found, carried = np.zeros((_GEARS, 10)), np.empty((2, e))
     reading, last = np.empty((channels, 1)), np.empty((channels, 1))
     derivative, last_derivative = np.empty((channels, n)), np.empty((channels, n))
-    place = np.empty(2 * e)
     knot, last_close = 0, 0
     for step in range(len(load)):
         knot, share = place_of(at, knot, step)
@@ -285,15 +312,9 @@ def go_through(steps, posture, course, springs, gears, columns, start, low_pass,
             last_close, gone = place_of(close, last_close, step)
             between(inverse, last_close, gone, S)
             between(motion, knot, share, motion_now)
+            state, torques = (x, v, a), (load[step], ripple[step], springs, gears)
+            advance(state, S, motion_now, rest_now[0], torques, turn, z, h, found)
             for j in range(e):
-                place[j] = x[j] + h * v[j] + (0.5 - BETA) * h * h * a[j]
-                place[e + j] = v[j] + (1.0 - GAMMA) * h * a[j]
-            x_p, v_p = place[:e].copy(), place[e:].copy()
-            place[:e] -= rest_now[0]
-            free = np.dot(S, -load[step] - springs[0] * x_p - springs[1] * v_p - np.dot(motion_now, place))
-            accelerate(a, free, S, gears, turn, z, ripple[step], springs, x_p, v_p, h, found)
-            for j in range(e):
-                x[j], v[j] = x_p[j] + BETA * h * h * a[j], v_p[j] + GAMMA * h * a[j]
                 carried[0, j], carried[1, j] = springs[0, j] * x[j], springs[1, j] * v[j]
             if n:
                 _next_sensitivity(

@@ -6,7 +6,7 @@ numba takes a third of a second to import: `BelievedArm` imports this module whe
 import numpy as np
 
 from robots.identification.motion import BETA, GAMMA
-from robots.identification.response_kernels import accelerate, between, compiled, place_of
+from robots.identification.response_kernels import advance, between, compiled, place_of
 
 _GEARS = 6
 MOVED = 3  # axes whose motors move otherwise than planned: those that move the tip
@@ -42,7 +42,7 @@ def go_through(h, posture, load, offset, springs, gears, start, shapes, every, m
     Y, by = np.zeros((3 * e, n)), np.zeros((2, _GEARS, n))
     S, motion_now = np.empty((e, e)), np.empty((e, 2 * e))
     rest_now, lever = np.empty((1, e)), np.empty((3, e))
-    found, place = np.zeros((_GEARS, 10)), np.empty(2 * e)
+    found = np.zeros((_GEARS, 10))
     knot, last_close, first = 0, 0, 0
     while first < len(shapes) and not shapes[first].any():
         first += 1
@@ -53,15 +53,8 @@ def go_through(h, posture, load, offset, springs, gears, start, shapes, every, m
             between(inverse, last_close, gone, S)
             between(motion, knot, share, motion_now)
             between(rest, knot, share, rest_now)
-            for j in range(e):
-                place[j] = x[j] + h * v[j] + (0.5 - BETA) * h * h * a[j]
-                place[e + j] = v[j] + (1.0 - GAMMA) * h * a[j]
-            x_p, v_p = place[:e].copy(), place[e:].copy()
-            place[:e] -= rest_now[0]
-            free = np.dot(S, -load[step] - springs[0] * x_p - springs[1] * v_p - np.dot(motion_now, place))
-            accelerate(a, free, S, gears, turn, z, offset[step], springs, x_p, v_p, h, found)
-            for j in range(e):
-                x[j], v[j] = x_p[j] + BETA * h * h * a[j], v_p[j] + GAMMA * h * a[j]
+            state, torques = (x, v, a), (load[step], offset[step], springs, gears)
+            advance(state, S, motion_now, rest_now[0], torques, turn, z, h, found)
             if n and step >= first:
                 _next_derivatives(Y, by, S, motion_now, gears, found, springs, shapes[step], h)
             for j in range(_GEARS):
