@@ -29,3 +29,7 @@ class PackedLog:
         return log.sample_times().copy(), {
             name: part.T for name, part in zip(self._sizes, columns, strict=True)
         }
+
+    def clear(self, root_context: Context) -> None:
+        """Forgets what was logged so far."""
+        self._sink.FindMutableLog(root_context).Clear()

@@ -209,8 +209,13 @@ class Experiment:
         times, data = self._log.read(self.context)
         return times, {name: data[name] for name in (*OF_WATCH, "path_time", "truth.motor_state")}
 
+    def forget(self) -> None:
+        """Empties the record, so that memory stays flat over hours; `log` then begins here."""
+        self._log.clear(self.context)
+        self._predictions.clear()
+
     def log(self) -> RunLog:
-        """The record of what has happened so far."""
+        """The record of what has happened so far, or since `forget`."""
         times, data = self._log.read(self.context)
         record = self.station.record(times, data)
         path = played(self.path, times, data)
