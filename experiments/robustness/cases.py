@@ -3,6 +3,7 @@
 from experiments.robustness.study import Case
 
 _LATE = ("station.drive.dead_time=0.139", "servo.model.command_delay=0.14")
+# The controller goes on believing in 4 ms where a dead time is called unknown.
 _AT = 6.0  # s, an event on the move, on every path
 _EGM = 0.004032  # s, the period of the controller of scenario 'cell'
 
@@ -26,6 +27,8 @@ CASES = {
                 f"reference.preview={_EGM}",
             ),
         ),
+        Case("unknown-100ms", ("station.drive.dead_time=0.096",)),
+        Case("unknown-300ms", ("station.drive.dead_time=0.296",)),
         Case("slow-camera", (*_LATE, "station.camera.period=0.01", "station.camera.delay=0.02")),
         Case(
             "drop-outs",

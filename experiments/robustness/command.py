@@ -14,10 +14,9 @@ from experiments.cli.console import count, progress_bar, refusing
 from experiments.cli.json_output import human_console, json_output
 from experiments.cli.option_limits import at_least
 from experiments.cli.options import JobsOption, JsonOption, RobotOption, SchedulerOption, SetOption
-from experiments.comparison.compare import named_laws
-from experiments.report.style import law_title
 from experiments.robustness.cases import CASES
-from experiments.robustness.study import Case, judged, run_trials, trials
+from experiments.robustness.contenders import contenders
+from experiments.robustness.study import Case, judged, run_trials, trials, with_calibrated_robots
 from robots.configuration.suggestion import did_you_mean
 from systems.reference.paths import make_path
 
@@ -29,7 +28,12 @@ def robustness_command(
         str, typer.Option(metavar="NAME|FILE", help="Properties drawn at random for each seed.")
     ] = ("everything"),
     laws: Annotated[
-        str, typer.Option(metavar="A,B,...", help="Which laws, by name or as my_law.py:MyLaw.")
+        str,
+        typer.Option(
+            metavar="A,B,...",
+            help="Which laws, by name or as my_law.py:MyLaw; LAW+FEEDFORWARD has an inverse model beside it, "
+            "LAW@calibrated a robot that was calibrated before.",
+        ),
     ] = "open_loop,numerical_ik",
     cases: Annotated[
         str, typer.Option(metavar="A,B,...", help=f"Which disturbances: {', '.join(CASES)}; or all.")
@@ -52,9 +56,9 @@ def robustness_command(
         for name, value in (("--seeds", seeds), ("--laps", laps), ("--jobs", jobs)):
             at_least(name, 1, value)
         chosen = [_case(name, settings or []) for name in (CASES if cases == "all" else cases.split(","))]
-        named = named_laws(laws)
+        compared = contenders(laws)
         drawn = range(first_seed, first_seed + seeds)
-        todo = trials(scenario, chosen, named, drawn, paths.split(","), laps, robot)
+        todo = trials(scenario, chosen, compared, drawn, paths.split(","), laps, robot)
         for trial in todo:
             if trial.seed == first_seed:  # what cannot run is refused before anything does
                 make_path(trial.load().reference)
@@ -62,17 +66,20 @@ def robustness_command(
         with (
             json_output(json_file) as output,
             output.staged(),
-            progress_bar(f"{count(len(todo), 'run')} {where.place(len(todo))}") as progress,
         ):
-            rows = run_trials(todo, where, progress)
+            if any(contender.is_calibrated for contender in compared):
+                with progress_bar(f"calibrating {count(seeds, 'robot')}") as progress:
+                    todo = with_calibrated_robots(todo, tuple(settings or ()), where, progress)
+            with progress_bar(f"{count(len(todo), 'run')} {where.place(len(todo))}") as progress:
+                rows = run_trials(todo, where, progress)
             results = [
                 {"case": case.name, "law": law, **judged(matching)}
                 for case in chosen
-                for law in named
+                for law in (contender.text for contender in compared)
                 if (matching := [row for row in rows if (row["case"], row["law"]) == (case.name, law)])
             ]
             output.write({"scenario": scenario, "robot": robot, "results": results, "runs": rows})
-    _print(human, scenario, results)
+    _print(human, scenario, results, {contender.text: contender.title for contender in compared})
 
 
 def _case(name: str, settings: list[str]) -> Case:
@@ -82,7 +89,7 @@ def _case(name: str, settings: list[str]) -> Case:
     return replace(CASES[name], settings=(*CASES[name].settings, *settings))
 
 
-def _print(console: Console, scenario: str, results: list[dict[str, Any]]) -> None:
+def _print(console: Console, scenario: str, results: list[dict[str, Any]], titles: dict[str, str]) -> None:
     table = Table(
         box=box.SIMPLE_HEAD,
         title=f"Scenario {escape(scenario)}: true error, worst (median)",
@@ -94,7 +101,7 @@ def _print(console: Console, scenario: str, results: list[dict[str, Any]]) -> No
     for name in ("lap", "mm", "°", "at rest mm", *(["mm after event"] if has_events else [])):
         table.add_column(name, justify="right", no_wrap=name != "mm after event")
     for result in results:
-        label = f"{escape(result['case'])}, {escape(law_title(result['law']))}"
+        label = f"{escape(result['case'])}, {escape(titles[result['law']])}"
         laps = result.get("laps", [])
         for number, lap in enumerate(laps, 1):
             is_last = number == len(laps)
@@ -105,7 +112,7 @@ def _print(console: Console, scenario: str, results: list[dict[str, Any]]) -> No
             table.add_row(label if number == 1 else "", *cells)
     console.print(table)
     for result in results:
-        label = f"{escape(result['case'])}, {escape(law_title(result['law']))}"
+        label = f"{escape(result['case'])}, {escape(titles[result['law']])}"
         if "coverage" in result:
             smallest, of_all = result["coverage"]
             console.print(f"{label}: in the predicted 95 % ellipsoid {of_all:.3f}, worst run {smallest:.3f}")

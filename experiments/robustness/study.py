@@ -13,7 +13,11 @@ from experiments.cli.workers import Executor, LocalProcesses, Progress, in_order
 from experiments.comparison.compare import simulating
 from experiments.metrics.laps import lap_metrics
 from experiments.metrics.run_metrics import error_metrics, pose_errors
-from robots.description.model import load_robot
+from experiments.robustness.calibrated import calibrated_robots
+from experiments.robustness.contenders import Contender
+from robots.description.model import RobotModel, load_robot
+
+_NOTHING_BESIDE = Contender("open_loop", "open_loop")
 
 
 @dataclass(frozen=True)
@@ -31,11 +35,12 @@ class Trial:
 
     scenario: str
     case: Case
-    law: str
+    contender: Contender
     seed: int
     path: str
     laps: int
     robot: str | None = None  # in place of the scenario's, which is carried over to it
+    calibrated: RobotModel | None = None  # as the controller knows it
 
     @property
     def settings(self) -> list[str]:
@@ -43,6 +48,7 @@ class Trial:
         drawn = ("seed", "station.errors.random.seed", "station.variation.seed")
         return [
             *self.case.settings,
+            *self.contender.settings,
             *(f"{name}={self.seed}" for name in drawn),
             f"reference.path={self.path}",
             f"reference.laps={self.laps}",
@@ -61,7 +67,7 @@ class Trial:
 def trials(
     scenario: str,
     cases: Sequence[Case],
-    laws: Sequence[str],
+    compared: Sequence[Contender],
     seeds: Sequence[int],
     paths: Sequence[str],
     laps: int = 1,
@@ -69,11 +75,41 @@ def trials(
 ) -> list[Trial]:
     """All combinations, seed by seed, so that the first results are of all laws."""
     return [
-        Trial(scenario, case, law, seed, path, laps, robot)
+        Trial(scenario, case, contender, seed, path, laps, robot)
         for case in cases
         for seed in seeds
         for path in paths
-        for law in laws
+        for contender in compared
+    ]
+
+
+def with_calibrated_robots(
+    todo: Sequence[Trial],
+    settings: tuple[str, ...],
+    executor: Executor,
+    progress: Callable[[float], None] | None = None,
+) -> list[Trial]:
+    """Calibrates the robots of all trials that want one, each where nothing but its errors disturbs it.
+
+    Args:
+        todo: the trials.
+        settings: of the scenario, whatever the case.
+        executor: where the measurements are simulated.
+        progress: is called now and then with the share that is done, 0 to 1.
+
+    Raises:
+        SimulationError: if a simulation broke off.
+        ValueError: if the measurements do not determine a robot.
+    """
+    measured = {
+        trial.seed: replace(trial, case=Case("measured", settings), contender=_NOTHING_BESIDE).load()
+        for trial in todo
+        if trial.contender.is_calibrated
+    }
+    robots = calibrated_robots(measured, executor, progress)
+    return [
+        replace(trial, calibrated=robots[trial.seed]) if trial.contender.is_calibrated else trial
+        for trial in todo
     ]
 
 
@@ -95,14 +131,14 @@ def run_trial(trial: Trial, progress: Progress) -> dict[str, Any]:
     """The numbers of one run; of one that broke off, ``failure`` in place of numbers."""
     row: dict[str, Any] = {
         "case": trial.case.name,
-        "law": trial.law,
+        "law": trial.contender.text,
         "seed": trial.seed,
         "path": trial.path,
         "failure": None,
     }
     try:
-        with simulating(trial.law, trial.seed):
-            log = run(trial.load(), trial.law, progress=progress)
+        with simulating(trial.contender.text, trial.seed):
+            log = run(trial.load(), trial.contender.law, trial.calibrated, progress=progress)
     except RuntimeError as error:  # a SimulationError; the others shall go on
         return row | {"failure": str(error)}
     errors = error_metrics(log, "true")

@@ -8,16 +8,18 @@ import pytest
 
 from diagrams.scenario.scenario import load_scenario
 from experiments.robustness.cases import CASES
+from experiments.robustness.contenders import contenders
 from experiments.robustness.study import Case, judged, trials
 from systems.reference.paths import make_path
 from systems.reference.shapes import Circle
 from tests.experiments.commands import refusal, truetip
 
 QUICK = ["reference.settle=0", "reference.dwell=0.5", "reference.acceleration=8", "station.elasticity=rigid"]
+OPEN_LOOP = contenders("open_loop")
 
 
 def test_every_case_is_a_scenario_and_only_the_seed_draws_the_robot():
-    for trial in trials("everything", list(CASES.values()), ["open_loop"], [3], ["circle"], laps=2):
+    for trial in trials("everything", list(CASES.values()), OPEN_LOOP, [3], ["circle"], laps=2):
         scenario = load_scenario(trial.scenario, trial.settings)
         station = scenario.station
         assert (scenario.seed, station.errors.random.seed, station.variation.seed) == (3, 3, 3)
@@ -54,12 +56,25 @@ def test_without_a_single_run_there_are_only_failures():
 
 
 def test_a_case_is_a_name_and_settings():
-    trial = trials("misaligned", [Case("loaded", ("station.payload=3",))], ["pbvs"], [7], ["rectangle"])[0]
+    trial = trials(
+        "misaligned", [Case("loaded", ("station.payload=3",))], contenders("pbvs"), [7], ["rectangle"]
+    )[0]
     assert load_scenario(trial.scenario, trial.settings).station.payload == 3.0
 
 
+def test_a_law_may_have_an_inverse_model_and_a_calibrated_robot():
+    names = "pbvs, pbvs+flexible_joint, open_loop+rigid@calibrated, pbvs@calibrated"
+    plain, beside, all_of_it, known = contenders(names)
+    assert (plain.law, plain.feedforward, plain.is_calibrated, plain.settings) == ("pbvs", None, False, ())
+    assert (beside.law, beside.feedforward) == ("pbvs", "flexible_joint")
+    assert load_scenario("misaligned", list(beside.settings)).servo.feedforward.kind == "flexible_joint"
+    assert (all_of_it.law, all_of_it.feedforward, all_of_it.is_calibrated) == ("open_loop", "rigid", True)
+    assert (known.law, known.is_calibrated) == ("pbvs", True)
+    assert len({each.title for each in (plain, beside, all_of_it, known)}) == 4
+
+
 def test_another_robot_gets_the_path_and_the_load_of_its_own_size():
-    (trial,) = trials("everything", [CASES["plain"]], ["open_loop"], [3], ["rectangle"], robot="kr16")
+    (trial,) = trials("everything", [CASES["plain"]], OPEN_LOOP, [3], ["rectangle"], robot="kr16")
     own, drawn = load_scenario(trial.scenario, trial.settings), trial.load()
     assert drawn.robot == "kr16"
     assert drawn.station.payload == pytest.approx(own.station.payload * 16.0 / 7.0)
@@ -96,6 +111,19 @@ def test_the_command_prints_a_row_of_each_law_and_writes_the_numbers(tmp_path: P
 
 
 @pytest.mark.slow
+def test_a_robot_that_was_calibrated_before_keeps_the_open_loop_near_its_path(tmp_path: Path):
+    """What is left is the sag of the gears that the controller believes in and this rigid plant has not."""
+    file, laws = tmp_path / "numbers.json", "open_loop,open_loop@calibrated"
+    settings = [part for setting in QUICK for part in ("--set", setting)]
+    options = ["--paths", "circle", "--seeds", 1, "--jobs", 1, "--json", file]
+    result = truetip("robustness", "--laws", laws, *options, *settings)
+    assert result.exit_code == 0, result.output
+    drawn, known = json.loads(file.read_text())["results"]
+    assert drawn["static_mm"][0] > 5.0
+    assert known["static_mm"][0] < 0.05 * drawn["static_mm"][0]
+
+
+@pytest.mark.slow
 def test_what_is_left_after_an_event_is_told(tmp_path: Path):
     file = tmp_path / "numbers.json"
     settings = [part for setting in ["reference.settle=5.8", *QUICK[1:]] for part in ("--set", setting)]
@@ -111,6 +139,8 @@ def test_what_is_left_after_an_event_is_told(tmp_path: Path):
     [
         (["--cases", "earthquake"], "--cases: must be of plain, 140ms"),
         (["--laws", "nothing"], "nothing"),
+        (["--laws", "pbvs+elastic"], "'pbvs+elastic': behind + stands one of"),
+        (["--laws", "pbvs@calibrated,pbvs@calibrated"], "'pbvs@calibrated' is there twice"),
         (["--seeds", 0], "--seeds"),
         (["--paths", "spiral"], "spiral"),
         (["--robot", "kr17"], "kr17"),
