@@ -1,5 +1,6 @@
 """What a fit of an elastic arm says of the robot: parameters with their uncertainty, and a robot file."""
 
+import math
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -65,13 +66,24 @@ def found_parameters(robot: RobotModel, fit: ArmFit, plant: RobotModel | None = 
             )
         )
     rows += _times(fit, true)
+    of_springs = gear_spring_sigmas(fit)
     for kind, unit, size in (("play", "rad", PLAY), ("hysteresis", "share", 1.0)):
         for joint, place in enumerate(parameters.of_kind(kind)):
             value, sigma = size * float(fit.values[place]), size * float(fit.sigma[place])
+            if kind == "hysteresis":
+                # A gear that hardly slips shows spring and hysteresis together, k (1 + h): where that is
+                # right, what is wrong with k is made up for by h.
+                sigma = math.hypot(sigma, (1.0 + value) * of_springs[joint])
             of_plant = None if true is None else float(getattr(true, kind)[joint])
             name = f"{kind}_gear_{joint + 1}"
             rows.append(FoundParameter(name, unit, value, sigma, sigma < _PART_KNOWN * abs(value), of_plant))
     return rows
+
+
+def gear_spring_sigmas(fit: ArmFit) -> dict[int, float]:
+    """Relative standard deviations of the springs of gears by joint, from 0 on."""
+    springs = enumerate(fit.parameters.springs)
+    return {spring.joint: float(fit.sigma[k]) for k, spring in springs if spring.part == "gear"}
 
 
 def _times(fit: ArmFit, true: "_True | None") -> list[FoundParameter]:
