@@ -1,8 +1,10 @@
 """What gears add to the angle of a joint beyond their springs, as linear columns: waves, gap, hysteresis."""
 
+import math
 from types import SimpleNamespace
 
 import numpy as np
+from scipy.special import erf
 
 from robots.description.model import NUM_JOINTS, RobotModel
 from systems.estimation import kernels
@@ -18,6 +20,8 @@ NUM_STATES = 3 * NUM_JOINTS  # the last three shapes of each joint
 # millimetre; and beside the teeth a hysteresis of a tenth of the gear's stiffness, which turns over within
 # half a milliradian. Where there is none the other column fits, where there is half of it the mean of both.
 _GAP = Gap(half=5e-5, impulse=2e-3, held=0.1, width=5e-4)
+_OTHERWISE = 0.1  # of the size of gear errors, what they have of other shapes than these; assumed
+_LEAST_TORQUE = 1e-6  # N m, so that a gear which nothing holds has a side
 
 
 class GearErrors:
@@ -50,6 +54,32 @@ class GearErrors:
         kernels.gears.step(self._compliance, _GAP, torque, float(duration), is_first, memory.state)
         memory.started[0] = 1.0
         return memory.state[1:].flatten()
+
+    def variances(
+        self, sizes: np.ndarray, states: np.ndarray, torque: np.ndarray, spread: float
+    ) -> np.ndarray:
+        """What the shapes may be off by, rad^2, (6,).
+
+        Which side teeth lie against is as uncertain as what pushes them there: the load, and half of what the
+        hysteresis carries, give or take as much as it carries, since how much of it stands beside the teeth
+        is not known, and what its spring takes up while they cross. Their position, between -1 and 1, is
+        expected at e, with the variance 1 - e^2 about it, and is off by (s - e)^2 + 1 - e^2 from where the
+        model has it, s.
+
+        Args:
+            sizes: of the shapes in rad, (7, 6).
+            states: as `step` gave them.
+            torque: of the gears in N m, (6,).
+            spread: of the sizes, as it was believed before, rad.
+        """
+        hysteresis, *teeth = states.reshape(3, NUM_JOINTS)
+        gap, spring = sizes[-2:].sum(axis=0), _GAP.held / self._compliance
+        carried = spring * _GAP.width * hysteresis
+        unsure = np.maximum(np.hypot(carried, 2.0 * spring * gap), _LEAST_TORQUE)
+        expected = -erf((torque + 0.5 * carried) / (math.sqrt(2.0) * unsure))
+        position = (sizes[-2:] * teeth).sum(axis=0)  # times the gap
+        off = (position - gap * expected) ** 2 + gap**2 * (1.0 - expected**2)
+        return off + (_OTHERWISE * spread) ** 2
 
     def shapes(self, theta: np.ndarray, states: np.ndarray) -> np.ndarray:
         """The shapes at motor positions in rad (6,), shape (7, 6).

@@ -25,7 +25,7 @@ from systems.estimation.gear_errors import NUM_SHAPES, NUM_STATES
 from systems.estimation.keyframes import Keyframes, keyframe_row, open_keyframe
 from systems.estimation.memory import Layout
 from systems.estimation.tip_model import NO_SHAPES, Prediction, Spread, TipModel, moved
-from systems.estimation.unmodelled import Unmodelled
+from systems.estimation.unmodelled import Doubts, Unmodelled
 
 _AGAIN = 500  # samples, in which a second event says that the first was explained wrongly
 _OF_THE_LOAD = 0.1  # of its spread, when a tool was displaced
@@ -183,25 +183,25 @@ class TipEstimator:
     def tip_covariance(self, memory: SimpleNamespace, pair: Pair) -> np.ndarray:
         """Covariance of the predicted tip, rotation (rad^2) first, shape (6, 6).
 
-        To what the unknowns may be wrong by, H P H^T, the steps of the encoders add J S J^T, and the camera
-        what it sees that no unknown describes. As long as
-        nothing tells a displaced tool from a camera that was moved, the tip is where it is seen or, as
-        likely, where it would be without the step: with the way d from there, that adds d d^T / 2.
+        To what the unknowns may be wrong by, H P H^T, the steps of the encoders and what gears may be off
+        by add J S J^T, and the camera what it sees beyond all that. As long as nothing tells a displaced
+        tool from a camera that was moved, the tip is where it is seen or, as likely, where it would be
+        without the step: with the way d from there, that adds d d^T / 2.
         """
-        H = self.predict(memory, pair).H[0]
-        J = self._jacobian(memory, pair) * pair.rounding
-        covariance = H @ self.covariance_of_robot(memory) @ H.T + J @ J.T
+        H, x = self.predict(memory, pair).H[0], self.x_robot(memory)
+        covariance = H @ self.covariance_of_robot(memory) @ H.T
+        covariance += self._by_angles(memory, x, pair)
         covariance += np.diag(self._unmodelled.variances(memory.unmodelled))
         if memory.after_step.is_open[0]:
             d = H @ (memory.xi - memory.after_step.xi_before)
             covariance += 0.5 * np.outer(d, d)
         return covariance
 
-    def _jacobian(self, memory: SimpleNamespace, pair: Pair) -> np.ndarray:
-        """Of the tip, as the joints move, rotation first, (6, 6)."""
-        x = self.x_robot(memory)
-        arm = self.model.forward(self._constants_at(memory, x), x, pair.theta[None])[1]
-        return arm.columns[0, :, :NUM_JOINTS]
+    def _by_angles(self, memory: SimpleNamespace, x: np.ndarray, pair: Pair) -> np.ndarray:
+        """Covariance of the tip, (6, 6), by what gears and readings of the joints may be off by."""
+        angles = self.model.gear_variances(x, pair.loads, pair.states) + pair.rounding**2
+        J = self.model.jacobian(self._constants_at(memory, x), x, pair.theta)
+        return (J * angles) @ J.T
 
     def add(self, memory: SimpleNamespace, pair: Pair) -> Event | None:
         """Learns from one pair; says if something happened to the robot."""
@@ -225,7 +225,7 @@ class TipEstimator:
             if verdict.is_outlier:
                 return None
             if self._innovations.measure_noise(innovations, r):
-                self._unmodelled.add(memory.unmodelled, r, lambda: self._doubts(memory, H))
+                self._unmodelled.add(memory.unmodelled, r, lambda: self._doubts(memory, H, pair))
             if verdict.has_jumped or verdict.has_drifted:
                 self._unmodelled.rest(memory.unmodelled)
             if verdict.is_calm:
@@ -348,15 +348,15 @@ class TipEstimator:
             return np.linalg.solve(memory.keyframes.A + memory.A_open, columns)
         return out
 
-    def _doubts(self, memory: SimpleNamespace, H: np.ndarray) -> tuple[float, np.ndarray]:
-        """`variance_factor`, and what the estimate may be wrong by, variances of the tip, (6,)."""
-        return self.variance_factor(memory), np.einsum("ij,ji->i", H, self._solve_columns(memory, H))
+    def _doubts(self, memory: SimpleNamespace, H: np.ndarray, pair: Pair) -> Doubts:
+        by_model = np.einsum("ij,ji->i", H, self._solve_columns(memory, H))
+        by_angles = self._by_angles(memory, self.x(memory), pair)  # of gears, as nothing is said of encoders
+        return Doubts(self.variance_factor(memory), by_model, np.diag(by_angles))
 
     def _doubt(self, memory: SimpleNamespace) -> None:
         """What was learnt does not hold where the robot is now, though nothing happened: it weighs less."""
         self._innovations.forget(memory.innovations)
-        A = (memory.keyframes.A + memory.A_open) / _DOUBT**2
-        self._keyframes.reset(memory.keyframes, A, memory.xi)
+        self._keyframes.reset(memory.keyframes, (memory.keyframes.A + memory.A_open) / _DOUBT**2, memory.xi)
         self._forget_open(memory)
 
     def _widen(self, memory: SimpleNamespace, event: Event) -> None:
@@ -393,7 +393,6 @@ class TipEstimator:
 
     @staticmethod
     def _forget_open(memory: SimpleNamespace) -> None:
-        for part in (memory.A_open, memory.b_open, memory.samples, memory.weight):
-            part[:] = 0.0
-        for part in (memory.sums, memory.sum_y, memory.sum_H):
+        opened = memory.A_open, memory.b_open, memory.samples, memory.weight, memory.sums
+        for part in (*opened, memory.sum_y, memory.sum_H):
             part[:] = 0.0

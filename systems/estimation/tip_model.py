@@ -7,7 +7,7 @@ import numpy as np
 
 from robots.calibration.identifiability import IdentifiableParameters, identifiable_parameters
 from robots.description.error_parameters import NUM_PARAMETERS, TOOL, error_parameters
-from robots.description.model import load_robot
+from robots.description.model import NUM_JOINTS, load_robot
 from systems.controller_model import ControllerModel
 from systems.estimation import kernels
 from systems.estimation.arm_geometry import Arm, ArmGeometry, Constants
@@ -73,6 +73,7 @@ class TipModel:
         self.robot, self.parameters = robot, error_parameters(robot)
         g = len(chosen)
         self._no_geometry = np.full(g, np.inf)
+        self._gear_error = spread.gear_error
         self.has_gear_errors = spread.gear_error > 0.0
         self.gear_errors = GearErrors(robot)
         self.size = g + 24 + 6 * NUM_SHAPES * self.has_gear_errors
@@ -155,6 +156,10 @@ class TipModel:
         step = arm.columns[..., 18:] @ (x[self.G] - constants.p[self.chosen])
         return moved(arm.X_WE, step), arm
 
+    def jacobian(self, constants: Constants, x: np.ndarray, q: np.ndarray) -> np.ndarray:
+        """Of the tip of that arm as its joints q in rad, (6,), move, rotation first, (6, 6)."""
+        return self.forward(constants, x, q[None])[1].columns[0, :, :NUM_JOINTS]
+
     def total_load(self, x: np.ndarray, loads: np.ndarray) -> np.ndarray:
         """Torques of gears and bearings (n, 18) from loads (n, 5, 18)."""
         return np.concatenate(([1.0], x[self.M])) @ loads
@@ -177,6 +182,20 @@ class TipModel:
         if shapes is None:
             return 0.0
         return (shapes * x[self.E].reshape(NUM_SHAPES, 6)).sum(-2)
+
+    def gear_variances(self, x: np.ndarray, loads: np.ndarray, states: np.ndarray) -> np.ndarray:
+        """What the gears may be off by beyond the uncertainty of x, rad^2, (6,); zero without gear errors.
+
+        Args:
+            x: the unknowns.
+            loads: of one instant, (5, 18).
+            states: of the gears then, (18,).
+        """
+        if not self.has_gear_errors:
+            return np.zeros(6)
+        sizes = x[self.E].reshape(NUM_SHAPES, 6)
+        torque = self.total_load(x, loads[None])[0, :6]
+        return self.gear_errors.variances(sizes, states, torque, self._gear_error)
 
     def predict(
         self,

@@ -208,8 +208,9 @@ class SelfCalibrating(LeafSystem):
         """Where the tip was at the newest exposure as far as is known now, whatever the camera saw.
 
         Returns:
-            The time of the exposure in s, as the joints' clock has it; the pose (4, 4); and its covariance,
-            rotation (rad^2) first, (6, 6). None if there is no sample or no plan for it.
+            The time of the exposure in s, as the joints' clock has it, or that of the newest encoders where
+            these have not come so far; the pose (4, 4); and its covariance, rotation (rad^2) first, (6, 6).
+            None if there is no sample or no plan for it.
         """
         sample: PoseSample = self._camera.Eval(context)
         memory = self._layout.view(np.array(context.get_discrete_state(self._memory).value()))
@@ -218,7 +219,8 @@ class SelfCalibrating(LeafSystem):
         pair = self._learning.pair(memory, sample.time, sample.X_WE.GetAsMatrix4())
         if pair is None:
             return None
-        time = sample.time + self.estimator.clock_offset(memory.estimator, sample.time)
+        exposure = sample.time + self.estimator.clock_offset(memory.estimator, sample.time)
+        time = min(exposure, float(memory.encoders.times.max()))  # as that of the pair
         rounding = self._learning.steps.sigma(memory.steps)
         still = pair._replace(twist=np.zeros(6), rounding=rounding)  # of the joints' clock alone
         X_WE = self.estimator.predict(memory.estimator, still).X_WE[0]

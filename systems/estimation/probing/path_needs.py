@@ -6,7 +6,6 @@ from typing import NamedTuple
 import numpy as np
 from scipy.linalg import solve_triangular
 
-from robots.description.model import NUM_JOINTS
 from robots.dynamics.newton_inverse import inverse_kinematics
 from systems.estimation.tip_model import TipModel
 from systems.reference.cartesian_path import CartesianPath
@@ -85,7 +84,7 @@ class PathNeeds:
 
     def jacobian(self, q: np.ndarray) -> np.ndarray:
         """Of the tip of the nominal robot at joints q (rad, (6,)), rotation first, (6, 6)."""
-        return self._model.forward(self._constants, self._model.mean, q[None])[1].columns[0, :, :NUM_JOINTS]
+        return self._model.jacobian(self._constants, self._model.mean, q)
 
     def information(self, H: np.ndarray) -> np.ndarray:
         """What one sample at each of n columns says of the unknowns, (size, size)."""

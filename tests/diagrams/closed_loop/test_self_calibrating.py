@@ -106,6 +106,19 @@ def test_the_tip_is_where_the_law_says_with_encoders_of_any_steps(seed, bits):
 
 
 @pytest.mark.slow
+def test_the_tip_is_predicted_at_no_time_that_the_encoders_have_not_reached():
+    """At 1.6 s a camera of 3 ms without delay has seen 1.599 s, encoders have been read at 1.596 s."""
+    settings = [f"station.camera.{each}" for each in ("period=0.003", "delay=0", "clock_offset=0")]
+    experiment = Experiment(load_scenario("everything", settings), "self_calibrating")
+    experiment.advance(until=1.6)
+    law = experiment.servo.law
+    context = law.GetMyContextFromRoot(experiment.context)
+    prediction = law.predicted_tip(context)
+    assert prediction is not None
+    assert prediction[0] == law.memory(context).encoders.times.max()
+
+
+@pytest.mark.slow
 @pytest.mark.parametrize("gap", [0.25, 0.8])  # s
 def test_a_camera_that_is_blind_on_the_path_costs_what_was_promised(gap):
     drawn = [f"{name}=4001" for name in ("seed", "station.errors.random.seed", "station.variation.seed")]

@@ -71,6 +71,22 @@ def test_hysteresis_tells_from_which_side_a_load_was_reached(robot):
     assert (after([0 * large, -large, 0 * large]) < -0.9).all()
 
 
+@pytest.mark.parametrize("load", [-1.5, -0.2, 0.0, 0.4, 3.0])  # of what the hysteresis carries
+def test_gears_may_be_off_by_the_side_of_teeth_that_nearly_nothing_pushes(robot, load):
+    """Against teeth whose side is drawn, by a push that is known to no more than what hysteresis does."""
+    gears, turned, spring = GearErrors(robot), 0.3, 0.1 * np.asarray(robot.joint_stiffness)
+    carried, crossing = spring * 5e-4 * turned, spring * 2.0 * 70e-6  # N m, before and while they cross
+    push = (load + 0.5) * carried
+    drawn = np.random.default_rng(0).normal(size=(20000, 1)) * np.hypot(carried, crossing)
+    sizes, states = np.zeros((7, 6)), np.concatenate((np.full(6, turned), np.full(6, 1.0), np.full(6, -0.4)))
+    sizes[5], sizes[6] = 20e-6, 50e-6
+    teeth = -np.sign(push + drawn) * 70e-6
+    expected = np.mean((teeth - (20e-6 - 0.4 * 50e-6)) ** 2, axis=0)
+    found = gears.variances(sizes, states, load * carried, 0.0)
+    np.testing.assert_allclose(found, expected, rtol=0.03, atol=(1e-6) ** 2)
+    np.testing.assert_allclose(gears.variances(0.0 * sizes, states, load * carried, 5e-5), (5e-6) ** 2)
+
+
 def test_columns_for_gear_errors_find_what_waves_and_gap_do_to_the_tip():
     true = tip_model(gear_error=5e-5)
     x = true.mean.copy()

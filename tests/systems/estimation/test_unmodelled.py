@@ -3,13 +3,19 @@
 import numpy as np
 import pytest
 
-from systems.estimation.unmodelled import Unmodelled
+from systems.estimation.unmodelled import Doubts, Unmodelled
 
 SIGMA = np.repeat([2e-4, 6e-5], 3)  # rad and m, of a sample
 NUMBER = 5000  # samples: 20 s
 
 
-def found(lacking: float, noise: float = 1.0, known: float = 0.0, events: tuple[int, ...] = ()) -> np.ndarray:
+def found(
+    lacking: float,
+    noise: float = 1.0,
+    known: float = 0.0,
+    events: tuple[int, ...] = (),
+    by_gears: float = 0.0,
+) -> np.ndarray:
     """Deviations that are found, (6,), in those of the camera, where all have a sine of ``lacking``."""
     rng = np.random.default_rng(3)
     unmodelled = Unmodelled(SIGMA**2)
@@ -20,7 +26,9 @@ def found(lacking: float, noise: float = 1.0, known: float = 0.0, events: tuple[
     for k, r in enumerate(shown):
         if k in events:
             r = r + 20.0 * SIGMA
-        unmodelled.add(memory, r, lambda: (noise**2, (known * SIGMA) ** 2 + 1e-20))
+        unmodelled.add(
+            memory, r, lambda: Doubts(noise**2, (known * SIGMA) ** 2 + 1e-20, (by_gears * SIGMA) ** 2)
+        )
         if k in events:
             unmodelled.rest(memory)
     return np.sqrt(unmodelled.variances(memory)) / SIGMA
@@ -44,6 +52,11 @@ def test_noise_alone_adds_next_to_nothing(noise: float):
 def test_what_the_estimate_knows_it_may_be_wrong_by_is_not_added_again():
     """It has nine times the camera's variance, 9/24 in a mean; what is found there is right to 0.025."""
     assert (found(0.0, known=3.0) ** 2).max() < 3.0 * 0.025
+
+
+def test_what_gears_are_said_to_be_off_by_is_not_added_again():
+    """Where they are off by 0.2 and are said to be, nothing is left, to what is let pass above."""
+    assert (found(0.2, by_gears=0.2) ** 2).max() < 0.012 + 0.1 * 0.2**2
 
 
 def test_a_sample_in_which_something_happened_does_not_count():
