@@ -82,7 +82,7 @@ class SelfCalibrating(LeafSystem):
         self.tip_model, self.estimator, self._drives = learning.tip_model, learning.estimator, learning.drives
         self._lead = ParameterLead(self.tip_model.size, config.lead_frequency, config.lead_acceleration)
         self._planner = PreviewPlanner(self.tip_model, model.period)
-        self._probe = Probe(model.robot, config.probe)
+        self._probe = Probe(model.robot, config.probe, model.camera_period)
         arrays = {
             "lead": self._lead.layout,
             "planner": self._planner.layout,

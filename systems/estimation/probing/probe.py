@@ -1,6 +1,7 @@
 """A small motion before the path begins, while nothing depends on where the tip is: it shows the robot."""
 
-from dataclasses import dataclass, field
+import math
+from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
@@ -13,6 +14,9 @@ _KNOCK_BEGIN, _KNOCK_LENGTH = 0.15, 0.4  # s
 _KNOCK_SIZE = np.array([0.01, 0.01, 0.01, 0.03, 0.03, 0.03])  # rad
 _INSTANTS = np.linspace(0.0, 1.0, 59)  # of the window, at which limits are looked at
 _SHORTEST = 0.5  # s, a window in which it is worth while to move
+_AMPLITUDE = np.array([0.15, 0.15, 0.15, 0.4, 0.4, 0.4])  # rad
+_EXCURSION = 0.1  # m
+_USUAL_PERIOD, _MOST_GROWTH = 4e-3, 1.5  # s, of a camera for which both are enough; times, that both may grow
 
 
 @dataclass
@@ -20,8 +24,11 @@ class ProbeConfig:
     """Whether and how far the joints move before the path begins."""
 
     kind: str = "smooth"  # or none
-    amplitude: list[float] = field(default_factory=lambda: [0.15, 0.15, 0.15, 0.4, 0.4, 0.4])  # rad, at most
-    largest_excursion: float = 0.1  # m, of the tip
+    # Amplitudes in rad, at most, and how far the tip may go in m. If none are given, 0.15 rad of the first
+    # three axes, 0.4 rad of the others, and 0.1 m; up to half as much again with a camera that looks less
+    # often than every 4 ms: what samples show goes with their number and the square of the motion.
+    amplitude: list[float] | None = None
+    largest_excursion: float | None = None
     begin: float = 0.8  # s after the start
     rest: float = 0.3  # s before the path begins
     # s, for which the camera may see nothing on the path: what is needed then is shown before. Of 0.35, 0.5
@@ -64,8 +71,13 @@ class Probe:
     for who knows the path to say: `pattern` is the usual one, as large as it may be, until it is replaced.
     """
 
-    def __init__(self, robot: RobotModel, config: ProbeConfig) -> None:
+    def __init__(self, robot: RobotModel, config: ProbeConfig, camera_period: float = _USUAL_PERIOD) -> None:
         """Checks the configuration.
+
+        Args:
+            robot: whose limits hold.
+            config: of the motion.
+            camera_period: s, between two samples.
 
         Raises:
             ValueError: if the kind is unknown, amplitudes are negative or not six, or the camera is blind for
@@ -73,7 +85,10 @@ class Probe:
         """
         if config.kind not in ("smooth", "none"):
             raise ValueError(f"probe: kind must be smooth or none, got '{config.kind}'")
-        amplitude = np.array(config.amplitude, dtype=float)
+        growth = min(max(1.0, math.sqrt(camera_period / _USUAL_PERIOD)), _MOST_GROWTH)
+        given, excursion = config.amplitude, config.largest_excursion
+        amplitude = growth * _AMPLITUDE if given is None else np.array(given, dtype=float)
+        self._excursion = growth * _EXCURSION if excursion is None else excursion
         if amplitude.shape != (NUM_JOINTS,) or not (amplitude >= 0.0).all():
             raise ValueError(
                 f"probe: amplitude must be six numbers of at least 0 rad, got {config.amplitude}"
@@ -105,7 +120,7 @@ class Probe:
         size = self.within_limits(self.pattern, room, J, length)
         knock = np.minimum(np.minimum(_KNOCK_SIZE, self._amplitude), room)
         knock_way = float(np.linalg.norm(J[3:] @ knock))
-        return np.array([knock * min(1.0, self._config.largest_excursion / max(knock_way, 1e-9)), size])
+        return np.array([knock * min(1.0, self._excursion / max(knock_way, 1e-9)), size])
 
     def within_limits(self, pattern: Pattern, room: np.ndarray, J: np.ndarray, length: float) -> np.ndarray:
         """The amplitudes of a pattern in rad, made smaller by what it would go beyond limits, (6,).
@@ -120,7 +135,7 @@ class Probe:
         displacement, velocity, _ = pattern.at(length * _INSTANTS, length)
         excursion = float(np.linalg.norm(displacement @ J[3:].T, axis=1).max())
         haste = float((np.abs(velocity).max(axis=0) / (_SPEED_SHARE * self._speed)).max())
-        largest = max(1.0, excursion / self._config.largest_excursion, haste)
+        largest = max(1.0, excursion / self._excursion, haste)
         return pattern.size / largest
 
     def room(self, q: np.ndarray) -> np.ndarray:

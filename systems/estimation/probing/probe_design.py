@@ -6,7 +6,8 @@ from robots.description.model import NUM_JOINTS
 from systems.estimation.probing.path_needs import PathNeeds, Standing
 from systems.estimation.probing.probe import USUAL, Pattern, Probe
 
-_TRIES = 32
+_TRIES, _MORE_TRIES = 32, 128  # the latter with a slow camera: where few samples are taken matters more
+_FEW = 200.0  # samples a second
 _MOST_PERIODS = 4  # in the window
 _STEPS = np.array([0.5, 0.7, 1.4, 2.0])  # by which an amplitude changes from try to try
 _INSTANTS = 45  # of the window
@@ -50,7 +51,7 @@ def designed(
 
     best = judged(USUAL._replace(size=np.full(NUM_JOINTS, np.inf)))
     rng = np.random.default_rng(0)
-    for _ in range(_TRIES):
+    for _ in range(_MORE_TRIES if rate < _FEW else _TRIES):
         candidate = judged(_changed(best[1], rng))
         if candidate[0] < best[0]:
             best = candidate

@@ -40,6 +40,18 @@ def test_it_keeps_to_joint_limits_and_to_the_excursion_of_the_tip():
     assert (np.abs(velocity) < 0.31 * robot.speed).all()
 
 
+@pytest.mark.parametrize(("period", "growth"), [(2e-3, 1.0), (4e-3, 1.0), (6e-3, 1.5**0.5), (0.04, 1.5)])
+def test_a_camera_that_looks_less_often_is_shown_more_unless_limits_are_given(period, growth):
+    """Samples times the square of the motion stay the same, until it is half as large again."""
+    robot = load_robot("irb1200")
+    given = ProbeConfig(amplitude=[0.15, 0.15, 0.15, 0.4, 0.4, 0.4], largest_excursion=0.1)
+    limited, free = (
+        Probe(robot, config, period).amplitude(HOME, JACOBIAN, PATH_START)
+        for config in (given, ProbeConfig())
+    )
+    np.testing.assert_allclose(free[1], growth * limited[1])
+
+
 @pytest.mark.parametrize(("kind", "path_start"), [("none", 4.0), ("smooth", 1.2)])
 def test_there_is_none_without_leave_or_time(kind, path_start):
     probe = Probe(load_robot("irb1200"), ProbeConfig(kind=kind))

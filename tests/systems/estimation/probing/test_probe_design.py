@@ -63,6 +63,18 @@ def test_what_the_design_promises_its_motion_shows(shape):
     assert shown < 0.1 * nothing
 
 
+@pytest.mark.slow
+def test_what_a_slow_camera_misses_a_larger_motion_makes_up_for():
+    """With 100 samples a second in place of 250 a deviation could be larger by sqrt(2.5) = 1.6."""
+    of, robot = needs(Rectangle()), load_robot("irb1200")
+    _, fast = designed(of, Probe(robot, ProbeConfig()), 4.0, RATE, sharp=0.0)
+    _, slow = designed(of, Probe(robot, ProbeConfig(), 0.01), 4.0, 100.0, sharp=0.0)
+    limits = ProbeConfig(amplitude=[0.15, 0.15, 0.15, 0.4, 0.4, 0.4], largest_excursion=0.1)
+    _, limited = designed(of, Probe(robot, limits, 0.01), 4.0, 100.0, sharp=0.0)
+    assert slow.sigma < 1.25 * fast.sigma
+    assert limited.sigma > 1.1 * slow.sigma
+
+
 def test_the_longer_the_camera_may_be_blind_the_more_is_shown_before():
     probe = Probe(load_robot("irb1200"), ProbeConfig())
     sees, blind = needs(Circle(), late=0.05), needs(Circle(), late=2.0)
