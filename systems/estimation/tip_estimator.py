@@ -350,8 +350,10 @@ class TipEstimator:
 
     def _doubts(self, memory: SimpleNamespace, H: np.ndarray, pair: Pair) -> Doubts:
         by_model = np.einsum("ij,ji->i", H, self._solve_columns(memory, H))
-        by_angles = self._by_angles(memory, self.x(memory), pair)  # of gears, as nothing is said of encoders
-        return Doubts(self.variance_factor(memory), by_model, np.diag(by_angles))
+        by_gears = np.zeros(6)
+        if self.model.has_gear_errors:  # by which alone, as nothing is said of encoders
+            by_gears = np.diag(self._by_angles(memory, self.x(memory), pair))
+        return Doubts(self.variance_factor(memory), by_model, by_gears)
 
     def _doubt(self, memory: SimpleNamespace) -> None:
         """What was learnt does not hold where the robot is now, though nothing happened: it weighs less."""
