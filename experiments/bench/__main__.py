@@ -28,7 +28,7 @@ from experiments.bench.exact import EXACT
 from experiments.bench.feedforward import feedforward
 from experiments.bench.identification import designs, identification
 from experiments.bench.images import images
-from experiments.bench.learning import learning
+from experiments.bench.learning.ticks import learning
 from experiments.bench.tracking import tracking
 from experiments.bench.wire import wire
 from experiments.comparison.compare import compared_laws

@@ -1,5 +1,6 @@
 """What samples of the past said, kept so that it can be read again with better parameters."""
 
+import math
 from collections.abc import Callable
 from types import SimpleNamespace
 
@@ -8,9 +9,9 @@ import numpy as np
 from systems.estimation import kernels
 from systems.estimation.arm_geometry import Constants
 from systems.estimation.gear_errors import NUM_SHAPES
-from systems.estimation.kernels.arrays import GEARS, MOTION, SHAPES, THETA, TIME, TWIST, OpenKeyframe
+from systems.estimation.kernels.arrays import SHAPES, OpenKeyframe
 from systems.estimation.memory import Layout
-from systems.estimation.tip_model import Prediction, TipModel
+from systems.estimation.tip_model import TipModel
 
 # m or rad, by which the parameters may be off from where the sum was linearised: half of its square, over an
 # arm of a metre, is a third of what the mean of a dozen samples of a good camera may be wrong by.
@@ -65,6 +66,21 @@ class Keyframes:
         memory.A_old[:], memory.b_old[:], memory.A[:], memory.b[:] = A, b, A, b
         memory.xi_pass[:] = np.inf
 
+    def drift_if_free(
+        self, memory: SimpleNamespace, A_open: np.ndarray, b_open: np.ndarray
+    ) -> tuple[float, float]:
+        """What the drift of the clock would be if nothing held it, and its standard deviation.
+
+        Both in units of its spread; A_open (n, n), b_open (n,) are of samples that are in no keyframe yet.
+        """
+        D, A = self._model.D, memory.A.copy()
+        A[D, D] -= memory.held[0] - 1.0
+        unit, row = np.zeros((len(A), 1)), np.empty((len(A), 1))
+        unit[D] = 1.0
+        if not kernels.information.solve(A, A_open, unit, row):
+            return 0.0, np.inf
+        return float(row[:, 0] @ (memory.b + b_open)), math.sqrt(row[D, 0])
+
     def free_drift(self, memory: SimpleNamespace) -> None:
         """Takes back that the clock is supposed not to drift."""
         D = self._model.D
@@ -72,17 +88,30 @@ class Keyframes:
         memory.A[D, D] -= memory.held[0] - 1.0
         memory.held[0] = 1.0
 
-    def has_room(self, memory: SimpleNamespace) -> bool:
-        """Whether another keyframe fits in."""
-        return memory.end[0] - memory.first[0] < self._length
+    def close(
+        self, memory: SimpleNamespace, constants: Constants, xi: np.ndarray, opened: OpenKeyframe
+    ) -> bool:
+        """Adds a keyframe: one pose at the mean of the open samples, with their mean error and information.
 
-    def add(self, memory: SimpleNamespace, row: np.ndarray, A: np.ndarray, b: np.ndarray) -> None:
-        """Adds a keyframe as `keyframe_row` makes it, with the information of its samples."""
-        end = int(memory.end[0])
-        memory.rows[end % self._length] = row
+        Args:
+            memory: of the layout.
+            constants: the geometry at xi.
+            xi: the estimate.
+            opened: the samples.
+
+        Returns:
+            Whether there was room for it.
+        """
+        first, end = int(memory.first[0]), int(memory.end[0])
+        if end - first >= self._length:
+            return False
+        model = self._model
+        arm = constants, model.unknowns(model.full(xi)), model.loads.masses
+        kernels.keyframes.merge(*arm, xi, opened, memory.rows[end % self._length])
         memory.end[0] = end + 1
-        memory.A += A
-        memory.b += b
+        memory.A += opened.A
+        memory.b += opened.b
+        return True
 
     def is_settled(self, memory: SimpleNamespace, xi: np.ndarray) -> bool:
         """Whether the sum is linear where the parameters are.
@@ -146,28 +175,8 @@ class Keyframes:
         memory.position[0] = -1.0
         return True
 
-    def predict(self, constants: Constants, xi: np.ndarray, rows: np.ndarray) -> Prediction:
-        """The tip of some keyframes, (n, row), with loads worked out anew."""
-        model = self._model
-        motion = rows[:, 12:18], rows[:, 18:24]
-        configuration = rows[:, THETA:GEARS], rows[:, GEARS:MOTION]
-        shapes = rows[:, SHAPES:].reshape(-1, NUM_SHAPES, 6) if model.has_gear_errors else None
-        seen = rows[:, TWIST:TIME], shapes, rows[:, TIME]
-        return model.predict_anew(constants, model.full(xi), configuration, motion, *seen)
-
 
 def open_keyframe(memory: SimpleNamespace) -> OpenKeyframe:
     """The keyframe that a `TipEstimator` adds samples to, as views of its memory."""
     sums = memory.A_open, memory.b_open, memory.samples, memory.weight
     return OpenKeyframe(*sums, memory.first_theta, memory.sums, memory.sum_y, memory.sum_H)
-
-
-def keyframe_row(means: np.ndarray, seen: tuple[np.ndarray, float]) -> np.ndarray:
-    """One keyframe as numbers.
-
-    Args:
-        means: encoder positions, deflection of the gears, joint velocity and acceleration, twist, time, and
-            shapes of the gears' errors behind each other.
-        seen: the pose (4, 4) and its weight in samples.
-    """
-    return np.concatenate((means[:31], seen[0][:3].ravel(), [seen[1]], means[31:]))

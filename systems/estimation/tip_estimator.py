@@ -22,9 +22,9 @@ from systems.estimation.events import (
     Innovations,
 )
 from systems.estimation.gear_errors import NUM_SHAPES, NUM_STATES
-from systems.estimation.keyframes import Keyframes, keyframe_row, open_keyframe
+from systems.estimation.keyframes import Keyframes, open_keyframe
 from systems.estimation.memory import Layout
-from systems.estimation.tip_model import NO_SHAPES, Prediction, Spread, TipModel, moved
+from systems.estimation.tip_model import NO_SHAPES, Prediction, Spread, TipModel
 from systems.estimation.unmodelled import Doubts, Unmodelled
 
 _AGAIN = 500  # samples, in which a second event says that the first was explained wrongly
@@ -90,6 +90,8 @@ class TipEstimator:
             count=(1,),
             event_at=(1,),  # the count at the last event
             is_foreign=(1,),  # whether the camera speaks of another frame: then nothing is learnt from it
+            is_busy=(1,),  # whether the sample of this tick took longer than others
+            is_behind=(1,),  # whether `work` was put off for that
             was_settled=(1,),  # whether the sum was linear enough when samples agreed with it last
             A_open=(n, n),
             b_open=(n,),
@@ -298,40 +300,34 @@ class TipEstimator:
 
     def _look_for_drift(self, memory: SimpleNamespace) -> Event | None:
         """Tells a clock that drifts from one that does not by what the drift would be if it were free."""
-        D, held = self.model.D, float(memory.keyframes.held[0])
-        if held <= 1.0:
+        if memory.keyframes.held[0] <= 1.0:
             return None
-        A, b = memory.keyframes.A + memory.A_open, memory.keyframes.b + memory.b_open
-        A[D, D] -= held - 1.0
-        unit = np.zeros(len(b))
-        unit[D] = 1.0
-        row = np.linalg.solve(A, unit)
-        drift = float(row @ b)
-        size = abs(drift) * float(self.model.sigma[D])
-        if size < _LEAST_DRIFT or abs(drift) < _DRIFT_SIGMAS * math.sqrt(row[D]):
+        memory.is_busy[0] = 1.0
+        drift, deviation = self._keyframes.drift_if_free(memory.keyframes, memory.A_open, memory.b_open)
+        size = drift * float(self.model.sigma[self.model.D])
+        if abs(size) < _LEAST_DRIFT or abs(drift) < _DRIFT_SIGMAS * deviation:
             return None
         self._keyframes.free_drift(memory.keyframes)
-        return Event(CLOCK_DRIFTS, drift * float(self.model.sigma[D]), 0.0)
+        return Event(CLOCK_DRIFTS, size, 0.0)
 
     def work(self, memory: SimpleNamespace) -> None:
-        """What can be done in a tick without a sample, or after its command is out: relinearise."""
+        """What can be done in a tick without a sample, or after its command is out: relinearise.
+
+        A tick whose sample took long is left in peace, unless the one before was.
+        """
+        is_put_off = bool(memory.is_busy[0]) and not memory.is_behind[0]
+        memory.is_busy[0], memory.is_behind[0] = 0.0, float(is_put_off)
+        if is_put_off:
+            return
         keyframes, tolerance = memory.keyframes, self._config.relinearise
         if self._keyframes.work(keyframes, lambda: self.constants(memory), memory.xi, tolerance):
             self._solve(memory)
 
     def _close(self, memory: SimpleNamespace) -> None:
-        """Makes the open samples a keyframe: one pose at their mean, with their mean error."""
-        if not self._keyframes.has_room(memory.keyframes):
-            return
-        total = float(memory.weight[0])
-        mean = memory.sums / total
-        r = (memory.sum_y - memory.sum_H @ memory.xi) / total
-        row = keyframe_row(mean, (np.eye(4), total))
-        found = self._keyframes.predict(self.constants(memory), memory.xi, row[None])
-        mean[6:12] = found.gears[0]
-        row = keyframe_row(mean, (moved(found.X_WE, r[None])[0], total))
-        self._keyframes.add(memory.keyframes, row, memory.A_open, memory.b_open)
-        self._forget_open(memory)
+        """Makes the open samples a keyframe."""
+        constants = self.constants(memory)
+        if self._keyframes.close(memory.keyframes, constants, memory.xi, open_keyframe(memory)):
+            self._forget_open(memory)
 
     def _solve(self, memory: SimpleNamespace) -> None:
         # Half of the square of a step is what it leaves of samples that are known far better: small steps
@@ -349,9 +345,9 @@ class TipEstimator:
         return out
 
     def _doubts(self, memory: SimpleNamespace, H: np.ndarray, pair: Pair) -> Doubts:
-        by_model = np.einsum("ij,ji->i", H, self._solve_columns(memory, H))
-        by_gears = np.zeros(6)
-        if self.model.has_gear_errors:  # by which alone, as nothing is said of encoders
+        memory.is_busy[0] = 1.0
+        by_model, by_gears = (H * self._solve_columns(memory, H).T).sum(axis=1), np.zeros(6)
+        if self.model.has_gear_errors:  # nothing is said of encoders here
             by_gears = np.diag(self._by_angles(memory, self.x(memory), pair))
         return Doubts(self.variance_factor(memory), by_model, by_gears)
 

@@ -163,7 +163,8 @@ class SelfCalibrating(LeafSystem):
         self._lead.step(memory.lead, model.mean, memory.columns, self.period)
         for _ in range(40):  # the first ones are only looked at
             self.estimator.add(memory.estimator, pair)
-        self.estimator.work(memory.estimator)
+        for _ in range(2):  # it is put off once
+            self.estimator.work(memory.estimator)
         memory.estimator.count[0] = 1e6  # from now on samples are judged
         for size in (0.0, 0.1):
             X_WE[0, 3] += size

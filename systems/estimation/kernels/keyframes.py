@@ -14,7 +14,7 @@ from systems.estimation.kernels.arrays import (
     SeenOnce,
 )
 from systems.estimation.kernels.information import add_squares, complete
-from systems.estimation.kernels.poses import compiled, error
+from systems.estimation.kernels.poses import compiled, error, move
 from systems.estimation.kernels.tip import predict_one_anew
 
 
@@ -44,3 +44,34 @@ def read(c, unknowns, masses, xi, keyframes, first, until, weights, A, b):
                 y[i] += H[i, j] * xi[j]
         add_squares(H, shares, y, A, b)
     complete(A)
+
+
+@compiled
+def merge(c, unknowns, masses, xi, opened, row):
+    """Makes a row of the samples of an open keyframe: one pose at their mean, with their mean error.
+
+    Args:
+        c, unknowns, masses: the arm at xi, (n,).
+        opened: `OpenKeyframe`.
+        row: is written.
+    """
+    total, means, number = opened.weight[0], opened.means, len(xi)
+    for k in range(POSE):
+        row[k] = means[k] / total
+    for k in range(POSE, len(means)):
+        row[SHAPES - POSE + k] = means[k] / total
+    row[WEIGHT] = total
+    X_WE, H, y = np.empty((4, 4)), np.empty((6, number)), np.empty(6)
+    shapes = row[SHAPES:].reshape((len(row) - SHAPES) // 6, 6)
+    seen = SeenOnce(row[TWIST:TIME], row[TIME], shapes)
+    moving = row[MOTION:TWIST]
+    predict_one_anew(c, unknowns, masses, row[THETA:GEARS], row[GEARS:MOTION], moving, seen, X_WE, H)
+    for i in range(6):
+        y[i] = opened.y[i]
+        for j in range(number):
+            y[i] -= opened.H[i, j] * xi[j]
+        y[i] /= total
+    move(X_WE, y)
+    for i in range(3):
+        for j in range(4):
+            row[POSE + 4 * i + j] = X_WE[i, j]

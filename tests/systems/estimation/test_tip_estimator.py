@@ -48,15 +48,21 @@ class Session:
 
 
 def test_four_seconds_of_motion_are_enough():
-    session = Session(0)
-    assert session.error() > 5e-3
-    session.learn(4.0)
-    assert not session.events
-    assert session.error() < 0.3e-3  # where it has not been
-    assert session.error(seen=True) < 30e-6  # half the noise of a sample
-    clock = session.model.C
-    found = session.estimator.x(session.memory)[clock]
-    assert found == pytest.approx(session.arm.x[clock], abs=5e-5)
+    """Of single robots, what is left where they have not been is anything from 0.1 to 0.5 mm."""
+    elsewhere, there = [], []
+    for session in map(Session, range(5)):
+        assert session.error() > 3e-3
+        session.learn(4.0)
+        assert not session.events
+        elsewhere.append(session.error())
+        there.append(session.error(seen=True))
+        clock = session.model.C
+        off = session.estimator.x(session.memory)[clock] - session.arm.x[clock]
+        variance = session.estimator.covariance(session.memory)[clock, clock]
+        assert abs(off) < min(1e-4, 4.0 * session.model.sigma[clock] * np.sqrt(variance))
+    assert np.median(elsewhere) < 0.3e-3
+    assert np.max(elsewhere) < 0.7e-3
+    assert np.median(there) < 30e-6  # half the noise of a sample
 
 
 def test_the_error_is_what_the_covariance_says():

@@ -4,7 +4,7 @@ import numpy as np
 
 from diagrams.runs.simulation import Experiment
 from diagrams.scenario.scenario import load_scenario
-from experiments.bench.hours import hours_scenario, resting
+from experiments.bench.learning.hours import hours_scenario, resting
 from robots.description.model import load_robot
 from robots.dynamics.newton_inverse import inverse_kinematics
 from systems.reference.paths import make_path

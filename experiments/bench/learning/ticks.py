@@ -51,8 +51,3 @@ def start_time(cache: str) -> float:
     subprocess.run([sys.executable, "-c", _MAKE], env=env, check=True)
     after = os.times()
     return after.children_user + after.children_system - before.children_user - before.children_system
-
-
-if __name__ == "__main__":
-    for name, _, value, unit, yardstick, _ in learning():
-        print(f"{name:44} {value:8.3g} {unit}, {value / yardstick:.2f} of what is allowed")
