@@ -1,4 +1,4 @@
-"""How the self-calibrating law works for hours: ``python -m experiments.bench.learning.hours [HOURS] [SEED]``.
+"""The self-calibrating law for hours: ``python -m experiments.bench.learning.hours [HOURS] [SEED]``.
 
 In the scenario `everything` the tool goes from rest to rest along lines between random poses, each tilted by
 up to 15 degrees, and never the same way twice. For each part of the time a row says how far the true tip was
