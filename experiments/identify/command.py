@@ -25,6 +25,7 @@ from experiments.cli.prepare import noted_robot
 from experiments.cli.staging import PAGE, TABLE, YAML, staged_file
 from experiments.cli.workers import Executor
 from experiments.feedforward.command import realistic_robot
+from experiments.identify.advice.report import ADVICE_HEAD, advice_rows
 from experiments.identify.cases import MotionCases, default_cases, load_cases
 from experiments.identify.closed_loop.drives import driven_motions
 from experiments.identify.excitation import (
@@ -57,6 +58,7 @@ from experiments.identify.study import (
     IdentifyStudy,
     identify_json,
     study_recording,
+    with_advice,
     with_drives,
     with_fine_tuning,
     with_rectangle,
@@ -121,6 +123,13 @@ def identify_command(
             help="Refine drives, friction and dampers in closed loop; needs commands and torques.",
         ),
     ] = False,
+    wants_advice: Annotated[
+        bool,
+        typer.Option(
+            "--advise",
+            help="Then look for further motions and sensors that would show what is not identifiable.",
+        ),
+    ] = False,
     tuned_on_robot: Annotated[
         bool,
         typer.Option(
@@ -177,9 +186,10 @@ def identify_command(
             raise ValueError(
                 "--recording is what was recorded: no --motions and no --write-recording go with it"
             )
-        if excite is not None and any((recording, cases, slow, write, write_table)):
+        if excite is not None and any((recording, cases, slow, write, write_table, wants_advice)):
             raise ValueError(
-                "--excite only designs a motion: no recording, no motions and no --write go with it"
+                "--excite only designs a motion: no recording, no motions, no --write and no --advise go "
+                "with it"
             )
         if not 0.0 < tuning_share < 1.0:
             raise ValueError(f"--tuning-share must be between 0 and 1, got {tuning_share:g}")
@@ -223,6 +233,9 @@ def identify_command(
             of_plant = None if recording is not None else DriveConfig()
             with progress_bar("drives in closed loop") as progress:
                 study = with_drives(study, recorded, DriveConfig(), of_plant, progress)
+        if wants_advice:
+            with progress_bar("further motions and sensors") as progress:
+                study = with_advice(study, where, progress)
         if tuned_on_robot:
             with progress_bar("fine tuning on the robot") as progress:
                 study = with_fine_tuning(study, where, tuning_share, seed, progress)
@@ -238,6 +251,8 @@ def identify_command(
             write_text(robot_file, robot_text(study.final))
         output.write(identify_json(study) | ({"searches": search_json(searches)} if searches else {}))
     _print(human, study)
+    if study.advice is not None and study.advice.weak:
+        human.print(_table(ADVICE_HEAD, advice_rows(study.advice)))
     if study.fine_tuning is not None:
         human.print(_table(MOTIONS_HEAD, motion_rows(study.fine_tuning)))
         tuned = number_rows(study.fine_tuning)[: len(study.fine_tuning.changed)]  # the page has the others
@@ -264,7 +279,7 @@ def _plant(robot: str, plant: str | None, is_recorded: bool) -> RobotModel | Non
 def _simulated(
     model: RobotModel, truth: RobotModel, motions: MotionCases, seed: int, where: Executor
 ) -> Recording:
-    with progress_bar(f"recording of {count(len(motions.starts(model)), 'motion')}") as progress:
+    with progress_bar(f"recording of {count(len(motions.planned(model)), 'motion')}") as progress:
         return simulated_recording(model, truth, motions, seed, where, progress)
 
 

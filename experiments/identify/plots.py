@@ -7,6 +7,7 @@ import plotly.graph_objects as go
 from plotly.subplots import make_subplots
 
 from experiments.cli.console import count
+from experiments.identify.advice.report import advice_sections, advised
 from experiments.identify.fine_tuning.report import fine_tuning_sections, outcome
 from experiments.identify.search import SEARCH_HEAD, SearchComparison, search_rows
 from experiments.identify.study import IdentifyStudy
@@ -71,6 +72,8 @@ def verdict(study: IdentifyStudy) -> str:
         )
     if study.fine_tuning is not None:
         said.append(outcome(study.fine_tuning))
+    if study.advice is not None:
+        said.append(advised(study.advice))
     return " ".join(said)
 
 
@@ -201,6 +204,8 @@ def write_identify_page(path: Path, study: IdentifyStudy, searches: SearchCompar
         420,
     )
     sections = [spectra, parameters]
+    if study.advice is not None:
+        sections += advice_sections(study.advice)
     if study.fine_tuning is not None:
         sections += fine_tuning_sections(study.fine_tuning)
     height, cases = _ROW * len(study.found.sensors), study.found.cases

@@ -1,7 +1,7 @@
 """Recordings of a simulated robot: the full nonlinear plant with drives and all parts of drive trains."""
 
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from pydrake.systems.analysis import Simulator
@@ -122,12 +122,21 @@ def simulated(
     payload = robot.payload.largest_mass if cases.payload is None else cases.payload
     config = FeedforwardConfig(kind="rigid")
     runs = []
-    for number, (q, angle) in enumerate(cases.starts(robot), 1):
+    planned = cases.planned(robot)
+    for number, motion in enumerate(planned, 1):
         trial = Trial(
-            robot, payload, q, angle, config, plant, settle=cases.settle, speeding_up=cases.speeding_up
+            robot,
+            payload if motion.payload is None else motion.payload,
+            motion.start,
+            motion.angle,
+            config,
+            plant,
+            settle=cases.settle,
+            speeding_up=cases.speeding_up,
         )
         runs.append(CaseRun(f"{number}", trial, cases.logger, cases.ringing, 1000 * seed + number))
-    return in_order(executor or LocalProcesses(), _run, runs, progress)
+    found = in_order(executor or LocalProcesses(), _run, runs, progress)
+    return [replace(case, payload=motion.payload) for case, motion in zip(found, planned, strict=True)]
 
 
 def simulated_recording(
