@@ -15,6 +15,8 @@ from experiments.identify.closed_loop.drives import RefinedDrives, refined_drive
 from experiments.identify.closed_loop.fit import GAINS
 from experiments.identify.fine_tuning.report import fine_tuning_json
 from experiments.identify.fine_tuning.tuning import SHARE, FineTuning, fine_tune
+from experiments.identify.judge.judge import Verdict, judge
+from experiments.identify.judge.report import judge_json
 from experiments.identify.recording_map import Recording
 from experiments.identify.slow import slow_json, with_slow_motion
 from robots.description.model import NUM_JOINTS, RobotModel
@@ -46,6 +48,7 @@ class IdentifyStudy:
     drives: RefinedDrives | None = None  # of closed loop
     fine_tuning: FineTuning | None = None  # of the inverse model, on the robot
     advice: Advice | None = None  # what to record further
+    verdict: Verdict | None = None  # of the full simulation
 
     @property
     def final(self) -> RobotModel:
@@ -183,6 +186,20 @@ def with_advice(
     return replace(study, advice=advice)
 
 
+def with_verdict(
+    study: IdentifyStudy,
+    recording: Recording,
+    executor: Executor,
+    progress: Callable[[float], None] | None = None,
+) -> IdentifyStudy:
+    """The study with what the full simulation says of it; see `judge`."""
+    commands = None
+    if study.drives is not None and all(case.commands is not None for case in recording.cases):
+        commands = recording, DriveConfig(), study.drives.drive
+    verdict = judge(study.robot, study.identified, study.found, executor, progress, commands)
+    return replace(study, verdict=verdict)
+
+
 def with_rectangle(
     study: IdentifyStudy, executor: Executor, progress: Callable[[float], None]
 ) -> IdentifyStudy:
@@ -244,6 +261,8 @@ def identify_json(study: IdentifyStudy) -> dict[str, Any]:
         numbers["drive"] = gains | {"command_delay_s": drive.command_delay}
     if study.advice is not None:
         numbers["advice"] = advice_json(study.advice)
+    if study.verdict is not None:
+        numbers["judge"] = judge_json(study.verdict)
     if study.fine_tuning is not None:
         numbers["fine_tuning"] = fine_tuning_json(study.fine_tuning)
     if study.slow is not None:

@@ -99,7 +99,11 @@ def advise(
     """
     if not weak:
         return Advice(payload)
-    prospects = _Prospects(robot, payload, found, executor, progress)
+    return advice_of(Prospects(robot, payload, found, executor, progress), payload, weak)
+
+
+def advice_of(prospects: "Prospects", payload: float, weak: Sequence[str]) -> Advice:
+    """The same, where the candidates have been looked at."""
     now, options = prospects.sigmas([]), prospects.options
     singles = [prospects.sigmas([option]) for option in options]
     rows = []
@@ -110,11 +114,11 @@ def advise(
             first = next((i for i in order if getattr(options[i], kind) is not None), None)
             best.append(None if first is None else Prospect((options[first],), singles[first][name]))
         few = [options[i] for i in sorted(order[:_FEW])]
-        reached = _chosen(prospects, few, {name: now[name]}, _TOGETHER, nearly=1.0)
+        reached = chosen_few(prospects, few, {name: now[name]}, _TOGETHER, nearly=1.0)
         reach = Prospect(tuple(reached), prospects.sigmas(reached)[name])
         rows.append(WeakParameter(name, now[name], _limit(name), *best, reach, now[name]))
     reachable = {row.name: row.sigma for row in rows if row.reach.sigma < row.limit}
-    chosen = _chosen(prospects, options, reachable, _STEPS)
+    chosen = chosen_few(prospects, options, reachable, _STEPS)
     last = prospects.sigmas(chosen)
     motions = sum(option.motion is not None for option in options)
     rows = [replace(row, proposed=last[row.name]) for row in rows]
@@ -125,8 +129,8 @@ def _limit(name: str) -> float:
     return STIFFNESS_KNOWN if name.startswith("stiffness_") else DAMPING_KNOWN
 
 
-def _chosen(
-    prospects: "_Prospects",
+def chosen_few(
+    prospects: "Prospects",
     options: Sequence[Option],
     now: dict[str, float],
     steps: int,
@@ -151,8 +155,12 @@ def _chosen(
     return chosen
 
 
-class _Prospects:
-    """Standard deviations with further motions and sensors."""
+class Prospects:
+    """Standard deviations with further motions and sensors.
+
+    Attributes:
+        options: all candidates, in the order of the work that they are.
+    """
 
     def __init__(
         self,
@@ -160,8 +168,9 @@ class _Prospects:
         payload: float,
         found: ArmIdentification,
         executor: Executor,
-        progress: Progress | None,
+        progress: Progress | None = None,
     ) -> None:
+        """Looks at all candidates; arguments as of `advise`."""
         fit = found.fit
         self._robot, self._fit, self._effects = robot, fit, design_effects(fit)
         motions = candidate_motions(robot, payload)

@@ -56,6 +56,26 @@ def resting(folder: Path) -> Path:
     return path
 
 
+@pytest.mark.parametrize("suffix", [".csv", ".mcap"])
+def test_motions_keep_payloads_of_their_own(tmp_path: Path, suffix: str):
+    recording = read_recording(resting(tmp_path))
+    heavy, light = (replace(recording.cases[0], name=name) for name in ("7", "8"))
+    path = tmp_path / f"again{suffix}"
+    write_recording(path, replace(recording, cases=[heavy, replace(light, payload=30.0)]))
+    assert [case.payload for case in read_recording(path).cases] == [None, 30.0]
+
+
+def test_payloads_of_motions_that_are_not_there_or_below_zero_are_refused(tmp_path: Path):
+    path = resting(tmp_path)
+    with path.with_suffix(".yaml").open("a") as file:
+        file.write("payloads: {west: 20}\n")
+    changed(path.with_suffix(".yaml"), "payloads: {}\n", "")
+    assert "payloads: no case 'west', there are rest" in refusal(run(tmp_path, f"--recording={path}"))
+    changed(path.with_suffix(".yaml"), "{west: 20}", "{rest: -20}")
+    message = refusal(run(tmp_path, f"--recording={path}"))
+    assert "payloads.rest must not be negative, got -20 kg" in message
+
+
 @pytest.mark.parametrize("suffix", [".csv", ".parquet", ".mcap"])
 def test_a_recording_is_read_as_it_was_written(tmp_path: Path, suffix: str):
     path = tmp_path / f"again{suffix}"
@@ -226,6 +246,8 @@ def test_a_slow_motion_is_designed_and_nothing_else(tmp_path: Path):
 
 REFUSED = {
     "excite": (["--excite=slow.csv", "--write=robot.yaml"], "--excite only designs a motion"),
+    "judge": (["--excite=slow.csv", "--judge"], "there is nothing to --judge or to --advise"),
+    "advise": (["--excite=slow.csv", "--advise"], "there is nothing to --judge or to --advise"),
     "robot": (["--robot=kr211"], "robot 'kr211': no file"),
     "plant": (["--robot=irb140"], "has no variant named irb140-realistic: say what moves by --plant"),
     "recording": (["--recording=none.csv"], "--recording none.csv: no such file"),
