@@ -1,6 +1,6 @@
 """Which few further motions or sensors would make known what a recording does not show well enough."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -109,16 +109,18 @@ def advice_of(prospects: "Prospects", payload: float, weak: Sequence[str]) -> Ad
     rows = []
     for name in weak:
         order = sorted(range(len(options)), key=lambda i: singles[i][name])
-        best: list[Prospect | None] = []
+        best: dict[str, Prospect | None] = {}
         for kind in ("motion", "sensor"):
             first = next((i for i in order if getattr(options[i], kind) is not None), None)
-            best.append(None if first is None else Prospect((options[first],), singles[first][name]))
+            best[kind] = None if first is None else Prospect((options[first],), singles[first][name])
         few = [options[i] for i in sorted(order[:_FEW])]
-        reached = chosen_few(prospects, few, {name: now[name]}, _TOGETHER, nearly=1.0)
+        reached = chosen_few(prospects.sigmas, few, {name: now[name]}, _TOGETHER, nearly=1.0)
         reach = Prospect(tuple(reached), prospects.sigmas(reached)[name])
-        rows.append(WeakParameter(name, now[name], _limit(name), *best, reach, now[name]))
+        rows.append(
+            WeakParameter(name, now[name], _limit(name), best["motion"], best["sensor"], reach, now[name])
+        )
     reachable = {row.name: row.sigma for row in rows if row.reach.sigma < row.limit}
-    chosen = chosen_few(prospects, options, reachable, _STEPS)
+    chosen = chosen_few(prospects.sigmas, options, reachable, _STEPS)
     last = prospects.sigmas(chosen)
     motions = sum(option.motion is not None for option in options)
     rows = [replace(row, proposed=last[row.name]) for row in rows]
@@ -130,25 +132,32 @@ def _limit(name: str) -> float:
 
 
 def chosen_few(
-    prospects: "Prospects",
+    sigmas: Callable[[Sequence[Option]], dict[str, float]],
     options: Sequence[Option],
     now: dict[str, float],
     steps: int,
     nearly: float = _NEARLY,
 ) -> list[Option]:
-    """Step by step the option that leaves least of what is too large, or one that is less work."""
+    """Step by step the option that leaves least of what is too large, or one that is less work.
 
-    def too_large(sigmas: dict[str, float]) -> float:
-        return sum(max(0.0, float(np.log(sigmas[name] / (_MARGIN * _limit(name))))) for name in now)
+    Args:
+        sigmas: relative standard deviations with some options.
+        options: in the order of the work that they are.
+        now: those without any; of these parameters alone.
+        steps: at most.
+        nearly: the share of the best gain with which less work is taken.
+    """
+
+    def too_large(with_option: dict[str, float]) -> float:
+        return sum(max(0.0, float(np.log(with_option[name] / (_MARGIN * _limit(name))))) for name in now)
 
     chosen: list[Option] = []
     left = too_large(now)
     for _ in range(steps):
         others = [option for option in options if option not in chosen]
-        gains = [left - too_large(prospects.sigmas([*chosen, option])) for option in others]
+        gains = [left - too_large(sigmas([*chosen, option])) for option in others]
         if not gains or max(gains) < _LITTLE:
             break
-        # The options are in the order of the work they are.
         step = next(i for i, gain in enumerate(gains) if gain >= nearly * max(gains))
         chosen.append(others[step])
         left -= gains[step]

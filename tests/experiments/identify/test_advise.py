@@ -1,5 +1,6 @@
 """Advice: candidates that the robot allows, steps that help most, and what came of one that was followed."""
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -7,7 +8,6 @@ import pytest
 
 from experiments.cli.workers import LocalProcesses
 from experiments.identify.advice.advise import Advice, Option, Prospect, WeakParameter, chosen_few
-from experiments.identify.advice.bench import Robot
 from experiments.identify.advice.candidates import (
     candidate_motions,
     candidate_sensors,
@@ -15,6 +15,7 @@ from experiments.identify.advice.candidates import (
     planned_case,
 )
 from experiments.identify.advice.report import advice_json, advice_rows, advice_sections, advised
+from experiments.identify.advice_bench import Robot
 from experiments.identify.cases import FurtherMotion, MotionCases, PlannedMotion, default_cases
 from experiments.identify.simulated import places
 from experiments.identify.study import study_recording, with_advice
@@ -69,7 +70,7 @@ class FewOptions:
         self.options = [Option(motion=PlannedMotion(np.zeros(6), 0.1, 0.0)) for _ in tells]
         self._tells = dict(zip(self.options, tells, strict=True))
 
-    def sigmas(self, options: list[Option]) -> dict[str, float]:
+    def sigmas(self, options: Sequence[Option]) -> dict[str, float]:
         information = np.array([1.0, 1.0]) + np.sum([self._tells[each] for each in options], axis=0)
         values = 2.0 * STIFFNESS_KNOWN / np.sqrt(information)
         return dict(zip(("stiffness_a", "stiffness_b"), values.tolist(), strict=True))
@@ -77,19 +78,19 @@ class FewOptions:
 
 def test_steps_go_to_what_tells_most_and_end_where_all_is_known():
     prospects = FewOptions([(0.1, 0.1), (9.0, 0.0), (0.0, 9.0), (3.0, 0.0)])
-    chosen = chosen_few(prospects, prospects.options, prospects.sigmas([]), 4)
+    chosen = chosen_few(prospects.sigmas, prospects.options, prospects.sigmas([]), 4)
     assert [prospects.options.index(each) for each in chosen] == [1, 2]
 
 
 def test_what_is_less_work_is_taken_where_it_helps_nearly_as_much():
     prospects = FewOptions([(8.0, 0.0), (9.0, 0.0)])
-    chosen = chosen_few(prospects, prospects.options, {"stiffness_a": 2.0 * STIFFNESS_KNOWN}, 1)
+    chosen = chosen_few(prospects.sigmas, prospects.options, {"stiffness_a": 2.0 * STIFFNESS_KNOWN}, 1)
     assert chosen == prospects.options[:1]
 
 
 def test_nothing_is_proposed_where_nothing_tells():
     prospects = FewOptions([(1e-3, 1e-3)])
-    assert chosen_few(prospects, prospects.options, prospects.sigmas([]), 4) == []
+    assert chosen_few(prospects.sigmas, prospects.options, prospects.sigmas([]), 4) == []
 
 
 def weak(name: str, few: float) -> WeakParameter:
@@ -110,6 +111,7 @@ def test_a_report_says_what_helps_and_what_nothing_shows():
     # As a file of --motions takes them.
     further = FurtherMotion(**numbers["further"][0])
     planned = replace(default_cases(load_robot("kr210")), further=[further]).planned(load_robot("kr210"))
+    assert motion.motion is not None
     np.testing.assert_allclose(planned[-1].start, motion.motion.start, atol=1e-5)
     assert len(planned) == 19
     assert numbers["parameters"]["stiffness_gear_6"]["made_known_by"] == "nothing"
@@ -131,7 +133,8 @@ def test_the_motion_that_is_advised_makes_known_what_was_weak():
     recording = robot.watched()
     before = with_advice(study_recording(robot.believed, robot.plant, recording), LocalProcesses(1))
     assert before.advice is not None
-    row = min((row for row in before.advice.weak if row.motion), key=lambda row: row.motion.sigma / row.limit)
+    gains = {row.motion.sigma / row.limit: row for row in before.advice.weak if row.motion is not None}
+    row = gains[min(gains)]
     assert row.motion is not None
     assert row.motion.sigma < row.limit < row.sigma
     after = study_recording(robot.believed, robot.plant, robot.added(recording, row.motion.options))

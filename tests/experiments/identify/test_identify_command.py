@@ -292,6 +292,8 @@ def test_springs_that_are_a_fifth_softer_than_believed_are_found(tmp_path: Path)
         "--no-gear-parts",
         "--no-rectangle",
         "--jobs=2",
+        "--judge",
+        "--advise",
         "--search=1",
         "--search-evaluations=60",
         f"--write={robot}",
@@ -307,6 +309,12 @@ def test_springs_that_are_a_fifth_softer_than_believed_are_found(tmp_path: Path)
     assert load_robot(str(robot)).joints[1].drive_train.stiffness == pytest.approx(
         0.8 * base.joints[1].drive_train.stiffness, rel=0.03
     )
+    # What the full simulation says of it: gyros are off by noise and little else, and the former beliefs by
+    # ten times as much.
+    left = numbers["judge"]["left"]["gyro"]
+    assert left["full"]["found"] < 0.1 * left["full"]["before"]
+    assert left["full"]["found"] < 1.5 * left["linear"]["found"]
+    assert set(numbers["advice"]["parameters"]) == set(numbers["weak"])
     # So few evaluations bring a search without a gradient nowhere near.
     runs = {each["method"]: each for each in numbers["searches"]["runs"]}
     assert set(runs) == {"gradient", "CMA-ES", "genetic, then pattern"}
@@ -314,4 +322,6 @@ def test_springs_that_are_a_fifth_softer_than_believed_are_found(tmp_path: Path)
     assert runs["gradient"]["cost"] == min(each["cost"] for each in runs.values())
     opened = open_page(tmp_path / "identify.html")
     assert "starts that fail" in opened.dom
+    assert "Full simulation as the judge" in opened.dom
+    assert "Further motions and sensors" in opened.dom
     assert not [line for line in opened.console if "rror" in line]

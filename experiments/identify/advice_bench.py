@@ -1,6 +1,6 @@
 """Benchmark of advice: what it proposes is simulated and added, and the identification done again.
 
-``python -m experiments.identify.advice.bench ROBOTS out/advice.jsonl [FIRST]``: so many robots with springs
+``python -m experiments.identify.advice_bench ROBOTS out/advice.jsonl [FIRST]``: so many robots with springs
 and dampers of their own, believed off by a factor of two. Six motions are recorded, with gyros on forearm and
 hand and the accelerometers alone. What is proposed, for some weak parameters the best motion and the best
 sensor, and a motion that should help least are then added, each for itself. A line a robot goes into the
@@ -98,7 +98,7 @@ def tried(robot: Robot) -> list[dict]:
     trials: dict[str, list[Option]] = {"proposed": advice.proposed}
     for row in sorted(advice.weak, key=lambda row: row.reach.sigma / row.limit)[:TRIED]:
         for kind, prospect in (("motion", row.motion), ("sensor", row.sensor)):
-            if prospect is not None:
+            if prospect is not None and list(prospect.options) not in trials.values():
                 trials[f"{kind} for {row.name}"] = list(prospect.options)
     now = prospects.sigmas([])
     of_motions = [option for option in prospects.options if option.motion is not None]
