@@ -3,7 +3,7 @@
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.interpolate import CubicSpline
+from scipy.interpolate import CubicHermiteSpline, CubicSpline
 
 from diagrams.scenario.scenario import StationConfig
 from experiments.cli.workers import Progress
@@ -16,6 +16,7 @@ from systems.cell.inertial_sensors import InertialLoggerConfig, InertialSensorCo
 
 # kg m^2 on the side of the links: rotors that nothing which happens behind the gears moves from their way.
 _HEAVY = 1e6
+_FINE = 1e-3  # s: so often sensors are sampled and motors are led, where a case has longer steps
 _STIFF = CascadeGains(150.0, 600.0, 0.0)  # their controllers: two poles at 300 per second
 
 
@@ -44,17 +45,18 @@ class FullRun:
         Raises:
             SimulationError: if the integration breaks off.
         """
-        case, by = self.case, self.by
-        robot = self.robot
+        case, by, robot = self.case, self.by, self.robot
+        every = max(1, round(case.period / _FINE))  # of the samples of the sensors one is of the case
         if by is None:
-            robot, by = with_heavy_rotors(robot), as_measured(case)
+            robot, by = with_heavy_rotors(robot), as_measured(case, case.period / every)
         config = StationConfig(period=by.period, elasticity="structure", payload=self.payload, drive=by.drive)
         end = float(case.times[-1])
-        log = driven(case.name, robot, config, by.told, _logger(self.sensors, case.period), end, 0)
+        logger = _logger(self.sensors, case.period / every)
+        log = driven(case.name, robot, config, by.told, logger, end, 0)
         if progress:
             progress(1.0)
         n = len(case.theta)
-        readings = log.samples[:, 1:].reshape(len(log.samples), -1, 3)
+        readings = log.samples[::every, 1:].reshape(-1, len(self.sensors), 3)
         kept = np.minimum(np.arange(n), len(readings) - 1)  # the last sample is logged a tick later
         theta = CubicSpline(log.time, log.motor[:, :NUM_JOINTS])(case.times)
         return FullReadings(readings[kept], theta)
@@ -85,11 +87,12 @@ def with_heavy_rotors(robot: RobotModel) -> RobotModel:
     return replace(robot, joints=joints)
 
 
-def as_measured(case: MotionCase) -> DrivenBy:
-    """Commands that lead heavy rotors along the measured motion."""
-    period = case.period
+def as_measured(case: MotionCase, period: float) -> DrivenBy:
+    """Commands, one a period in s, that lead heavy rotors along the measured motion."""
     delay = period  # a command is interpolated over a period
-    theta, rate = (np.concatenate([each[1:], each[-1:]]) for each in (case.theta, case.rate))
+    measured = CubicHermiteSpline(case.times, case.theta, case.rate)
+    times = np.append(np.arange(1, round(case.times[-1] / period) + 1) * period, case.times[-1])
+    theta, rate = measured(times), measured(times, 1)
     # What is told now is held from one period later on for as long: the mean acceleration of that time.
     further = np.concatenate([rate[1:], rate[-1:]])
     torque = _HEAVY * (further - rate) / period
@@ -101,14 +104,14 @@ def _logger(sensors: list[SensorPlace], period: float) -> InertialLoggerConfig:
     return InertialLoggerConfig(
         [
             InertialSensorConfig(
-                place.name,
+                f"{number} {place.name}",
                 place.kind,
                 place.body,
                 place.position.tolist(),
                 np.rad2deg(zyx_from_rotation(place.rotation)).tolist(),
                 bandwidth=place.bandwidth,
             )
-            for place in sensors
+            for number, place in enumerate(sensors)
         ],
         period,
     )

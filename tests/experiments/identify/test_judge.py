@@ -167,7 +167,19 @@ def test_heavy_rotors_keep_to_the_measured_motion(recorded):
     np.testing.assert_allclose(shown.theta, case.theta, atol=4e-6)
     heavy = with_heavy_rotors(plant)
     assert heavy.reflected_inertia == pytest.approx(1e6)
-    assert as_measured(case).told.shape == (len(case.theta), 3, 6)
+    assert as_measured(case, case.period).told.shape == (len(case.theta), 3, 6)
+
+
+@pytest.mark.slow
+def test_a_robot_that_says_where_its_motors_are_every_4_ms_is_judged_as_well(recorded):
+    """What gyros show is off by less than a hundredth: cubics between samples are near enough."""
+    plant, recording = recorded
+    case = recording.cases[0].at_lag(0.0)
+    seldom = MotionCase("seldom", 4e-3, case.theta[::4], case.rate[::4], case.readings[::4])
+    shown, finely = (FullRun(plant, PAYLOAD, each, recording.sensors).run() for each in (seldom, case))
+    gyros = [i for i, sensor in enumerate(recording.sensors) if sensor.kind == "gyro"]
+    off = (shown.readings - finely.readings[::4])[:, gyros]
+    assert np.sqrt(np.mean(np.square(off))) < 0.01 * np.sqrt(np.nanmean(np.square(case.readings[:, gyros])))
 
 
 @pytest.mark.slow
