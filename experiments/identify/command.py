@@ -306,7 +306,7 @@ def _print(human: Console, study: IdentifyStudy) -> None:
 def _table(head: list[str], rows: list[list[str]]) -> Table:
     table = Table(box=box.SIMPLE_HEAD, padding=(0, 1, 0, 0))
     for name in head:
-        left = name in ("parameter", "unit", "method", "number", "motion", "sensors", "made known by")
+        left = name in ("parameter", "unit", "method", "number", "motion", "sensors", "known by")
         table.add_column(name, justify="left" if left else "right", no_wrap=True)
     for row in rows:
         table.add_row(*map(escape, row))

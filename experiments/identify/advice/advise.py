@@ -116,6 +116,8 @@ def advice_of(prospects: "Prospects", payload: float, weak: Sequence[str]) -> Ad
         few = [options[i] for i in sorted(order[:_FEW])]
         reached = chosen_few(prospects.sigmas, few, {name: now[name]}, _TOGETHER, nearly=1.0)
         reach = Prospect(tuple(reached), prospects.sigmas(reached)[name])
+        # Steps end where a parameter is known well enough, which one option may do better.
+        reach = min((each for each in (reach, *best.values()) if each), key=lambda each: each.sigma)
         rows.append(
             WeakParameter(name, now[name], _limit(name), best["motion"], best["sensor"], reach, now[name])
         )

@@ -8,7 +8,7 @@ from experiments.cli.console import count
 from experiments.identify.advice.advise import Advice, Option, Prospect, WeakParameter
 from experiments.report.plot_page import Section, html_table
 
-ADVICE_HEAD = ["parameter", "sigma", "motion", "sensor", "best few", "proposed", "made known by"]
+ADVICE_HEAD = ["parameter", "sigma", "motion", "sensor", "few", "proposed", "known by"]
 
 
 def advised(advice: Advice) -> str:
