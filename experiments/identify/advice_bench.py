@@ -24,6 +24,7 @@ from experiments.identify.recording_map import Recording
 from experiments.identify.simulated import places, simulated_recording
 from experiments.identify.study import IdentifyStudy, study_recording
 from robots.description.model import load_robot
+from robots.identification.identified_robot import DAMPING_KNOWN, STIFFNESS_KNOWN
 from robots.identification.motion import SensorPlace
 from systems.cell.inertial_sensors import InertialSensorConfig
 
@@ -148,6 +149,9 @@ def report(lines: list[dict]) -> None:
             f"over that before {gain:.2f} (median); "
             f"{inside:.2f} of 95 % intervals hold the truth"
         )
+    limits = {"stiffness": STIFFNESS_KNOWN, "damping": DAMPING_KNOWN}
+    sure = [row for row in lines if row["predicted"] < limits[row["name"].split("_")[0]]]
+    print(f"{sum(row['identifiable'] for row in sure)} of {len(sure)} that should become known are known")
 
 
 def main(robots: int, path: Path, first: int) -> None:
