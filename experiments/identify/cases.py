@@ -28,6 +28,24 @@ _GYRO, _ACCELEROMETER = 2e-3, 5e-2  # rad/s, m/s^2: noise of a sample of a good 
 
 
 @dataclass
+class FurtherMotion:
+    """One motion beside those of all positions and angles."""
+
+    position_deg: list[float] = numbers((0.0,) * NUM_JOINTS, (NUM_JOINTS,), unit="deg")  # where it begins
+    angle_deg: float = 5.0  # by which axes 1 to 3 turn, with its sign
+    payload: float | None = quantity(None, 0.0, unit="kg")  # None for that of the other motions
+
+
+@dataclass(frozen=True)
+class PlannedMotion:
+    """A motion of axes 1 to 3."""
+
+    start: np.ndarray  # (6,) rad
+    angle: float  # rad, signed
+    payload: float | None = None  # kg; None for that of the other motions
+
+
+@dataclass
 class MotionCases:
     """Short motions of axes 1 to 3 from several positions, as Reiner (2010), section 4.5.1, and sensors."""
 
@@ -38,7 +56,24 @@ class MotionCases:
     ringing: float = positive(0.6, "s")  # after the motion
     angles_deg: list[float] = numbers((5.0, 20.0), unit="deg")
     positions_deg: list[list[float]] = field(default_factory=list)  # where motions begin; empty: chosen
+    further: list[FurtherMotion] = field(default_factory=list)  # such as an identification has advised
     logger: InertialLoggerConfig = field(default_factory=InertialLoggerConfig)
+
+    def planned(self, robot: RobotModel) -> list[PlannedMotion]:
+        """All motions: those of `starts`, then the further ones.
+
+        Raises:
+            ValueError: as `starts`, or if a further motion leaves the range of a joint.
+        """
+        found = [PlannedMotion(q, angle) for q, angle in self.starts(robot)]
+        for number, each in enumerate(self.further):
+            q, angle = np.deg2rad(each.position_deg), float(np.deg2rad(each.angle_deg))
+            if not has_room(robot, q, angle):
+                raise ValueError(
+                    f"further[{number}]: no room for {each.angle_deg:g} degrees from {each.position_deg}"
+                )
+            found.append(PlannedMotion(q, angle, each.payload))
+        return found
 
     def starts(self, robot: RobotModel) -> list[tuple[np.ndarray, float]]:
         """Positions (rad, shape (6,)) and angles (rad, signed) of all cases.
@@ -54,7 +89,7 @@ class MotionCases:
             if q.shape != (NUM_JOINTS,):
                 raise ValueError(f"cases: a position needs {NUM_JOINTS} angles, got {np.rad2deg(q).tolist()}")
             for angle in np.deg2rad(self.angles_deg):
-                turned = [sign * angle for sign in (1.0, -1.0) if _has_room(robot, q, sign * angle)]
+                turned = [sign * angle for sign in (1.0, -1.0) if has_room(robot, q, sign * angle)]
                 if not turned:
                     raise ValueError(
                         f"cases: no room for {np.rad2deg(angle):g} degrees from "
@@ -81,12 +116,18 @@ def _with_sensors(cases: MotionCases, robot: RobotModel) -> MotionCases:
     return cases
 
 
-def _sensors(robot: RobotModel) -> list[InertialSensorConfig]:
+def bodies_of(robot: RobotModel) -> list[str]:
+    """On which sensors may sit: links, and the ends of those that are beams."""
     bodies = []
     for number, link in enumerate(robot.links, 1):
         bodies.append(f"link_{number}")
         if link.beam is not None:
             bodies.append(f"link_{number}_segment_{4 if link.beam.degrees_of_freedom == 5 else 2}")
+    return bodies
+
+
+def _sensors(robot: RobotModel) -> list[InertialSensorConfig]:
+    bodies = bodies_of(robot)
     gyros = [
         InertialSensorConfig(f"gyro_{body}", "gyro", body, range=10.0, noise_sigma=_GYRO) for body in bodies
     ]
@@ -114,7 +155,8 @@ def _chosen(robot: RobotModel) -> list[np.ndarray]:
     return found
 
 
-def _has_room(robot: RobotModel, q: np.ndarray, angle: float) -> bool:
+def has_room(robot: RobotModel, q: np.ndarray, angle: float) -> bool:
+    """Whether axes 1 to 3 may turn by an angle from a position, both in rad, within their ranges."""
     end = q.copy()
     end[:3] += angle
     return bool((end > robot.lower).all() and (end < robot.upper).all())

@@ -25,6 +25,7 @@ from experiments.cli.prepare import noted_robot
 from experiments.cli.staging import PAGE, TABLE, YAML, staged_file
 from experiments.cli.workers import Executor
 from experiments.feedforward.command import realistic_robot
+from experiments.identify.advice.report import ADVICE_HEAD, advice_rows
 from experiments.identify.cases import MotionCases, default_cases, load_cases
 from experiments.identify.closed_loop.drives import driven_motions
 from experiments.identify.excitation import (
@@ -40,6 +41,7 @@ from experiments.identify.fine_tuning.report import (
     number_rows,
 )
 from experiments.identify.fine_tuning.tuning import SHARE
+from experiments.identify.judge.report import SUMMARY_HEAD, judge_summary
 from experiments.identify.plots import table_head, table_rows, verdict, write_identify_page
 from experiments.identify.recording_file import RECORDINGS, read_recording, write_recording
 from experiments.identify.recording_map import Recording
@@ -57,9 +59,11 @@ from experiments.identify.study import (
     IdentifyStudy,
     identify_json,
     study_recording,
+    with_advice,
     with_drives,
     with_fine_tuning,
     with_rectangle,
+    with_verdict,
 )
 from experiments.report.files import write_text
 from robots.description.model import RobotFileError, RobotModel, load_robot
@@ -119,6 +123,20 @@ def identify_command(
         typer.Option(
             "--drives",
             help="Refine drives, friction and dampers in closed loop; needs commands and torques.",
+        ),
+    ] = False,
+    wants_verdict: Annotated[
+        bool,
+        typer.Option(
+            "--judge",
+            help="Then run the motions in the full nonlinear simulation, before and as identified.",
+        ),
+    ] = False,
+    wants_advice: Annotated[
+        bool,
+        typer.Option(
+            "--advise",
+            help="Then look for further motions and sensors that would show what is not identifiable.",
         ),
     ] = False,
     tuned_on_robot: Annotated[
@@ -181,6 +199,8 @@ def identify_command(
             raise ValueError(
                 "--excite only designs a motion: no recording, no motions and no --write go with it"
             )
+        if excite is not None and (wants_advice or wants_verdict):
+            raise ValueError("--excite only designs a motion: there is nothing to --judge or to --advise")
         if not 0.0 < tuning_share < 1.0:
             raise ValueError(f"--tuning-share must be between 0 and 1, got {tuning_share:g}")
         if tuned_on_robot and recording is not None and plant is None:
@@ -223,6 +243,12 @@ def identify_command(
             of_plant = None if recording is not None else DriveConfig()
             with progress_bar("drives in closed loop") as progress:
                 study = with_drives(study, recorded, DriveConfig(), of_plant, progress)
+        if wants_verdict:
+            with progress_bar("full simulation as the judge") as progress:
+                study = with_verdict(study, recorded, where, progress)
+        if wants_advice:
+            with progress_bar("further motions and sensors") as progress:
+                study = with_advice(study, where, progress)
         if tuned_on_robot:
             with progress_bar("fine tuning on the robot") as progress:
                 study = with_fine_tuning(study, where, tuning_share, seed, progress)
@@ -238,6 +264,10 @@ def identify_command(
             write_text(robot_file, robot_text(study.final))
         output.write(identify_json(study) | ({"searches": search_json(searches)} if searches else {}))
     _print(human, study)
+    if study.verdict is not None:
+        human.print(_table(SUMMARY_HEAD, judge_summary(study.verdict)))
+    if study.advice is not None and study.advice.weak:
+        human.print(_table(ADVICE_HEAD, advice_rows(study.advice)))
     if study.fine_tuning is not None:
         human.print(_table(MOTIONS_HEAD, motion_rows(study.fine_tuning)))
         tuned = number_rows(study.fine_tuning)[: len(study.fine_tuning.changed)]  # the page has the others
@@ -264,7 +294,7 @@ def _plant(robot: str, plant: str | None, is_recorded: bool) -> RobotModel | Non
 def _simulated(
     model: RobotModel, truth: RobotModel, motions: MotionCases, seed: int, where: Executor
 ) -> Recording:
-    with progress_bar(f"recording of {count(len(motions.starts(model)), 'motion')}") as progress:
+    with progress_bar(f"recording of {count(len(motions.planned(model)), 'motion')}") as progress:
         return simulated_recording(model, truth, motions, seed, where, progress)
 
 
@@ -276,7 +306,7 @@ def _print(human: Console, study: IdentifyStudy) -> None:
 def _table(head: list[str], rows: list[list[str]]) -> Table:
     table = Table(box=box.SIMPLE_HEAD, padding=(0, 1, 0, 0))
     for name in head:
-        left = name in ("parameter", "unit", "method", "number", "motion")
+        left = name in ("parameter", "unit", "method", "number", "motion", "sensors", "known by")
         table.add_column(name, justify="left" if left else "right", no_wrap=True)
     for row in rows:
         table.add_row(*map(escape, row))

@@ -7,7 +7,9 @@ import plotly.graph_objects as go
 from plotly.subplots import make_subplots
 
 from experiments.cli.console import count
+from experiments.identify.advice.report import advice_sections, advised
 from experiments.identify.fine_tuning.report import fine_tuning_sections, outcome
+from experiments.identify.judge.report import judge_section, judged
 from experiments.identify.search import SEARCH_HEAD, SearchComparison, search_rows
 from experiments.identify.study import IdentifyStudy
 from experiments.report.plot_page import Section, html_table, sortable_table, write_plot_page
@@ -71,6 +73,10 @@ def verdict(study: IdentifyStudy) -> str:
         )
     if study.fine_tuning is not None:
         said.append(outcome(study.fine_tuning))
+    if study.verdict is not None:
+        said.append(judged(study.verdict))
+    if study.advice is not None:
+        said.append(advised(study.advice))
     return " ".join(said)
 
 
@@ -201,6 +207,10 @@ def write_identify_page(path: Path, study: IdentifyStudy, searches: SearchCompar
         420,
     )
     sections = [spectra, parameters]
+    if study.verdict is not None:
+        sections.append(judge_section(study.verdict))
+    if study.advice is not None:
+        sections += advice_sections(study.advice)
     if study.fine_tuning is not None:
         sections += fine_tuning_sections(study.fine_tuning)
     height, cases = _ROW * len(study.found.sensors), study.found.cases

@@ -18,6 +18,7 @@ from experiments.identify.recording_map import (
     Recording,
     RecordingMap,
     check_map,
+    check_payloads,
     check_periods,
     check_times,
     map_of,
@@ -81,8 +82,19 @@ def read_recording(path: Path, columns: Path | None = None, needs_sensors: bool 
         torques = torque[rows] if torque is not None else np.zeros((0, NUM_JOINTS))
         told = commands[rows] if commands is not None else None
         cases.append(
-            RecordedCase(name, time[rows], theta[rows], speed, torques, stamps[rows], readings[rows], told)
+            RecordedCase(
+                name,
+                time[rows],
+                theta[rows],
+                speed,
+                torques,
+                stamps[rows],
+                readings[rows],
+                told,
+                plan.payloads.get(name),
+            )
         )
+    check_payloads(mapped, plan, cases)
     check_periods(path, cases)
     return Recording(plan.payload, cases, places(plan), plan.command_period)
 

@@ -38,6 +38,9 @@ class RecordingMap:
     """What the columns of a recording are."""
 
     payload: float | None = quantity(None, 0.0, unit="kg")  # at the flange; None for the largest
+    payloads: dict[str, float] = field(
+        default_factory=dict
+    )  # kg, of motions with another one, by their names
     case: str = "case"  # column with the name of the motion; empty where there is only one
     time: str = "time"  # column, s by the robot's clock
     stamp: str = ""  # column, s by the clock of the sensors; empty for that of the robot
@@ -66,6 +69,7 @@ def map_of(recording: Recording, has_torque: bool, has_command: bool) -> Recordi
     joints = range(1, NUM_JOINTS + 1)
     return RecordingMap(
         recording.payload,
+        {case.name: case.payload for case in recording.cases if case.payload is not None},
         stamp="stamp",
         position=[f"position_{i}" for i in joints],
         speed=[f"speed_{i}" for i in joints],
@@ -119,12 +123,25 @@ def check_map(plan: RecordingMap, node: Node, needs_sensors: bool) -> None:
         columns = getattr(plan, name)
         if len(columns) not in wanted:
             raise node.at([name]).refuse(f"{name} must be {wanted[-1]} columns, got {len(columns)}")
+    for name, payload in plan.payloads.items():
+        if not payload >= 0.0:
+            raise node.at(["payloads", name]).refuse(
+                f"payloads.{name} must not be negative, got {payload:g} kg"
+            )
     if not plan.sensors and needs_sensors:
         raise node.refuse("sensors: needs one or more, each with name, kind, body and three columns")
     for i, sensor in enumerate(plan.sensors):
         if len(sensor.columns) != 3:
             place = node.at(["sensors", i])
             raise place.refuse(f"sensor '{sensor.name}': columns must be 3, got {len(sensor.columns)}")
+
+
+def check_payloads(path: Path, plan: RecordingMap, cases: list[RecordedCase]) -> None:
+    """Refuses payloads of motions that are not there. Raises RecordingError."""
+    names = [case.name for case in cases]
+    unknown = [name for name in plan.payloads if name not in names]
+    if unknown:
+        raise RecordingError(f"{path}: payloads: no case '{unknown[0]}', there are {', '.join(names)}")
 
 
 def check_times(where: Callable[[int], str], time: np.ndarray, stamps: np.ndarray) -> None:

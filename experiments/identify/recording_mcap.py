@@ -17,6 +17,7 @@ from diagrams.record.topics import INERTIAL, JOINTS, MOTION, TOLD
 from experiments.identify.recording_map import (
     Recording,
     RecordingMap,
+    check_payloads,
     check_periods,
     check_times,
     map_of,
@@ -73,7 +74,9 @@ def read_mcap(path: Path, needs_sensors: bool = True) -> Recording:
         rate = CubicSpline(time, theta).derivative()(time)
         known = torque if np.isfinite(torque).all() else np.zeros((0, NUM_JOINTS))
         told = _told(contents.topics.get(TOLD), joints.time[inside], begin)
-        cases.append(RecordedCase(name, time, theta, rate, known, stamps, readings, told))
+        load = plan.payloads.get(name)
+        cases.append(RecordedCase(name, time, theta, rate, known, stamps, readings, told, load))
+    check_payloads(path, plan, cases)
     check_periods(path, cases)
     return Recording(plan.payload, cases, places(plan), plan.command_period)
 

@@ -1,7 +1,7 @@
 """Recordings of a simulated robot: the full nonlinear plant with drives and all parts of drive trains."""
 
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from pydrake.systems.analysis import Simulator
@@ -49,52 +49,86 @@ class CaseRun:
         period, ahead = config.period, config.drive.command_delay + config.drive.dead_time
         end = trial.settle + trial.profile.duration + self.ringing
         told = commands(trial, np.arange(0.0, end, period) + ahead, period)
-        builder = DiagramBuilder()
-        plant = trial.plant or trial.robot
-        station = builder.AddNamedSystem(
-            "station", SimulatedStation(plant, config, "cascade", takes_torque=True, inertial=[self.logger])
-        )
-        player = builder.AddNamedSystem("commands", CommandPlayer(told, period))
-        for name in ("position_command", "velocity_command", "torque_feedforward"):
-            builder.Connect(player.GetOutputPort(name), station.GetInputPort(name))
-        logs = [
-            LogVectorOutput(station.GetOutputPort(name), builder, step)
-            for name, step in (
-                ("truth.motor_state", _STEP),
-                ("truth.motor_torque", _STEP),
-                ("inertial_sample_1", self.logger.true_period),
-            )
-        ]
-        simulator = Simulator(builder.Build())
-        context = simulator.get_mutable_context()
-        station.set_at_rest(context, told[0, 0], self.seed)
-        rate = station.fastest_rate(context)
-        stiff = IntegratorConfig("radau3", accuracy=_ACCURACY, max_step=_STEP)
-        integration = Integration(stiff, period, rate)
-        integration.initialize(simulator)
-        # Play and friction break the estimate of the error, which then asks for ever smaller steps.
-        simulator.get_mutable_integrator().set_fixed_step_mode(True)
-        try:
-            integration.advance(simulator, end)
-        except RuntimeError as error:
-            raise SimulationError(f"{self.name}: {' '.join(str(error).split())}") from error
-        motor, torque, samples = (log.FindLog(context).data().T for log in logs)
-        time = logs[0].FindLog(context).sample_times()
-        # What is logged of a sampled port at a tick is the sample of the tick before.
-        samples = samples[1:]
+        log = driven(self.name, trial.plant or trial.robot, config, told, self.logger, end, self.seed)
         if progress:
             progress(1.0)
-        issued = np.minimum(np.floor(time / period + _WITHIN), len(told) - 1).astype(int)
+        issued = np.minimum(np.floor(log.time / period + _WITHIN), len(told) - 1).astype(int)
         return RecordedCase(
             self.name,
-            time,
-            motor[:, :NUM_JOINTS],
-            motor[:, NUM_JOINTS:],
-            torque,
-            samples[:, 0],
-            samples[:, 1:].reshape(len(samples), -1, 3),
+            log.time,
+            log.motor[:, :NUM_JOINTS],
+            log.motor[:, NUM_JOINTS:],
+            log.torque,
+            log.samples[:, 0],
+            log.samples[:, 1:].reshape(len(log.samples), -1, 3),
             told[issued],
         )
+
+
+@dataclass(frozen=True)
+class DrivenLog:
+    """What is logged of a station that is told commands; n steps, m samples of the sensors."""
+
+    time: np.ndarray  # (n,) s
+    motor: np.ndarray  # (n, 12), positions in rad, then velocities
+    torque: np.ndarray  # (n, 6) N m
+    samples: np.ndarray  # (m, 1 + 3 sensors), stamps in s, then readings
+
+
+def driven(
+    name: str,
+    plant: RobotModel,
+    config: StationConfig,
+    told: np.ndarray,
+    logger: InertialLoggerConfig,
+    end: float,
+    seed: int,
+) -> DrivenLog:
+    """Simulates a station that is told commands, from rest.
+
+    Args:
+        name: of the motion, for messages.
+        plant: what moves, as the drives know it, too.
+        config: of the station.
+        told: positions in rad, velocities in rad/s and torques in N m, one row a period, (k, 3, 6).
+        logger: of the sensors.
+        end: in s.
+        seed: of their noise.
+
+    Raises:
+        SimulationError: if the integration breaks off.
+    """
+    builder = DiagramBuilder()
+    station = builder.AddNamedSystem(
+        "station", SimulatedStation(plant, config, "cascade", takes_torque=True, inertial=[logger])
+    )
+    player = builder.AddNamedSystem("commands", CommandPlayer(told, config.period))
+    for port in ("position_command", "velocity_command", "torque_feedforward"):
+        builder.Connect(player.GetOutputPort(port), station.GetInputPort(port))
+    logs = [
+        LogVectorOutput(station.GetOutputPort(port), builder, step)
+        for port, step in (
+            ("truth.motor_state", _STEP),
+            ("truth.motor_torque", _STEP),
+            ("inertial_sample_1", logger.true_period),
+        )
+    ]
+    simulator = Simulator(builder.Build())
+    context = simulator.get_mutable_context()
+    station.set_at_rest(context, told[0, 0], seed)
+    rate = station.fastest_rate(context)
+    stiff = IntegratorConfig("radau3", accuracy=_ACCURACY, max_step=_STEP)
+    integration = Integration(stiff, config.period, rate)
+    integration.initialize(simulator)
+    # Play and friction break the estimate of the error, which then asks for ever smaller steps.
+    simulator.get_mutable_integrator().set_fixed_step_mode(True)
+    try:
+        integration.advance(simulator, end)
+    except RuntimeError as error:
+        raise SimulationError(f"{name}: {' '.join(str(error).split())}") from error
+    motor, torque, samples = (log.FindLog(context).data().T for log in logs)
+    # What is logged of a sampled port at a tick is the sample of the tick before.
+    return DrivenLog(logs[0].FindLog(context).sample_times(), motor, torque, samples[1:])
 
 
 def simulated(
@@ -122,12 +156,22 @@ def simulated(
     payload = robot.payload.largest_mass if cases.payload is None else cases.payload
     config = FeedforwardConfig(kind="rigid")
     runs = []
-    for number, (q, angle) in enumerate(cases.starts(robot), 1):
+    planned = cases.planned(robot)
+    for number, motion in enumerate(planned, 1):
         trial = Trial(
-            robot, payload, q, angle, config, plant, settle=cases.settle, speeding_up=cases.speeding_up
+            robot,
+            payload if motion.payload is None else motion.payload,
+            motion.start,
+            motion.angle,
+            config,
+            plant,
+            settle=cases.settle,
+            speeding_up=cases.speeding_up,
         )
         runs.append(CaseRun(f"{number}", trial, cases.logger, cases.ringing, 1000 * seed + number))
-    return in_order(executor or LocalProcesses(), _run, runs, progress)
+    found = in_order(executor or LocalProcesses(), _run, runs, progress)
+    loads = [None if motion.payload == payload else motion.payload for motion in planned]
+    return [replace(case, payload=load) for case, load in zip(found, loads, strict=True)]
 
 
 def simulated_recording(

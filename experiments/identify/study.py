@@ -9,10 +9,14 @@ import numpy as np
 
 from experiments.cli.workers import Executor, Progress, SimulationError, in_order
 from experiments.feedforward.rectangle import RectangleTrial
+from experiments.identify.advice.advise import Advice, advise
+from experiments.identify.advice.report import advice_json
 from experiments.identify.closed_loop.drives import RefinedDrives, refined_drives
 from experiments.identify.closed_loop.fit import GAINS
 from experiments.identify.fine_tuning.report import fine_tuning_json
 from experiments.identify.fine_tuning.tuning import SHARE, FineTuning, fine_tune
+from experiments.identify.judge.judge import Verdict, judge
+from experiments.identify.judge.report import judge_json
 from experiments.identify.recording_map import Recording
 from experiments.identify.slow import slow_json, with_slow_motion
 from robots.description.model import NUM_JOINTS, RobotModel
@@ -43,6 +47,8 @@ class IdentifyStudy:
     rectangle_ratio: dict[str, float] | None  # deviation with `elastic_structure` over that with `rigid`
     drives: RefinedDrives | None = None  # of closed loop
     fine_tuning: FineTuning | None = None  # of the inverse model, on the robot
+    advice: Advice | None = None  # what to record further
+    verdict: Verdict | None = None  # of the full simulation
 
     @property
     def final(self) -> RobotModel:
@@ -172,6 +178,28 @@ def with_fine_tuning(
     return replace(study, fine_tuning=tuning)
 
 
+def with_advice(
+    study: IdentifyStudy, executor: Executor, progress: Callable[[float], None] | None = None
+) -> IdentifyStudy:
+    """The study with what to record further for what it has not found; see `advise`."""
+    advice = advise(study.robot, study.payload, study.found, study.weak, executor, progress)
+    return replace(study, advice=advice)
+
+
+def with_verdict(
+    study: IdentifyStudy,
+    recording: Recording,
+    executor: Executor,
+    progress: Callable[[float], None] | None = None,
+) -> IdentifyStudy:
+    """The study with what the full simulation says of it; see `judge`."""
+    commands = None
+    if study.drives is not None and all(case.commands is not None for case in recording.cases):
+        commands = recording, DriveConfig(), study.drives.drive
+    verdict = judge(study.robot, study.identified, study.found, executor, progress, commands)
+    return replace(study, verdict=verdict)
+
+
 def with_rectangle(
     study: IdentifyStudy, executor: Executor, progress: Callable[[float], None]
 ) -> IdentifyStudy:
@@ -231,6 +259,10 @@ def identify_json(study: IdentifyStudy) -> dict[str, Any]:
         drive = study.drives.drive
         gains = {f"{name}_1_s": getattr(drive.cascade, name) for name in GAINS}
         numbers["drive"] = gains | {"command_delay_s": drive.command_delay}
+    if study.advice is not None:
+        numbers["advice"] = advice_json(study.advice)
+    if study.verdict is not None:
+        numbers["judge"] = judge_json(study.verdict)
     if study.fine_tuning is not None:
         numbers["fine_tuning"] = fine_tuning_json(study.fine_tuning)
     if study.slow is not None:

@@ -22,6 +22,28 @@ _MAD = 1.4826  # of a normal distribution, standard deviation over median of the
 
 
 @dataclass(frozen=True)
+class Evidence:
+    """What the data say of n unknowns and of the lags of c cases, N = n + c; whitened by the spread."""
+
+    information: np.ndarray  # (N, N), without the priors
+    prior: np.ndarray  # (N,), standard deviations of the priors
+    # of cases, sensors and phases (N, N) each: how much they disagree, covariance of the gradient
+    disagreement: list[np.ndarray]
+    alike: np.ndarray  # (n,), standard deviations of what is wrong alike everywhere
+
+    @property
+    def covariance(self) -> np.ndarray:
+        """Of unknowns and lags if nothing but noise were wrong, (N, N)."""
+        return np.linalg.inv(self.information + np.diag(1.0 / self.prior**2))
+
+    def whole(self) -> np.ndarray:
+        """The covariance of the unknowns with all that is in `ArmFit.covariance`, (n, n)."""
+        n, noise = len(self.alike), self.covariance
+        whole = noise + widest([noise @ each @ noise for each in self.disagreement])
+        return whole[:n, :n] + np.diag(np.square(self.alike))
+
+
+@dataclass(frozen=True)
 class ArmFit:
     """The unknowns of an arm, found; n unknowns, c cases."""
 
@@ -32,6 +54,7 @@ class ArmFit:
     spread: np.ndarray  # (channels,) of the residuals in rad/s or m/s^2
     evaluations: int
     condition: float  # of the whitened sensitivities in units of the prior
+    evidence: Evidence | None = None  # which the covariances are from
 
     @property
     def sigma(self) -> np.ndarray:
@@ -226,21 +249,21 @@ class ArmProblem:
         of_sensors = [part_of(J[:, :, k], residuals[:, :, k]) for k in range(channels // 3)]
         information = np.sum([part.information for part in of_cases], axis=0)
         covariance = np.linalg.inv(information + np.diag(1.0 / sigma**2))
-        ways = of_cases, of_sensors, of_phases
-        whole = covariance + widest([scatter(parts, covariance) for parts in ways])
-        alike = [_STEPPED.get(kind, 0.0) for kind in self.parameters.kinds]
-        whole[:n, :n] += np.diag(np.square(alike))
+        alike = np.array([_STEPPED.get(kind, 0.0) for kind in self.parameters.kinds])
+        apart = [disagreement(parts, covariance) for parts in (of_cases, of_sensors, of_phases)]
+        evidence = Evidence(information, sigma, apart, alike)
         of_unknowns = information[:n, :n] * np.outer(sigma[:n], sigma[:n])
         singular = np.linalg.svd(of_unknowns, compute_uv=False)
         condition = float(np.sqrt(singular[0] / max(singular[-1], 1e-300)))
         return ArmFit(
             self.parameters,
             p,
-            whole[:n, :n],
+            evidence.whole(),
             covariance[:n, :n],
             spread,
             evaluations + self.evaluations,
             condition,
+            evidence,
         )
 
 
@@ -278,7 +301,12 @@ def widest(ways: Sequence[np.ndarray]) -> np.ndarray:
 
 
 def scatter(parts: Sequence[DataPart], covariance: np.ndarray) -> np.ndarray:
-    """How far parts of the data pull the unknowns apart: the sandwich covariance, clustered, (n, n).
+    """How far parts of the data pull the unknowns apart: the sandwich covariance, clustered, (n, n)."""
+    return covariance @ disagreement(parts, covariance) @ covariance
+
+
+def disagreement(parts: Sequence[DataPart], covariance: np.ndarray) -> np.ndarray:
+    """Covariance of the gradient by how much parts of the data disagree, (n, n).
 
     What the model lacks is another thing in each case, to each sensor, and in each phase of the motions:
     while the robot speeds up, slows down, and as the ringing dies away. At the solution the gradients of the
@@ -293,10 +321,13 @@ def scatter(parts: Sequence[DataPart], covariance: np.ndarray) -> np.ndarray:
         covariance: of noise alone, the inverse of information and priors, (n, n).
     """
     root = np.linalg.cholesky(covariance)
-    moved = []
+    pulls = []
     for part in parts:
         share, axes = np.linalg.eigh(root.T @ part.information @ root)
         left = np.maximum(1.0 - share, _ALONE)
-        moved.append(root @ axes @ ((axes.T @ root.T @ part.pull) / np.sqrt(left)))
+        pulls.append(axes @ ((axes.T @ root.T @ part.pull) / np.sqrt(left)))
     # A single part is the whole: its gradient is zero.
-    return np.transpose(moved) @ np.array(moved) if len(parts) > 1 else np.zeros_like(covariance)
+    if len(parts) < 2:
+        return np.zeros_like(covariance)
+    corrected = solve_triangular(root.T, np.transpose(pulls))
+    return corrected @ corrected.T

@@ -48,6 +48,22 @@ class ArmIdentification:
     measured: np.ndarray  # (m, cases, channels), NaN where there is none
     before: np.ndarray  # the same as the first beliefs have it
     after: np.ndarray  # and as the unknowns that were found have it
+    payloads: list[float]  # of the cases in kg
+
+
+class _Arms:
+    """One robot with the payloads of all motions."""
+
+    def __init__(self, robot: RobotModel, payload: float, sensors: list[SensorPlace]) -> None:
+        self._robot, self._payload, self._sensors = robot, payload, sensors
+        self._known: dict[float, ElasticArm] = {}
+
+    def carrying(self, payload: float | None = None) -> ElasticArm:
+        """With a payload in kg; None for that of most motions."""
+        mass = self._payload if payload is None else payload
+        if mass not in self._known:
+            self._known[mass] = ElasticArm(self._robot, mass, self._sensors)
+        return self._known[mass]
 
 
 class _Data:
@@ -55,14 +71,15 @@ class _Data:
 
     def __init__(
         self,
-        arm: ElasticArm,
+        arms: "_Arms",
         recorded: Sequence[RecordedCase],
         sensors: list[SensorPlace],
         progress: Progress,
     ) -> None:
-        self.recorded, self.sensors, self._arm = recorded, sensors, arm
+        self.recorded, self.sensors = recorded, sensors
+        self._arms = [arms.carrying(case.payload) for case in recorded]
         self.motions: list[ArmAlongMotion] = []
-        for case in recorded:
+        for case, arm in zip(recorded, self._arms, strict=True):
             self.motions.append(arm.along(case.at_lag(0.0)))
             progress(len(self.motions) / len(recorded))
         self.lags = np.zeros(len(recorded))
@@ -124,7 +141,7 @@ class _Data:
         """Makes equations of some cases those about the arm as it yields and rings with unknowns p."""
         moved = self.problem(parameters, ratio, chosen, Grid()).moved(p)
         for i, each in zip(chosen, moved, strict=True):
-            self.motions[i] = self._arm.about(self.cases[i], self.motions[i], each)
+            self.motions[i] = self._arms[i].about(self.cases[i], self.motions[i], each)
 
     def find_rests(
         self, parameters: ElasticParameters, ratio: np.ndarray, p: np.ndarray, spread: np.ndarray
@@ -205,7 +222,7 @@ def identify_arm(
 
     Args:
         robot: as it is believed to be; its springs and dampers are the start.
-        payload: mass at the flange in kg.
+        payload: mass at the flange in kg, where a motion says nothing else.
         recorded: the motions, each from rest, all with the same period.
         sensors: in the order of the readings.
         gear_parts: whether gears may have play, hysteresis and ripple.
@@ -216,10 +233,11 @@ def identify_arm(
         ValueError: if a sensor sits on a body that the robot does not have.
     """
     tell = progress or (lambda share: None)
-    arm = ElasticArm(robot, payload, sensors)
+    arms = _Arms(robot, payload, sensors)
+    arm = arms.carrying()
     floor, some = sensor_floor(sensors), few(len(recorded))
     everything = list(range(len(recorded)))
-    first = _Data(arm, [recorded[i] for i in some], sensors, lambda share: tell(0.1 * share))
+    first = _Data(arms, [recorded[i] for i in some], sensors, lambda share: tell(0.1 * share))
     check_excitation([case.at_lag(0.0) for case in first.recorded], first.rigid, sensors)
     first.align(first.rigid)
     check_axes(first.cases, first.rigid, sensors)
@@ -236,7 +254,7 @@ def identify_arm(
     p = solve_from_afar(until, plain.start.copy(), floor, lambda shift: first.shift(every, shift))
     evaluations = sum(problem.evaluations for problem in problems)
     # About where the arm sags with these springs, and all of the motions.
-    sagging = ElasticArm(varied(robot, plain.factors(p)), payload, sensors)
+    sagging = _Arms(varied(robot, plain.factors(p)), payload, sensors)
     data = _Data(sagging, recorded, sensors, lambda share: tell(0.2 + 0.2 * share))
     data.align(data.rigid)
     evaluations += data.align_to(plain, robot.gear_ratio, p)
@@ -264,4 +282,7 @@ def identify_arm(
     after = problem.readings(found)
     times = problem.response.kept * recorded[0].period
     lags = data.lags + shift * recorded[0].period
-    return ArmIdentification(arm, data.cases, sensors, lags, fit, times, problem.measured, before, after)
+    payloads = [payload if case.payload is None else case.payload for case in recorded]
+    return ArmIdentification(
+        arm, data.cases, sensors, lags, fit, times, problem.measured, before, after, payloads
+    )

@@ -32,6 +32,7 @@ class RecordedCase:
     readings: np.ndarray  # (m, sensors, 3) rad/s or m/s^2
     # (n, 3, 6) rad, rad/s, N m: what the drives were told last; None where it is not known
     commands: np.ndarray | None = None
+    payload: float | None = None  # kg at the flange, where it is another one than that of the other motions
 
     @property
     def period(self) -> float:

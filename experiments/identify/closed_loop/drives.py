@@ -82,8 +82,14 @@ def refined_drives(
 
 
 def driven_motions(recording: Recording) -> list[RecordedDrive]:
-    """Some of the motions, evenly chosen. Raises RecordingError if they have no commands or torques."""
-    cases = recording.cases
+    """Some of the motions with the payload of the recording, evenly chosen.
+
+    Raises:
+        RecordingError: if they have no commands or torques.
+    """
+    cases = [case for case in recording.cases if case.payload is None]
+    if not cases:
+        raise RecordingError("drives: all motions have payloads of their own, and none that of the recording")
     samples = recording.command_period / cases[0].period
     if samples < 1.0 - _WHOLE or abs(samples - round(samples)) > _WHOLE * samples:
         raise RecordingError(

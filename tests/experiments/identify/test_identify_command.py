@@ -56,6 +56,26 @@ def resting(folder: Path) -> Path:
     return path
 
 
+@pytest.mark.parametrize("suffix", [".csv", ".mcap"])
+def test_motions_keep_payloads_of_their_own(tmp_path: Path, suffix: str):
+    recording = read_recording(resting(tmp_path))
+    heavy, light = (replace(recording.cases[0], name=name) for name in ("7", "8"))
+    path = tmp_path / f"again{suffix}"
+    write_recording(path, replace(recording, cases=[heavy, replace(light, payload=30.0)]))
+    assert [case.payload for case in read_recording(path).cases] == [None, 30.0]
+
+
+def test_payloads_of_motions_that_are_not_there_or_below_zero_are_refused(tmp_path: Path):
+    path = resting(tmp_path)
+    with path.with_suffix(".yaml").open("a") as file:
+        file.write("payloads: {west: 20}\n")
+    changed(path.with_suffix(".yaml"), "payloads: {}\n", "")
+    assert "payloads: no case 'west', there are rest" in refusal(run(tmp_path, f"--recording={path}"))
+    changed(path.with_suffix(".yaml"), "{west: 20}", "{rest: -20}")
+    message = refusal(run(tmp_path, f"--recording={path}"))
+    assert "payloads.rest must not be negative, got -20 kg" in message
+
+
 @pytest.mark.parametrize("suffix", [".csv", ".parquet", ".mcap"])
 def test_a_recording_is_read_as_it_was_written(tmp_path: Path, suffix: str):
     path = tmp_path / f"again{suffix}"
@@ -226,6 +246,8 @@ def test_a_slow_motion_is_designed_and_nothing_else(tmp_path: Path):
 
 REFUSED = {
     "excite": (["--excite=slow.csv", "--write=robot.yaml"], "--excite only designs a motion"),
+    "judge": (["--excite=slow.csv", "--judge"], "there is nothing to --judge or to --advise"),
+    "advise": (["--excite=slow.csv", "--advise"], "there is nothing to --judge or to --advise"),
     "robot": (["--robot=kr211"], "robot 'kr211': no file"),
     "plant": (["--robot=irb140"], "has no variant named irb140-realistic: say what moves by --plant"),
     "recording": (["--recording=none.csv"], "--recording none.csv: no such file"),
@@ -270,6 +292,8 @@ def test_springs_that_are_a_fifth_softer_than_believed_are_found(tmp_path: Path)
         "--no-gear-parts",
         "--no-rectangle",
         "--jobs=2",
+        "--judge",
+        "--advise",
         "--search=1",
         "--search-evaluations=60",
         f"--write={robot}",
@@ -285,6 +309,12 @@ def test_springs_that_are_a_fifth_softer_than_believed_are_found(tmp_path: Path)
     assert load_robot(str(robot)).joints[1].drive_train.stiffness == pytest.approx(
         0.8 * base.joints[1].drive_train.stiffness, rel=0.03
     )
+    # What the full simulation says of it: gyros are off by noise and little else, and the former beliefs by
+    # ten times as much.
+    left = numbers["judge"]["left"]["gyro"]
+    assert left["full"]["found"] < 0.1 * left["full"]["before"]
+    assert left["full"]["found"] < 1.5 * left["linear"]["found"]
+    assert set(numbers["advice"]["parameters"]) == set(numbers["weak"])
     # So few evaluations bring a search without a gradient nowhere near.
     runs = {each["method"]: each for each in numbers["searches"]["runs"]}
     assert set(runs) == {"gradient", "CMA-ES", "genetic, then pattern"}
@@ -292,4 +322,6 @@ def test_springs_that_are_a_fifth_softer_than_believed_are_found(tmp_path: Path)
     assert runs["gradient"]["cost"] == min(each["cost"] for each in runs.values())
     opened = open_page(tmp_path / "identify.html")
     assert "starts that fail" in opened.dom
+    assert "Full simulation as the judge" in opened.dom
+    assert "Further motions and sensors" in opened.dom
     assert not [line for line in opened.console if "rror" in line]

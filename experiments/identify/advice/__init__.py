@@ -1,0 +1,1 @@
+"""Which further motions or sensors would show what a recording does not."""

@@ -1,0 +1,1 @@
+"""What further motions and sensors would tell of an arm: information before anything is recorded."""
