@@ -63,6 +63,21 @@ def test_four_seconds_of_motion_are_enough():
     assert np.median(elsewhere) < 0.3e-3
     assert np.max(elsewhere) < 0.7e-3
     assert np.median(there) < 30e-6  # half the noise of a sample
+    assert np.max(there) < 50e-6
+
+
+def test_reading_the_past_is_put_off_once_where_a_tick_is_long_and_never_twice():
+    session = Session(0)
+    session.learn(1.0)
+    memory, past = session.memory, session.memory.keyframes
+    past.xi_pass[:] = np.inf  # the past is to be read
+    past.position[0] = -1.0
+    memory.is_busy[0], memory.is_behind[0] = 1.0, 0.0
+    session.estimator.work(memory)
+    assert past.position[0] == -1.0
+    memory.is_busy[0] = 1.0  # the next tick is long, too
+    session.estimator.work(memory)
+    assert past.position[0] > -1.0
 
 
 def test_the_error_is_what_the_covariance_says():
