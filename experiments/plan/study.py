@@ -32,7 +32,10 @@ STILL = 2e-3  # m/s, C that is none: 2 mm/s^2 in the mean
 _CALMER = (0.03, 0.12, 0.3, 0.42, 0.55, 0.8)  # of the time that is gained, which is given away for calm
 _CALMER_ENERGY = (0.1, 0.4, 1.0, 10.0, 40.0, 100.0, 150.0, 220.0)  # weights of calm
 _SMOOTHER = 10.0  # motions for laws, which are late, and where the optimiser has not converged
-_SHARP = 60, 0.05  # coefficients and smoothness of motions that may ring: limits are used up to the edge
+_SHARP = (
+    60,
+    0.05,
+)  # coefficients and smoothness of quick motions that may ring: limits are used up to the edge
 _FRONT = (1.0, 1.05, 1.1, 1.2, 1.35, 1.5)  # of the shortest duration
 
 
@@ -71,7 +74,8 @@ class Plan:
     @property
     def sharpness(self) -> tuple[int, float]:
         """Coefficients of the spline, and times how much of the usual weight it is kept smooth."""
-        return _SHARP if self.may_ring and not self.is_for_law else (COEFFICIENTS, 1.0)
+        is_sharp = self.objective == "time" and self.may_ring and not self.is_for_law
+        return _SHARP if is_sharp else (COEFFICIENTS, 1.0)
 
 
 @dataclass(frozen=True)
