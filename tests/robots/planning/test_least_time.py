@@ -62,7 +62,7 @@ def test_no_rigid_arm_is_quicker_on_any_straight_way(name, payload):
 def test_no_optimum_beats_it_and_more_of_a_limit_never_takes_longer():
     robot = load_robot("kr16")
     limits, path = motion_limits(robot), straight_joint_path(*ACROSS)
-    bound = least_time(robot, 16.0, *ACROSS, limits)
+    bound = least_time(robot, 16.0, ACROSS[0], ACROSS[1], limits)
     found = optimum(
         PathDynamics(robot, 16.0, path, "elastic_structure"),
         limits,
@@ -70,4 +70,4 @@ def test_no_optimum_beats_it_and_more_of_a_limit_never_takes_longer():
     )
     assert bound < found.motion.duration
     more = replace(limits, gear_torque_rate=2.0 * limits.gear_torque_rate)
-    assert least_time(robot, 16.0, *ACROSS, more) < bound
+    assert least_time(robot, 16.0, ACROSS[0], ACROSS[1], more) < bound
