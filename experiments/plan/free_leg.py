@@ -19,7 +19,6 @@ from robots.planning.rigid_start import rigid_start
 
 _BENT = (1.0, 0.5, 0.0)  # shares of the free way's bend that are tried
 _PIECES = 60  # in which a way is checked
-_COEFFICIENTS = 36  # of the spline that tells how quick a way is
 
 
 def free_leg(
@@ -29,6 +28,7 @@ def free_leg(
     limits: MotionLimits,
     dynamics: str = "elastic_structure",
     obstacles: tuple[Obstacle, ...] = (),
+    sharpness: tuple[int, float] = (36, 1.0),
 ) -> Leg:
     """The leg between the same joint positions on the way on which it is quickest.
 
@@ -42,6 +42,8 @@ def free_leg(
         limits: of the motion.
         dynamics: of `robots.planning.path_dynamics.DYNAMICS`, that decide.
         obstacles: boxes that the arm keeps clear of.
+        sharpness: coefficients of the spline that tells how quick a way is, and times how much of the usual
+            weight it is kept smooth: a bend pays only as far as its timing can follow it.
 
     Raises:
         PathError: if all ways are blocked, with the place, or the limits admit no motion.
@@ -58,7 +60,7 @@ def free_leg(
             f"the arm touches itself, the floor or an obstacle at {100.0 * max(filter(None, blocked)):.0f} % "
             "of the way; a target in between may lead it round"
         )
-    return min(clear, key=lambda each: _duration(robot, payload, each.path, limits, dynamics))
+    return min(clear, key=lambda each: _duration(robot, payload, each.path, limits, dynamics, sharpness))
 
 
 def blended(straight: Curve, bent: Curve, share: float) -> Curve:
@@ -68,13 +70,21 @@ def blended(straight: Curve, bent: Curve, share: float) -> Curve:
     return Curve(coefficients)
 
 
-def _duration(robot: RobotModel, payload: float, path: Curve, limits: MotionLimits, dynamics: str) -> float:
+def _duration(
+    robot: RobotModel,
+    payload: float,
+    path: Curve,
+    limits: MotionLimits,
+    dynamics: str,
+    sharpness: tuple[int, float],
+) -> float:
     """In s, of the quickest motion; infinite where none is found."""
     try:
         found = optimum(
             PathDynamics(robot, payload, path, dynamics),
             limits,
-            rigid_start(robot, payload, path, limits, _COEFFICIENTS),
+            rigid_start(robot, payload, path, limits, sharpness[0]),
+            smoother=sharpness[1],
         )
     except PathError:
         return np.inf

@@ -57,7 +57,7 @@ def legs_of(robot: RobotModel, path: str) -> list[Leg]:
     elif path == RECTANGLE:
         home = working_position(robot)
         poses = [corner.pose() for corner in rectangle(robot, home)]
-        legs = _through(robot, [(f"corner {i}", pose) for i, pose in enumerate(poses, 1)], home)
+        legs = legs_between(robot, [(f"corner {i}", pose) for i, pose in enumerate(poses, 1)], home)
     elif path.lower().endswith(SUFFIXES):
         legs = _program_legs(robot, path)
     else:
@@ -80,7 +80,7 @@ def _program_legs(robot: RobotModel, path: str) -> list[Leg]:
     first = program.targets[0]
     home = first.q if first.has_joints else working_position(robot)
     named = [(f"{path}, line {each.line}", _place(each)) for each in program.targets]
-    return _through(robot, named, home)
+    return legs_between(robot, named, home)
 
 
 def _place(target: Target) -> np.ndarray:
@@ -90,7 +90,7 @@ def _place(target: Target) -> np.ndarray:
     return target.base.X @ target.X_BT @ np.linalg.inv(X_tool)
 
 
-def _through(robot: RobotModel, places: list[tuple[str, np.ndarray]], home: np.ndarray) -> list[Leg]:
+def legs_between(robot: RobotModel, places: list[tuple[str, np.ndarray]], home: np.ndarray) -> list[Leg]:
     """Legs between places: poses (4, 4), or joint positions (6,) in rad."""
     inverse, legs, q = inverse_kinematics(robot), [], home
     is_first = True

@@ -22,7 +22,7 @@ from robots.planning.limit_use import energy, require_standing
 from robots.planning.limits import MotionLimits
 from robots.planning.optimum import ITERATIONS, Optimum, calmed, optimum
 from robots.planning.path_dynamics import PathDynamics
-from robots.planning.rigid_start import rigid_start
+from robots.planning.rigid_start import quickest_rigid, rigid_start
 from robots.planning.ringing import ringing_band
 from robots.planning.time_spline import TimeSpline, fitted
 
@@ -32,6 +32,10 @@ STILL = 2e-3  # m/s, C that is none: 2 mm/s^2 in the mean
 _CALMER = (0.03, 0.12, 0.3, 0.42, 0.55, 0.8)  # of the time that is gained, which is given away for calm
 _CALMER_ENERGY = (0.1, 0.4, 1.0, 10.0, 40.0, 100.0, 150.0, 220.0)  # weights of calm
 _SMOOTHER = 10.0  # motions for laws, which are late, and where the optimiser has not converged
+_SHARP = (
+    60,
+    0.05,
+)  # coefficients and smoothness of quick motions that may ring: limits are used up to the edge
 _FRONT = (1.0, 1.05, 1.1, 1.2, 1.35, 1.5)  # of the shortest duration
 
 
@@ -67,6 +71,12 @@ class Plan:
     obstacles: tuple[Obstacle, ...] = ()
     is_for_law: bool = False
 
+    @property
+    def sharpness(self) -> tuple[int, float]:
+        """Coefficients of the spline, and times how much of the usual weight it is kept smooth."""
+        is_sharp = self.objective == "time" and self.may_ring and not self.is_for_law
+        return _SHARP if is_sharp else (COEFFICIENTS, 1.0)
+
 
 @dataclass(frozen=True)
 class LegResult:
@@ -92,7 +102,13 @@ def study_plan(plan: Plan, progress: Callable[[float], None] | None = None) -> l
         ValueError: if something that is asked for does not exist, or a leg is impossible; with the place.
     """
     one_of("--objective", OBJECTIVES, plan.objective)
-    legs = legs_of(plan.robot, plan.path)
+    return study_legs(plan, legs_of(plan.robot, plan.path), progress)
+
+
+def study_legs(
+    plan: Plan, legs: list[Leg], progress: Callable[[float], None] | None = None
+) -> list[LegResult]:
+    """The same for legs that are known, whatever ``plan.path`` says; arguments and errors likewise."""
     ready: list[_Ready] = []
     results: list[LegResult] = []
     for number, leg in enumerate([*legs, *legs]):
@@ -133,7 +149,9 @@ def _made_ready(plan: Plan, leg: Leg) -> _Ready:
 
     usual = kept_in_plant(baseline, driver, plan.limits)
     if plan.is_free:
-        leg = free_leg(plan.robot, plan.payload, leg, plan.limits, plan.dynamics, plan.obstacles)
+        leg = free_leg(
+            plan.robot, plan.payload, leg, plan.limits, plan.dynamics, plan.obstacles, plan.sharpness
+        )
         dynamics = PathDynamics(plan.robot, plan.payload, leg.path, plan.dynamics)
         elastic = PathDynamics(plan.robot, plan.payload, leg.path, "elastic_structure")
         driver = PlantDriver(plan.robot, plan.payload, elastic, plan.plant, plan.is_for_law)
@@ -147,9 +165,10 @@ def _planned(plan: Plan, ready: _Ready, allowed: float) -> LegResult:
     def optimal(limits: MotionLimits) -> TimeSpline:
         began = time.perf_counter()
         # Where it does not converge from one, it begins with the other; the usual one has the right duration.
+        count, _ = plan.sharpness
         starts = [
-            rigid_start(plan.robot, plan.payload, ready.leg.path, limits, COEFFICIENTS),
-            as_spline(usual.timing),
+            rigid_start(plan.robot, plan.payload, ready.leg.path, limits, count),
+            as_spline(usual.timing, count),
         ]
         if plan.objective == "energy":
             starts.reverse()
@@ -202,17 +221,15 @@ def calm_enough(
     return best, optimum_of_best
 
 
-def as_spline(timing: Timing) -> TimeSpline:
-    """The spline next to a timing."""
-    return fitted(
-        timing.times / timing.duration, timing.rates(timing.times)[0], timing.duration, COEFFICIENTS
-    )
+def as_spline(timing: Timing, count: int = COEFFICIENTS) -> TimeSpline:
+    """The spline with so many coefficients next to a timing."""
+    return fitted(timing.times / timing.duration, timing.rates(timing.times)[0], timing.duration, count)
 
 
 def _optimal(
     plan: Plan, dynamics: PathDynamics, limits: MotionLimits, starts: list[TimeSpline], usual: float
 ) -> Optimum:
-    smoothers = (_SMOOTHER, _SMOOTHER**2) if plan.is_for_law else (1.0, _SMOOTHER)
+    smoothers = (_SMOOTHER, _SMOOTHER**2) if plan.is_for_law else (plan.sharpness[1], _SMOOTHER)
     for start, smoother in product(starts, smoothers):
         is_frugal = plan.objective == "energy"
         found = optimum(
@@ -267,6 +284,7 @@ def plan_json(plan: Plan, results: list[LegResult]) -> dict[str, Any]:
                 "inverse": each.planned.run.inverse,
                 "time_s": each.planned.timing.duration,
                 "baseline_s": each.baseline.timing.duration,
+                "rigid_s": float(quickest_rigid(plan.robot, plan.payload, each.leg.path, plan.limits)[0][-1]),
                 "energy_j": each.planned.run.energy(plan.recuperation),
                 "baseline_energy_j": each.baseline.run.energy(plan.recuperation),
                 "criterion": each.planned.run.criterion,
