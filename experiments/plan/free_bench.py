@@ -24,9 +24,8 @@ from robots.planning.limits import motion_limits
 from robots.planning.rigid_start import quickest_rigid
 
 _ROBOTS = ("kr16", "kr210")
-_AWAY = np.array(
-    [0.15, 0.35, 0.2]
-)  # of the working position's distance from axis 1: how far poses are from it
+# Of the working position's distance from axis 1: how far poses are from it.
+_AWAY = np.array([0.15, 0.35, 0.2])
 _APART = 0.3  # of that, at least
 _TRIES = 100  # for each pair
 

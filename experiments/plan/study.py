@@ -32,10 +32,8 @@ STILL = 2e-3  # m/s, C that is none: 2 mm/s^2 in the mean
 _CALMER = (0.03, 0.12, 0.3, 0.42, 0.55, 0.8)  # of the time that is gained, which is given away for calm
 _CALMER_ENERGY = (0.1, 0.4, 1.0, 10.0, 40.0, 100.0, 150.0, 220.0)  # weights of calm
 _SMOOTHER = 10.0  # motions for laws, which are late, and where the optimiser has not converged
-_SHARP = (
-    60,
-    0.05,
-)  # coefficients and smoothness of quick motions that may ring: limits are used up to the edge
+# Coefficients and smoothness of quick motions that may ring: limits are used up to the edge.
+_SHARP = 60, 0.05
 _FRONT = (1.0, 1.05, 1.1, 1.2, 1.35, 1.5)  # of the shortest duration
 
 
