@@ -1,12 +1,14 @@
 """What is left when a straight line ends: how far motors and tip still are from where they come to rest.
 
-``python -m experiments.feedforward.line_end [--payload SHARE] [--draws N] [ROBOT...]`` drives the realistic
-robots, with the plain ones believed and with what an identification may find of the true ones.
+``python -m experiments.feedforward.line_end [--payload SHARE] [--draws N] [--first SEED] [--lines N...]
+[ROBOT...]``
+drives the realistic robots, with the plain ones believed and with what an identification may find of the
+true ones.
 """
 
 import argparse
 import time
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from statistics import median
 
@@ -156,15 +158,20 @@ def trial(
     return RectangleTrial(believed, share * true.payload.largest_mass, config, true)
 
 
-def rows(name: str, share: float = 1.0, draws: int = _DRAWS) -> Iterator[str]:
+def rows(
+    name: str,
+    share: float = 1.0,
+    draws: Sequence[int] = range(1, _DRAWS + 1),
+    edges: Sequence[int] = range(_EDGES),
+) -> Iterator[str]:
     """A line of text for each edge, belief and inverse model, the worst of the draws, the time of a tick."""
     true = load_robot(f"{name}-realistic")
     plain = load_robot(name)
-    for edge in range(_EDGES):
+    for edge in edges:
         for label, kind in (("alone", "none"), ("motors", "motors")):
             yield _row(name, edge, "plain", label, _values(trial(plain, true, KIND, kind, share), edge))
         worst = {}
-        for draw in range(1, draws + 1):
+        for draw in draws:
             belief = believed(true, draw)
             for label, kind, beside in (("alone", KIND, "none"), ("corrected", CORRECTED, "motors")):
                 values = _values(trial(belief, true, kind, beside, share), edge)
@@ -192,8 +199,11 @@ if __name__ == "__main__":
     parser.add_argument("robots", nargs="*", default=_ROBOTS)
     parser.add_argument("--payload", type=float, default=1.0, help="share of the largest one")
     parser.add_argument("--draws", type=int, default=_DRAWS, help="of what an identification may find")
+    parser.add_argument("--first", type=int, default=1, help="seed of the first draw")
+    parser.add_argument("--lines", nargs="*", type=int, default=range(1, _EDGES + 1), help="1 to 4")
     chosen = parser.parse_args()
     print(f"{'largest and effective':30}{'of the motors':>18}{'of the tip':>18}{'from its path':>18}")
     for robot in chosen.robots:
-        for row in rows(robot, chosen.payload, chosen.draws):
+        draws = range(chosen.first, chosen.first + chosen.draws)
+        for row in rows(robot, chosen.payload, draws, [line - 1 for line in chosen.lines]):
             print(row, flush=True)

@@ -8,9 +8,11 @@ from pydrake.multibody.tree import JacobianWrtVariable
 from robots.description.model import NUM_JOINTS, RobotModel
 from robots.identification.arm_along_motion import ElasticArm
 from robots.identification.motion import BETA, GAMMA, MotionCase, SensorPlace
+from systems.feedforward.corrected_inverse.resting_places import MIDDLE, Resting
 
-_UNLOADED = 1e-6  # rad: a gear that its load winds up by less is taken to rest in the middle of its play
+_UNLOADED = 1e-6  # rad: a gear that its load winds up by less has no load that holds it in its play
 _CLOSE = 2  # steps from one inverse of the mass matrix to the next, for the hand is light and turns
+_MOVING = 3  # axes whose play moves the tip noticeably
 _PASSES = 6  # of a contraction: what load adds to springs is some hundredths of them
 
 
@@ -29,6 +31,9 @@ class BelievedArm:
     Linear about the motion but for its gears, as `robots.identification.arm_along_motion` has it, and
     integrated as there. Motors move exactly as they are told: what drives and friction make of that is not
     in it.
+
+    Attributes:
+        unloaded: gears of axes 1 to 3 that may rest anywhere within their play before the motion, (6,).
     """
 
     def __init__(self, robot: RobotModel, payload: float, step: float, every: int) -> None:
@@ -72,6 +77,7 @@ class BelievedArm:
             if hysteresis is not None:
                 gear[4:] = hysteresis.stiffness[0], hysteresis.width[0]
         self._plant = parts.plant
+        self.unloaded = np.zeros(NUM_JOINTS, dtype=bool)
         self._context = self._plant.CreateDefaultContext()  # scratch memory only: written before every use
 
     def set_motion(self, theta: np.ndarray, rate: np.ndarray) -> None:
@@ -102,14 +108,25 @@ class BelievedArm:
             x[:NUM_JOINTS] += np.where(np.abs(wound) < _UNLOADED, 0.0, np.sign(wound)) * self._gears[:, 2]
             carried = -motion.load[0] - motion.stiffness[0] @ (x - motion.rest[0])
         self._at_rest = x
+        self.unloaded = (np.abs(carried[:NUM_JOINTS] / self._springs[0, :NUM_JOINTS]) < _UNLOADED) & (
+            self._gears[:, 2] > 0.0
+        )
+        self.unloaded[_MOVING:] = False
 
-    def course(self, offset: np.ndarray, rate: np.ndarray, shapes: np.ndarray | None = None) -> Course:
+    def course(
+        self,
+        offset: np.ndarray,
+        rate: np.ndarray,
+        shapes: np.ndarray | None = None,
+        resting: Resting = MIDDLE,
+    ) -> Course:
         """What the arm does when the motors are off the motion.
 
         Args:
             offset, rate: of the motors in rad and rad/s at the first N steps, (N, 6) each.
             shapes: of which unknown shares are in the motions of motors 1 to 3, and their rates, (N, 2, c);
                 None: nothing is unknown. Number 3 i + j of the unknowns belongs to shape i and motor j.
+            resting: where gears without load begin, and how wide their play is.
         """
         from systems.feedforward.corrected_inverse import arm_kernel  # imports numba
 
@@ -122,13 +139,16 @@ class BelievedArm:
         derived = np.zeros((len(samples), 3, arm_kernel.MOVED * shapes.shape[2]))
         start = self._at_rest.copy()
         start[:NUM_JOINTS] += offset[0]
+        gears = self._gears.copy()
+        gears[self.unloaded, 2] *= resting.play
+        start[:NUM_JOINTS] += np.where(self.unloaded, resting.place * gears[:, 2], 0.0)
         arm_kernel.go_through(
             self._step,
             self._posture,
             self._load[:steps],
             np.ascontiguousarray(np.stack([offset, rate], axis=1)),
             self._springs,
-            self._gears,
+            gears,
             start,
             shapes,
             self._every,

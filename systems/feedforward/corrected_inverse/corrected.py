@@ -15,6 +15,7 @@ from systems.controller_model import ControllerModel
 from systems.feedforward.arm_correction import reach
 from systems.feedforward.config import FeedforwardConfig
 from systems.feedforward.corrected_inverse.believed_arm import BelievedArm
+from systems.feedforward.corrected_inverse.resting_places import ANYWHERE, MIDDLE, Resting, WorstOf
 from systems.feedforward.elastic_structure import ElasticStructureFeedforward
 from systems.feedforward.joint_motion import JointReference
 from systems.feedforward.predictive.correction import smoothness
@@ -24,13 +25,15 @@ _STEP = 1e-3  # s, at most, of the simulation
 _KNOT = 0.016  # s, between knots of what is added to the motion of a motor
 _BEFORE, _AFTER, _SEEN = 0.1, 0.05, 0.3  # s: it begins before the motion, ends after it, and is seen so long
 _AT_REST = 1e-6  # rad/s, of the links
-_LONGEST = 10.0  # s: what is simulated again and again takes half a minute then
+_LONGEST = 10.0  # s: what is simulated again and again takes a minute or more then
 _WINDOW, _AHEAD = 1.5, 1.0  # s: corrected at once, and from one window to the next
 _SMOOTHER = 3.0  # times what is smooth enough for one motor
 _ITERATIONS, _SHARES = 12, (1.0, 0.5, 0.25, 0.125, 0.0625)
-_ENOUGH = 1e-3  # of the cost, by which it still falls
+_ENOUGH, _ENOUGH_ANYWHERE = 1e-3, 1e-2  # of the cost, by which it still falls
 _MOVED, _TINY = 3, 1e-12  # axes whose motors are corrected; share of the squares that counts for nothing
 _SPLINE, _FIXED = 3, 3  # degree; coefficients that are alike at the beginning, and at the end
+
+_Case = tuple[np.ndarray, np.ndarray]  # in m, (n, 3), and by the unknowns, (n, 3, u)
 
 
 class CorrectedFeedforward(ElasticStructureFeedforward):
@@ -44,8 +47,11 @@ class CorrectedFeedforward(ElasticStructureFeedforward):
     judge of every step; a long motion window after window, each a second after the last.
 
     The motors are taken to move as they are told: friction is left to the drives and to
-    `PredictiveCorrection`. It is computed once, from the whole path; then it is played. A gear without load
-    may rest anywhere within its play; before the first motion its middle is believed.
+    `PredictiveCorrection`. It is computed once, from the whole path; then it is played.
+
+    A gear without load may rest anywhere within its play before the motion, and no encoder tells where. Then
+    the motion is simulated from both ends of the play, wider and narrower, and from its middle, and what is
+    least is a smooth worst case of all of them (`WorstOf`), of the distances and of the ringing at the end.
     """
 
     title = "corrected"
@@ -71,7 +77,7 @@ class CorrectedFeedforward(ElasticStructureFeedforward):
         yielding = replace(model, elasticity="structure")
         self._smoothness = _SMOOTHER * reach(model.robot) * smoothness(yielding)  # m s^2
         self._played: tuple[np.ndarray, np.ndarray] | None = None
-        self.history: list[float] = []  # m, the simulated tip's largest distance before each iteration
+        self.history: list[float] = []  # m, the simulated tip's effective distance, before each iteration
 
     def prepare(self, path: CartesianPath, home: np.ndarray) -> None:
         """Simulates and corrects the motion along a path; see `Feedforward.prepare`.
@@ -137,18 +143,24 @@ class CorrectedFeedforward(ElasticStructureFeedforward):
         motion[:, 0] += lead[0]
         self._believed.set_motion(motion[:, 0], motion[:, 1])
         wanted = np.array([self._kinematics.forward(q)[:3, 3] for q in links[:, 0]])
-        added = np.einsum("nds,sj->ndj", shapes, self._found(shapes, wanted))
-        load = self._believed.course(added[:, 0], added[:, 1]).torque
+        added = np.einsum("nds,sj->ndj", shapes, self._found(shapes, wanted, last))
+        courses = [self._believed.course(added[:, 0], added[:, 1], None, each) for each in self._restings()]
+        load = np.mean([course.torque for course in courses], axis=0)
         motion += added
         return self._told(motion, load)
 
-    def _found(self, shapes: np.ndarray, wanted: np.ndarray) -> np.ndarray:
+    def _restings(self) -> Sequence[Resting]:
+        return ANYWHERE if self._believed.unloaded.any() else (MIDDLE,)
+
+    def _found(self, shapes: np.ndarray, wanted: np.ndarray, last: float) -> np.ndarray:
         """How much of each shape is to be added to each motor in rad, (c, 6).
 
         Args:
             shapes: at all steps, with two derivatives, (N, 3, c).
             wanted: where the tip shall be at the ticks in m, (n, 3).
+            last: in s, the last correction.
         """
+        end = round((last - _AFTER) / self._period)
         count, width, ahead = shapes.shape[2], round(_WINDOW / _KNOT), round(_AHEAD / _KNOT)
         share = np.zeros((count, NUM_JOINTS))
         self.history = []
@@ -158,45 +170,66 @@ class CorrectedFeedforward(ElasticStructureFeedforward):
                 until = min(until, round(((first + width) * _KNOT + _SEEN) / self._period))
             steps = (until - 1) * self._every + 1
             window = slice(first, min(first + width, count))
-            share = self._improved(share, window, shapes[:steps], wanted[:until])
+            share = self._improved(share, window, shapes[:steps], wanted[:until], end)
         return share
 
     def _improved(
-        self, share: np.ndarray, window: slice, shapes: np.ndarray, wanted: np.ndarray
+        self, share: np.ndarray, window: slice, shapes: np.ndarray, wanted: np.ndarray, end: int
     ) -> np.ndarray:
-        """The same with better shares of the shapes in a window; see `_found`, up to the window's end."""
+        """The same with better shares of the shapes in a window; see `_found`, up to the window's end.
+
+        The motion ends at a tick: from there on the arm should only rest.
+        """
         unknown = np.ascontiguousarray(shapes[:, :2, window])
         count = unknown.shape[2]
         rough = self._smoothness * np.diff(shapes[:: self._every, 2], axis=0)
         weight = np.kron(rough[:, window].T @ rough, np.eye(_MOVED))
+        restings = self._restings()
+        is_anywhere = len(restings) > 1
+        enough = _ENOUGH_ANYWHERE if is_anywhere else _ENOUGH
 
-        def simulated(share: np.ndarray, unknown: np.ndarray | None = None) -> tuple[np.ndarray, np.ndarray]:
+        def simulated(share: np.ndarray, unknown: np.ndarray | None = None) -> list[_Case]:
+            """What is to be small, and by the unknowns: the gap, and apart from it what rings at the end."""
             offset = np.einsum("nds,sj->dnj", shapes[:, :2], share)
-            course = self._believed.course(offset[0], offset[1], unknown)
-            return course.tip - wanted, course.derived
+            cases = []
+            for resting in restings:
+                course = self._believed.course(offset[0], offset[1], unknown, resting)
+                case = course.tip - wanted, course.derived
+                cases.append(case)
+                if is_anywhere and end < len(wanted) - 1:
+                    gap, derived = (each[end:] - each[end:].mean(axis=0) for each in case)
+                    cases.append((gap, derived))
+            return cases
 
-        def cost(gap: np.ndarray, share: np.ndarray) -> float:
-            return float((gap**2).sum() + ((rough @ share) ** 2).sum())
+        def squares(cases: list[_Case]) -> np.ndarray:
+            return np.array([(gap**2).sum() for gap, _ in cases])
+
+        worst = WorstOf.than(squares(simulated(share)))
+
+        def cost(cases: list[_Case], share: np.ndarray) -> float:
+            return worst.cost(squares(cases)) + float(((rough @ share) ** 2).sum())
 
         own = np.arange(_MOVED * window.start, _MOVED * window.stop)
         for _ in range(_ITERATIONS):
-            gap, derived = simulated(share, unknown)
-            before = cost(gap, share)
-            self.history.append(float(np.linalg.norm(gap, axis=1).max()))
-            J = derived.reshape(-1, derived.shape[2])
-            slope = J.T @ gap.ravel() + weight @ share[:, :_MOVED].ravel()
+            cases = simulated(share, unknown)
+            before = cost(cases, share)
+            self.history.append(float(np.sqrt(worst.cost(squares(cases)) / len(wanted))))
+            slope, normal = weight @ share[:, :_MOVED].ravel(), weight[:, own].copy()
+            for factor, (gap, derived) in zip(worst.slopes(squares(cases)), cases, strict=True):
+                J = derived.reshape(-1, derived.shape[2])
+                slope += factor * (J.T @ gap.ravel())
+                normal += factor * (J.T @ J)
             # What nothing shows, such as a motor within its gear's play, stays as it is.
-            normal = J.T @ J + weight[:, own]
             normal += _TINY * np.trace(normal) / len(normal) * np.eye(len(normal))
             step = np.zeros_like(share)
             step[window, :_MOVED] = np.linalg.solve(normal, -slope).reshape(count, _MOVED)
             trials = (share + part * step for part in _SHARES)
-            costs = ((cost(simulated(trial)[0], trial), trial) for trial in trials)
+            costs = ((cost(simulated(trial), trial), trial) for trial in trials)
             better = next(((after, trial) for after, trial in costs if after < before), None)
             if better is None:
                 return share
             after, share = better
-            if after > (1.0 - _ENOUGH) * before:
+            if after > (1.0 - enough) * before:
                 return share
         return share
 

@@ -19,7 +19,7 @@ from systems.feedforward.predictive.config import PredictiveConfig
 from systems.feedforward.predictive.correction import PredictiveCorrection
 from systems.samples import JointSample
 
-ACROSS = 1  # the edge that goes across
+AWAY, ACROSS = 0, 1  # edges: the one away from the robot, and across
 ALONE, CORRECTED = 0, 1
 
 
@@ -106,6 +106,20 @@ def test_with_what_an_identification_finds_the_tip_comes_to_rest_twice_as_near(n
     alone, corrected = across(belief, true, "elastic_structure"), across(belief, true, "corrected", "motors")
     assert corrected.tip.largest < 0.5 * alone.tip.largest
     assert corrected.tip.effective < 0.5 * alone.tip.effective
+
+
+@pytest.mark.slow
+def test_where_axis_1_may_rest_anywhere_in_its_play_no_more_is_left_than_uncorrected():
+    """Away from the robot, with half the load: there a correction for one place alone makes it swing more."""
+    true = load_robot("kr210-realistic")
+    belief = believed(true, 3)
+    half = [
+        trial(belief, true, kind, beside, share=0.5)
+        for kind, beside in (("elastic_structure", "none"), ("corrected", "motors"))
+    ]
+    alone, corrected = (line_end(each, line_scenario(each, AWAY)) for each in half)
+    assert corrected.tip.largest < alone.tip.largest
+    assert corrected.tip.effective < alone.tip.effective
 
 
 @pytest.mark.slow

@@ -8,6 +8,7 @@ from diagrams.runs.simulation import run
 from experiments.feedforward.line_end import LAW, line_scenario, trial
 from robots.description.model import NUM_JOINTS, load_robot
 from systems.feedforward.corrected_inverse.believed_arm import BelievedArm
+from systems.feedforward.corrected_inverse.resting_places import Resting
 
 ROBOT, STEP, EVERY = load_robot("kr16-realistic"), 1e-3, 4
 LOAD = ROBOT.payload.largest_mass
@@ -51,6 +52,21 @@ def test_an_arm_at_rest_stays_at_rest():
     course = arm.course(still, still)
     assert np.ptp(course.tip, axis=0) == pytest.approx(0.0, abs=1e-7)  # m
     assert np.ptp(course.torque, axis=0) == pytest.approx(0.0, abs=0.5)  # N m
+
+
+def test_a_gear_without_load_rests_where_it_is_put_in_its_play():
+    """Axis 1 stands upright: the tip is off by the play times its distance from it, and stays there."""
+    _, theta, _ = swung()
+    theta = np.tile(theta[0], (100, 1))
+    still = np.zeros_like(theta)
+    arm = BelievedArm(ROBOT, LOAD, STEP, EVERY)
+    arm.set_motion(theta, still)
+    assert list(arm.unloaded) == [True] + 5 * [False]
+    one, other = (arm.course(still, still, None, Resting(place, 1.5)).tip for place in (-1.0, 1.0))
+    assert ROBOT.drive_trains is not None
+    width = 2.0 * 1.5 * ROBOT.drive_trains.half_gap[0]
+    distances = np.linalg.norm(other - one, axis=1)
+    assert distances == pytest.approx(width * np.linalg.norm(one[0, :2]), rel=1e-3)
 
 
 @pytest.mark.slow
