@@ -110,6 +110,23 @@ class PositionLevel(ServoLaw):
 
     def step(self, moment: LawInput, memory: np.ndarray) -> LawOutput:
         """Integrates the correction and commands the joints for the corrected pose."""
+        if isinstance(self._orientation, EulerCorrection):
+            return self._step_as_written(moment, memory)
+        X_WC, V_WC, kept, correction = self.kernels.corrected_pose(
+            moment.X_WD,
+            moment.V_WD,
+            *(moment.measured or (moment.X_WD, moment.X_WD)),
+            moment.measured is not None,
+            memory,
+            (self.config.rotation, self.config.translation),
+            (self.angle_limit, self.config.correction_limit),
+            self.period,
+        )
+        joints = self.joints_at(X_WC, V_WC, memory[_JOINTS])
+        return LawOutput(joints[:6], joints[6:12], correction, np.concatenate([kept, joints]))
+
+    def _step_as_written(self, moment: LawInput, memory: np.ndarray) -> LawOutput:
+        """The same with any form of the correction, as its class says it."""
         turn, shift = memory[_TURN], memory[_SHIFT]
         turning = moving = np.zeros(3)
         if moment.measured is not None:

@@ -148,6 +148,69 @@ def numerical_ik(X_WD, V_WD, wanted, seen, is_seen, X_WE, J, memory, gains, limi
     return following, correction
 
 
+@compiled
+def turned_by(turn, out):
+    """The rotation matrix of a rotation vector (3,) in rad into (3, 3), the Euler-Rodrigues formula."""
+    angle = math.sqrt(turn[0] ** 2 + turn[1] ** 2 + turn[2] ** 2)
+    scale = angle if angle > 0.0 else 1.0
+    x, y, z = turn[0] / scale, turn[1] / scale, turn[2] / scale
+    s, v = math.sin(angle), 1.0 - math.cos(angle)
+    out[0, 0], out[0, 1], out[0, 2] = 1.0 - v * (y * y + z * z), v * x * y - s * z, v * x * z + s * y
+    out[1, 0], out[1, 1], out[1, 2] = v * x * y + s * z, 1.0 - v * (x * x + z * z), v * y * z - s * x
+    out[2, 0], out[2, 1], out[2, 2] = v * x * z - s * y, v * y * z + s * x, 1.0 - v * (x * x + y * y)
+
+
+@compiled
+def corrected_pose(X_WD, V_WD, wanted, seen, is_seen, memory, gains, limits, period):
+    """What `systems.servo.position_level.PositionLevel` commands with rotation vectors.
+
+    Args:
+        X_WD, V_WD: wanted pose and twist.
+        wanted, seen: poses at an exposure; only if something ``is_seen``.
+        memory: of the last tick, of which the first six are the correction: rotation vector and shift.
+        gains: of rotation and translation in 1/s.
+        limits: of the correction in rad and m.
+        period: of a tick in s.
+
+    Returns:
+        The pose (3, 4) and the twist (6,) to command, the correction that is remembered (6,), and the same
+        in the world (6,).
+    """
+    kept, rate, gap = memory[:6].copy(), np.zeros(6), np.empty(6)
+    C, step, both = np.zeros((3, 4)), np.empty((3, 3)), np.zeros((3, 4))
+    if is_seen:
+        error(wanted, seen, gap)
+        for i in range(3):
+            for k in range(3):
+                rate[i] += gains[0] * gap[k] * seen[k, i]
+            rate[3 + i] = gains[1] * gap[3 + i]
+            kept[3 + i] += period * rate[3 + i]
+        turned_by(kept[:3], C[:, :3])
+        turned_by(period * rate[:3], step)
+        for i in range(3):
+            for j in range(3):
+                both[i, j] = C[i, 0] * step[0, j] + C[i, 1] * step[1, j] + C[i, 2] * step[2, j]
+        error(both, np.eye(4)[:3], gap)
+        kept[:3] = gap[:3]
+    for part in range(2):
+        first = 3 * part
+        size = math.sqrt(kept[first] ** 2 + kept[first + 1] ** 2 + kept[first + 2] ** 2)
+        if size > limits[part]:
+            for i in range(first, first + 3):
+                kept[i] *= limits[part] / size
+    turned_by(kept[:3], C[:, :3])
+    X_WC, V_WC, correction = np.zeros((3, 4)), V_WD.copy(), kept.copy()
+    for i in range(3):
+        X_WC[i, 3] = X_WD[i, 3] + kept[3 + i]
+        V_WC[3 + i] += rate[3 + i]
+        correction[i] = 0.0
+        for j in range(3):
+            X_WC[i, j] = X_WD[i, 0] * C[0, j] + X_WD[i, 1] * C[1, j] + X_WD[i, 2] * C[2, j]
+            V_WC[i] += X_WC[i, j] * rate[j]
+            correction[i] += X_WD[i, j] * kept[j]
+    return X_WC, V_WC, kept, correction
+
+
 def warm_up() -> None:
     """Calls everything once with arrays as a tick has them, so that no tick waits for a compiler."""
     X, J, V = np.eye(4)[:3].copy(), np.eye(6), np.zeros(6)
@@ -158,3 +221,4 @@ def warm_up() -> None:
     robust_solve(J, V[:, None])
     error(X, X, np.empty(6))
     numerical_ik(X, V, X, X, True, X, J, np.zeros(24), (1.0, 1.0), (1.0, 1.0), 1.0)
+    corrected_pose(X, V, X, X, True, np.zeros(24), (1.0, 1.0), (1.0, 1.0), 1.0)

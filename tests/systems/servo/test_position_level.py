@@ -12,6 +12,7 @@ from systems.guard.guard import GuardConfig
 from systems.reference.paths import ReferenceConfig, make_path
 from systems.reference.shapes import Circle
 from systems.servo.euler_correction import EulerCorrection
+from systems.servo.law import LawInput
 from systems.servo.position_level import PositionLevel, PositionLevelConfig, RotationVectorCorrection
 from tests.systems.rigs import PERIOD, LawRig
 
@@ -61,6 +62,23 @@ def test_a_constant_turn_dies_by_its_gain_however_large_it_is(size: float):
         error = correction.rate(_rows(R_WD), _rows(R_WC @ D))
         assert np.linalg.norm(error) == pytest.approx(size * (1.0 - gain * PERIOD) ** step, rel=1e-9)
         turn = correction.moved(turn, gain * PERIOD * error)
+
+
+@pytest.mark.parametrize("is_seen", [True, False])
+def test_the_compiled_step_is_that_of_the_class_to_rounding(is_seen: bool):
+    """Also where the correction stands at its limits."""
+    config = PositionLevelConfig(correction_limit=0.02, correction_limit_deg=2.0)
+    law = PositionLevel(ControllerModel(ROBOT), config, GuardConfig())
+    rng = np.random.default_rng(1)
+    for scale in (1e-3, 0.03, 0.3):
+        X, V, seen = looking(80.0)[:3].copy(), rng.normal(size=6), looking(80.0 + 50.0 * scale)[:3].copy()
+        seen[:, 3] += scale * rng.normal(size=3)
+        q = InverseKinematics(ROBOT).nearest(looking(80.0), np.zeros(6))
+        memory = np.concatenate([scale * rng.normal(size=6), q, np.zeros(12)])
+        moment = LawInput(X, V, q, (X, seen) if is_seen else None)
+        compiled, written = law.step(moment, memory.copy()), law._step_as_written(moment, memory.copy())
+        for one, other in zip(compiled, written, strict=True):
+            np.testing.assert_allclose(one, other, atol=1e-9)  # joints are 1e3 of rounding near a singularity
 
 
 @pytest.mark.parametrize("form", [RotationVectorCorrection, EulerCorrection])
