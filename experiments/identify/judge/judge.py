@@ -74,7 +74,7 @@ def judge(
 
     Args:
         robot: as it was believed to be.
-        written: as it goes into the file, with former values where none is identifiable.
+        written: as it goes into the file, with former values where motions hardly show any.
         found: by the identification.
         executor: where they are simulated, each motion of each robot a job.
         progress: is called now and then with the share that is done, 0 to 1.

@@ -60,9 +60,9 @@ def judge_section(verdict: Verdict) -> Section:
     note = (
         f"{judged(verdict)} Root mean squares of measured readings about those at rest, and of what is left "
         "of them. Motors move as measured, in the full nonlinear simulation of the robot as it was believed "
-        "to be, as it is written (with former values where the motions show none) and with all values found, "
-        "and in the model that identifies. Where the values found leave as much in both, that model was good "
-        "enough."
+        "to be, as it is written (with former values where motions hardly show any) and with all values "
+        "found, and in the model that identifies. Where the values found leave as much in both, that model "
+        "was good enough."
     )
     return Section("Full simulation as the judge", note, html_table(judge_head(verdict), judge_rows(verdict)))
 
