@@ -25,6 +25,7 @@ _SUDDEN = 60.0  # by which chi squared is smaller with a step than with a parabo
 _FOREIGN = 8.0  # sigmas of what robots of this kind may be off by
 _PAUSE = 50  # samples after an event before the next one
 _SCATTER, _LEAST_SCATTER = 500, 100  # samples, in the mean of the camera's noise; and before it is said
+_MOST_SCATTER = 9.0  # times that mean, by a single change
 _EXPLAINED = 0.15  # what a cause leaves of the mean error if it is the cause
 
 
@@ -234,7 +235,8 @@ class Innovations:
         if memory.changes[0] == 0.0:
             memory.last[:] = r
         share = 1.0 / min(max(float(memory.changes[0]), 1.0), _SCATTER)
-        kernels.innovations.scatter(r, memory.last, memory.scatter, share)
+        means = memory.last, memory.scatter
+        kernels.innovations.scatter(r, *means, self._variances, _MOST_SCATTER, share)
         memory.changes[0] += 1.0
         return bool(memory.changes[0] >= _LEAST_SCATTER)
 

@@ -3,11 +3,9 @@
 import math
 from dataclasses import dataclass, field
 from types import SimpleNamespace
-from typing import NamedTuple
 
 import numpy as np
 
-from robots.description.model import NUM_JOINTS
 from systems.estimation import kernels
 from systems.estimation.arm_geometry import Constants
 from systems.estimation.camera_moves import CameraMoves
@@ -21,10 +19,10 @@ from systems.estimation.events import (
     Event,
     Innovations,
 )
-from systems.estimation.gear_errors import NUM_SHAPES, NUM_STATES
+from systems.estimation.gear_errors import NUM_SHAPES
 from systems.estimation.keyframes import Keyframes, open_keyframe
 from systems.estimation.memory import Layout
-from systems.estimation.tip_model import NO_SHAPES, Prediction, Spread, TipModel
+from systems.estimation.tip_model import NO_SHAPES, Pair, Prediction, Spread, TipModel
 from systems.estimation.unmodelled import Doubts, Unmodelled
 
 _AGAIN = 500  # samples, in which a second event says that the first was explained wrongly
@@ -35,6 +33,7 @@ _KEEP_EVERY = 10  # samples, between two notes of what is known
 _DRIFT_EVERY = 50  # samples, between two looks whether the clock drifts, halfway between two such notes
 # s/s; and how sure it has to be, as what no parameter describes adds up.
 _LEAST_DRIFT, _DRIFT_SIGMAS = 1e-4, 8.0
+_CALM_WEIGHT = 0.2  # of a sample, below which it says nothing of events or of the camera
 _CLOSE_AT = (5, 20, 60)  # samples: the first linearisations are poor
 
 
@@ -51,20 +50,6 @@ class TipEstimatorConfig:
     geometry_step: float = 1e-4  # m or rad, within which poses are linear in the parameters
     calm: float = 0.05  # m/s^2, of the tip by parameters that are led in: more makes samples count less
     test_after: int = 250  # samples before events are looked for
-
-
-class Pair(NamedTuple):
-    """One instant: what the encoders said, what the camera saw, and what the plan knows of it."""
-
-    theta: np.ndarray  # (6,) rad
-    loads: np.ndarray  # (5, 18) N m, as `ArmLoads.at` gives them
-    motion: np.ndarray  # (12,), velocity and acceleration of the joints
-    twist: np.ndarray  # (6,), of the tip
-    X_WE: np.ndarray  # (4, 4), seen
-    unrest: float = 0.0  # m/s^2, of the tip by parameters that are led in
-    states: np.ndarray = np.zeros(NUM_STATES)  # of the gears, see `GearErrors`
-    time: float = 0.0  # s, as the camera's clock has it
-    rounding: np.ndarray = np.zeros(NUM_JOINTS)  # rad, standard deviation of theta by steps of the encoders
 
 
 class TipEstimator:
@@ -148,11 +133,16 @@ class TipEstimator:
 
         The camera's noise is measured: with f times the variance that is believed, weights stay what they
         are, and P (A_0 + f (A - A_0)) P is the covariance of what they give, P = A^-1. A noisier camera than
-        is believed casts doubt on what was known before, too: then it is f P.
+        is believed casts doubt on what was known before, too: then it is f P. Where A_0 has been taken back
+        since, because something happened, f is not counted below 1.
         """
         P = np.linalg.inv(memory.keyframes.A + memory.A_open)
         factor = self.variance_factor(memory)
-        return factor * P + max(0.0, 1.0 - factor) * P @ self.model.prior @ P
+        if factor >= 1.0:
+            return factor * P
+        by_prior = P @ self.model.prior @ P
+        is_taken_back = (np.diag(by_prior) > np.diag(P)).any()
+        return P if is_taken_back else factor * P + (1.0 - factor) * by_prior
 
     def covariance_of_robot(self, memory: SimpleNamespace) -> np.ndarray:
         """The same of `x_robot`."""
@@ -226,7 +216,7 @@ class TipEstimator:
             verdict = self._innovations.judge(innovations, r, H, lambda: self._solve_columns(memory, H))
             if verdict.is_outlier:
                 return None
-            if self._innovations.measure_noise(innovations, r):
+            if weight > _CALM_WEIGHT and self._innovations.measure_noise(innovations, r):
                 self._unmodelled.add(memory.unmodelled, r, lambda: self._doubts(memory, H, pair))
             if verdict.has_jumped or verdict.has_drifted:
                 self._unmodelled.rest(memory.unmodelled)
@@ -234,13 +224,13 @@ class TipEstimator:
                 memory.was_settled[0] = self._keyframes.is_settled(memory.keyframes, memory.xi)
             if verdict.is_doubtful and memory.was_settled[0]:
                 return None  # a few samples later it is known what they mean
-            if verdict.has_jumped and weight > 0.2:
+            if verdict.has_jumped and weight > _CALM_WEIGHT:
                 event = self._innovations.explain(innovations, H, self.model)
                 self._camera_or_tool.begin(memory.after_step, may_be_camera=event.kind != LOAD_CHANGED)
                 if event.kind == TOOL_DISPLACED and memory.after_step.is_open[0]:
                     event, memory.after_step.is_event[0] = event._replace(kind=TOOL_OR_CAMERA), 1.0
                 self._widen(memory, event)
-            elif verdict.has_drifted and weight > 0.2:
+            elif verdict.has_drifted and weight > _CALM_WEIGHT:
                 self._innovations.forget(innovations)
                 self._camera_or_tool.begin(memory.after_step)
                 if memory.was_settled[0]:
@@ -365,10 +355,19 @@ class TipEstimator:
         again = memory.count[0] - memory.event_at[0] < _AGAIN
         memory.event_at[0] = memory.count[0]
         share = 1.0 if again or event.kind == LOAD_CHANGED else _OF_THE_LOAD
+        tool = self.model.tool_directions()
+        self._open(memory, share, tool @ tool.T)
+
+    def open_load(self, memory: SimpleNamespace) -> None:
+        """Takes what is known of the load back, and nothing else: the motors say that it may have changed."""
+        self._innovations.forget(memory.innovations)
+        self._unmodelled.rest(memory.unmodelled)
+        self._open(memory, 1.0, 0.0)
+
+    def _open(self, memory: SimpleNamespace, share: float, others: np.ndarray | float) -> None:
+        """Adds to the covariance of the unknowns: a share of the load's spread, and others, (n, n)."""
         model = self.model
-        P = np.linalg.inv(memory.keyframes.A + memory.A_open)
-        tool = model.tool_directions()
-        P = P + tool @ tool.T
+        P = np.linalg.inv(memory.keyframes.A + memory.A_open) + others
         load = np.zeros(model.size)
         load[model.M] = share * np.array([4.0, 0.3, 0.3, 0.3]) / model.sigma[model.M]
         A = np.linalg.inv(P + np.diag(load**2))

@@ -12,7 +12,7 @@ from systems.controller_model import ControllerModel
 from systems.estimation import kernels
 from systems.estimation.arm_geometry import Arm, ArmGeometry, Constants
 from systems.estimation.arm_loads import ArmLoads
-from systems.estimation.gear_errors import NUM_SHAPES, GearErrors
+from systems.estimation.gear_errors import NUM_SHAPES, NUM_STATES, GearErrors
 from systems.estimation.kernels.arrays import Seen, SeenOnce, Unknowns
 from systems.estimation.learnt_robot import known_before
 
@@ -39,6 +39,20 @@ class Spread:
     gear_error: float = (
         0.0  # rad, of a gear's waves, gap and hysteresis; 5e-5 is a good guess where there are
     )
+
+
+class Pair(NamedTuple):
+    """One instant: what the encoders said, what the camera saw, and what the plan knows of it."""
+
+    theta: np.ndarray  # (6,) rad
+    loads: np.ndarray  # (5, 18) N m, as `ArmLoads.at` gives them
+    motion: np.ndarray  # (12,), velocity and acceleration of the joints
+    twist: np.ndarray  # (6,), of the tip
+    X_WE: np.ndarray  # (4, 4), seen
+    unrest: float = 0.0  # m/s^2, of the tip by parameters that are led in
+    states: np.ndarray = np.zeros(NUM_STATES)  # of the gears, see `GearErrors`
+    time: float = 0.0  # s, as the camera's clock has it
+    rounding: np.ndarray = np.zeros(NUM_JOINTS)  # rad, standard deviation of theta by steps of the encoders
 
 
 class Prediction(NamedTuple):

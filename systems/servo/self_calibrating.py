@@ -18,19 +18,17 @@ from systems.estimation.preview_planner import PreviewPlanner, Wanted
 from systems.estimation.probing.path_needs import PathNeeds, Standing
 from systems.estimation.probing.probe import Probe
 from systems.estimation.probing.probe_design import designed
-from systems.estimation.tip_estimator import Pair
+from systems.estimation.tip_model import Pair
 from systems.guard.guard import GuardConfig
 from systems.reference.cartesian_path import CartesianPath
 from systems.reference.reference import PathAhead
 from systems.samples import JointSample, PoseSample
-from systems.servo.self_calibrating_ahead import NextCommand
+from systems.servo.self_calibrating_ahead import NextCommand, Pace
 from systems.servo.self_calibrating_config import SelfCalibratingConfig
 from systems.servo.self_calibrating_learning import UNREST, Learning
 
 _STARTING = 1.5  # s
 _FOLLOWED = 4.0  # rad of the lead's frequency, after which nine tenths of a step are followed
-_CAREFUL = 0.25  # of the planned speed, while the dead time or the load is not what it was
-_BEFORE_PATH = 0.6  # s, at which it is held until the dead time is found; a slowed path needs time to stop
 
 
 class SelfCalibrating(LeafSystem):
@@ -48,7 +46,7 @@ class SelfCalibrating(LeafSystem):
         out ``measurement``         vector 3: when the last usable sample arrived (s), how many were refused,
                                     when the newest one was exposed (s)
         out ``speed_share``         1: less than all of the planned speed while the dead time is wrong, none
-                                    before it is found
+                                    before it is found, nor while a blind camera is waited for
         out ``look_ahead``          1 in s: how far ahead of now the plan is
 
     Of each camera sample the encoder positions of the same instant are found; the pair teaches the
@@ -81,6 +79,7 @@ class SelfCalibrating(LeafSystem):
         self._learning = learning = Learning(model, config)
         self.tip_model, self.estimator, self._drives = learning.tip_model, learning.estimator, learning.drives
         self._lead = ParameterLead(self.tip_model.size, config.lead_frequency, config.lead_acceleration)
+        self._pace = Pace(model, config, learning)
         self._planner = PreviewPlanner(self.tip_model, model.period)
         self._probe = Probe(model.robot, config.probe, model.camera_period)
         arrays = {
@@ -90,6 +89,7 @@ class SelfCalibrating(LeafSystem):
             "start_time": (1,),
             "planned": (1,),  # the last instant of the plan
             "amplitude": (2, NUM_JOINTS),  # of the probe: knock, oscillations
+            "waited": (1,),  # s, by its oscillations for the dead time to be found and followed
             **learning.arrays,
         }
         self._next = NextCommand(Layout(**arrays))
@@ -125,6 +125,7 @@ class SelfCalibrating(LeafSystem):
             self._needs = PathNeeds(self.tip_model, self.estimator.weights, path, home, self._late)
         except ValueError:
             return  # out of reach of the nominal robot: whoever starts the run says so
+        self._pace.needs = self._needs
         rate = 1.0 / max(self.period, self._model.camera_period)  # of a tick one sample is taken
         sharp = self._config.probe.sharp
         found = designed(self._needs, self._probe, path.path_start, rate, sharp)
@@ -289,27 +290,12 @@ class SelfCalibrating(LeafSystem):
         for state, command in zip(self._outputs, commands, strict=False):
             discrete_state.set_value(int(state), command)
         ahead = float(memory.planned[0]) - time
-        share = self._speed_share(memory, reference, time)
+        share = self._pace.share(memory, reference, time)
         for state, value in zip(self._outputs[5:], (share, ahead), strict=True):
             discrete_state.set_value(int(state), [value])
         model = self.tip_model
         learnt = memory.lead.x[model.G] - model.mean[model.G]
         discrete_state.set_value(int(self._outputs[3]), memory.columns @ learnt)
-
-    def _note_vague(self, memory: SimpleNamespace, time: float) -> None:
-        """Says so if nothing has shown well enough what the path needs that begins now."""
-        sigma = self._forecast.sigma if self._forecast else 0.0
-        if sigma > self._config.probe.vague:
-            self._learning.events.note(memory.events, time, Event(PATH_UNSEEN, sigma, sigma))
-
-    def _speed_share(self, memory: SimpleNamespace, reference: PathAhead, time: float) -> float:
-        """The share of the planned speed at which the path may be run with what is known of the dead time."""
-        instant = float(memory.planned[0])
-        if not memory.delay.known[0]:
-            is_near = reference.path_time(instant) > reference.path.path_start - _BEFORE_PATH
-            return 0.0 if is_near else 1.0
-        is_upset = time < memory.paused_until[0] or not self._learning.delay.is_settled(memory.delay, instant)
-        return _CAREFUL if is_upset else 1.0
 
     def _command(
         self, memory: SimpleNamespace, reference: PathAhead, time: float, position: np.ndarray
@@ -356,7 +342,10 @@ class SelfCalibrating(LeafSystem):
         lead, since_start = memory.lead, time - memory.start_time[0]
         self._lead.step(lead, self.estimator.x_robot(memory.estimator), memory.columns, self.period)
         first, last = memory.first[0], memory.planned[0]
-        aside = self._probe.at(instant - first, path_start - first, memory.amplitude)
+        if not self._learning.delay.is_settled(delay, instant):
+            memory.waited[0] = self._probe.waited(instant - first, float(memory.waited[0]))
+        waited = float(memory.waited[0])
+        aside = self._probe.at(instant - first, path_start - first, memory.amplitude, waited)
         wanted = Wanted(moment.X_WE, moment.V_WE, aside)
         plan = self._planner.step(memory.planner, (lead.x, lead.rate), wanted, since_start, instant - last)
         memory.columns[:] = plan.columns[:, 18:]

@@ -1,12 +1,20 @@
-"""The next command of the self-calibrating law, worked out before the message is there that asks for it."""
+"""What is ahead of the self-calibrating law: its next command, and how fast the path may go on."""
 
 from types import SimpleNamespace
 
 import numpy as np
 
+from systems.controller_model import ControllerModel
 from systems.estimation.memory import Layout
+from systems.estimation.probing.path_needs import PathNeeds
 from systems.reference.reference import PathAhead
-from systems.servo.self_calibrating_learning import PLAN
+from systems.servo.self_calibrating_config import SelfCalibratingConfig
+from systems.servo.self_calibrating_learning import PLAN, Learning
+
+_CAREFUL = 0.25  # of the planned speed, while the dead time or the load is not what it was
+_BEFORE_PATH = 0.6  # s, at which it is held until the dead time is found; a slowed path needs time to stop
+_MISSED = 5.0  # samples one after the other that no camera loses by chance: it is blind
+_NEXT = 0.3  # s of the path that are looked at while it is; about what is still run while it is slowed
 
 
 def _renewed(memory: SimpleNamespace) -> list[np.ndarray]:
@@ -17,6 +25,7 @@ def _renewed(memory: SimpleNamespace) -> list[np.ndarray]:
         memory.planner.all,
         memory.columns.ravel(),
         memory.planned,
+        memory.waited,
         drives.started,
         drives.z.ravel(),
         drives.w.ravel(),
@@ -69,3 +78,42 @@ class NextCommand:
         for part, end in zip(_renewed(memory), self._ends, strict=True):
             part[:] = memory.next.before[start:end]
             start = end
+
+
+class Pace:
+    """The share of the planned speed at which the path may be run with what is known."""
+
+    needs: PathNeeds | None = None  # once the path is known
+
+    def __init__(self, model: ControllerModel, config: SelfCalibratingConfig, learning: Learning) -> None:
+        """Takes what it asks."""
+        self._period, self._config, self._learning = model.period, config, learning
+        self._blind_after = _MISSED * max(model.period, model.camera_period)  # s
+
+    def share(self, memory: SimpleNamespace, reference: PathAhead, time: float) -> float:
+        """None of it before the probe is over, a part while motors are not where they should be.
+
+        Args:
+            memory: of the law.
+            reference: the path.
+            time: of the tick, s.
+        """
+        instant = float(memory.planned[0])
+        path_time, path_start = reference.path_time(instant), reference.path.path_start
+        if path_time < path_start - _BEFORE_PATH:
+            return 1.0
+        is_probing = path_time + memory.waited[0] > instant + self._period
+        if path_time < path_start and (is_probing or not memory.delay.known[0]):
+            return 0.0
+        if self._awaits_camera(memory, path_time, time):
+            return 0.0
+        is_upset = time < memory.paused_until[0] or not self._learning.delay.is_settled(memory.delay, instant)
+        return _CAREFUL if is_upset else 1.0
+
+    def _awaits_camera(self, memory: SimpleNamespace, path_time: float, time: float) -> bool:
+        """Whether the camera has gone blind before it has shown what the path needs next; not for ever."""
+        since = time - float(memory.heard.accepted[0])
+        if self.needs is None or not self._blind_after < since < self._config.longest_wait:
+            return False
+        P = self._learning.estimator.covariance(memory.estimator)
+        return self.needs.sigma_between(P, path_time, path_time + _NEXT) > self._config.known_ahead

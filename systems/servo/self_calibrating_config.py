@@ -20,3 +20,6 @@ class SelfCalibratingConfig(LawConfig):
     probe: ProbeConfig = field(default_factory=ProbeConfig)
     lead_frequency: float = 30.0  # rad/s, at most, with which parameters follow their estimate
     lead_acceleration: float = 0.5  # m/s^2, at most, that this gives the tip
+    # m, standard deviation: where the tip ahead is known less well, the path waits for a camera that is blind
+    known_ahead: float = 2e-5
+    longest_wait: float = 2.0  # s, that it waits

@@ -10,12 +10,12 @@ from systems.estimation import kernels
 from systems.estimation.drives.dead_time import CommandDelay
 from systems.estimation.drives.drive_model import COLUMNS, DriveModel
 from systems.estimation.drives.encoder_steps import EncoderSteps
-from systems.estimation.events import DEAD_TIME_CHANGED, Event, EventLog
+from systems.estimation.events import DEAD_TIME_CHANGED, LOAD_CHANGED, Event, EventLog
 from systems.estimation.gear_errors import NUM_STATES
 from systems.estimation.kernels.arrays import Ring
 from systems.estimation.memory import History, Layout
-from systems.estimation.tip_estimator import Pair, TipEstimator
-from systems.estimation.tip_model import TipModel
+from systems.estimation.tip_estimator import TipEstimator
+from systems.estimation.tip_model import Pair, TipModel
 from systems.samples import JointSample, PoseSample
 from systems.servo.self_calibrating_config import SelfCalibratingConfig
 
@@ -25,6 +25,7 @@ _UPSET = 3e-4  # rad, a following error that no drive makes on its own: load or 
 _UPSET_PAUSE = 0.3  # s without learning after it, so that the drives come to rest
 _LONGEST_PAUSE = 0.6  # s, after which what is left has to be learnt
 _CALM_AGAIN = 1.0  # s after an upset before there can be another one
+_LOOKED_AT, _LEAST_CHANGE = 250, 0.3  # samples since an upset, until a mass (kg) is compared with that before
 _SETTLING = 0.2  # s that the drives take to come to rest after a dead time was corrected
 _ASTRAY = 3e-3  # rad, by which motors may miss their plan before its loads are not those of the robot
 UNREST = 0.5  # m/s^2, while the robot is led onto its plan, or the plan is not where motors are
@@ -90,6 +91,7 @@ class Learning:
             "first": (1,),  # the first planned instant
             "compared": (1,),  # how many planned instants encoders have been compared at
             "upset_at": (1,),
+            "load": Layout(mass=(1,), time=(1,), samples=(1,)),  # kg and s at an upset, and how many since
             "paused_until": (1,),
         }
 
@@ -144,6 +146,7 @@ class Learning:
                 event = self.estimator.add(memory.estimator, pair)
                 if event is not None:
                     self.events.note(memory.events, time, event)
+                self._note_load(memory)
                 heard.accepted[0] = time
         self.estimator.work(memory.estimator)
 
@@ -171,7 +174,7 @@ class Learning:
         off = kernels.instants.read(*rings, exposure, self._load_lag, *rows, now.twist, ahead, at.X_WE)
         if memory.delay.known[0] and off > _ASTRAY:
             return None
-        is_settling = exposure < memory.delay.settled[0] + _SETTLING
+        is_settling = exposure < memory.delay.settled[0] + _SETTLING or exposure < memory.paused_until[0]
         unrest = UNREST if is_settling else float(now.unrest[0])
         return Pair(at.theta, then.loads, then.motion, now.twist, at.X_WE, unrest, then.states, stamp)
 
@@ -198,7 +201,7 @@ class Learning:
             change = self.delay.look(memory.delay)
             if was_known and change:
                 self.events.note(memory.events, time, Event(DEAD_TIME_CHANGED, change, 0.0))
-                memory.upset_at[0] = time
+                memory.upset_at[0], memory.load.samples[0] = time, 0.0  # it was not the load
         if since_start > _GIVE_UP:
             memory.delay.known[0] = 1.0
 
@@ -218,6 +221,28 @@ class Learning:
             if actual is not None:
                 self._learn_drives(memory, instant, plan.rows[k % self.plan.length], actual)
 
+    def _open_load(self, memory: SimpleNamespace) -> None:
+        """Motors that do what no drive does may carry another load; the camera will say which."""
+        load = memory.load
+        if not load.samples[0]:  # else it is the same change still
+            load.mass[0], load.time[0] = self._mass(memory), memory.upset_at[0]
+        load.samples[0] = 1.0
+        self.estimator.open_load(memory.estimator)
+
+    def _note_load(self, memory: SimpleNamespace) -> None:
+        """Says by how much the load has changed, once enough has been seen since the motors were upset."""
+        load = memory.load
+        load.samples[0] += load.samples[0] > 0.0
+        if load.samples[0] <= _LOOKED_AT:
+            return
+        load.samples[0] = 0.0
+        change = self._mass(memory) - float(load.mass[0])
+        if abs(change) > _LEAST_CHANGE:
+            self.events.note(memory.events, float(load.time[0]), Event(LOAD_CHANGED, change, 0.0))
+
+    def _mass(self, memory: SimpleNamespace) -> float:
+        return float(self.estimator.x(memory.estimator)[self.tip_model.M][0])
+
     def _learn_drives(
         self, memory: SimpleNamespace, instant: float, planned: np.ndarray, actual: np.ndarray
     ) -> None:
@@ -233,6 +258,7 @@ class Learning:
         if left > _UPSET and is_watched:
             if instant > memory.upset_at[0] + _CALM_AGAIN:
                 memory.upset_at[0] = instant
+                self._open_load(memory)
             until = min(instant + _UPSET_PAUSE, memory.upset_at[0] + _LONGEST_PAUSE)
             if until > instant:  # or what is believed would be opened again at every instant
                 memory.paused_until[0] = until

@@ -146,7 +146,8 @@ class CommandDelay:
             memory.rate[0] = rate
             if abs(memory.target[0] - memory.delay[0]) < 1e-6:
                 memory.delay[0], memory.rate[0] = memory.target[0], 0.0
-            memory.settled[0] = planned + self._period
+            # The instant of this tick, a little further on for rounding.
+            memory.settled[0] = planned + (1.0 + max(0.0, rate) + 1e-6) * self._period
         return float(memory.delay[0])
 
     def is_settled(self, memory: SimpleNamespace, instant: float) -> bool:
@@ -169,4 +170,5 @@ class CommandDelay:
         if abs(found.delay - target) < _WRONG * self._period or not is_clear:
             return 0.0
         memory.target[0] = max(self._period, found.delay)
+        memory.settled[0] = np.inf  # until the next command: nothing that was planned so far was in time
         return float(memory.target[0] - target)

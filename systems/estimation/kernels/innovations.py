@@ -55,8 +55,12 @@ def enter_usual(r, variances, suspicious, share, error, spread, recent, by_model
 
 
 @compiled
-def scatter(r, last, variance, share):
-    """Takes half of the square of a change, (6,), into a mean; r becomes the last one."""
+def scatter(r, last, variance, believed, most, share):
+    """Takes half of the square of a change, (6,), into a mean; r becomes the last one.
+
+    It counts as at most so many times the mean: a robot that is upset is no noise of the camera.
+    """
     for i in range(len(r)):
-        variance[i] += share * (0.5 * (r[i] - last[i]) ** 2 - variance[i])
+        square = min(0.5 * (r[i] - last[i]) ** 2, most * max(variance[i], believed[i]))
+        variance[i] += share * (square - variance[i])
         last[i] = r[i]

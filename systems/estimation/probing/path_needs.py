@@ -48,6 +48,7 @@ class PathNeeds:
             ValueError: if the nominal robot does not reach the path.
         """
         self._model, self._weights = model, weights
+        self._lap_starts = np.asarray(path.lap_starts, dtype=float)
         end = path.lap_starts[1] if len(path.lap_starts) > 1 else path.dwell_start
         length = max(end - path.path_start, _INVERSE_STEP)
         steps = max(1, math.ceil(length / _INVERSE_STEP))
@@ -111,6 +112,27 @@ class PathNeeds:
         variance = np.einsum("nij,nij->n", rows @ P, rows)
         worst = int(variance.argmax())
         return self._standing(P, worst, math.sqrt(variance[worst]))
+
+    def sigma_between(self, P: np.ndarray, begin: float, end: float) -> float:
+        """How well the tip is known in m where it is known worst between two times on the path, on any lap.
+
+        Args:
+            P: covariance of the unknowns in units of their spreads, (size, size).
+            begin, end: s; before the path begins the tip counts as at its begin, after it as at its end.
+        """
+        first, last = (self._nearest(t) for t in (begin, end))
+        # Where a lap ends between the two, what is left of it and what has begun of the next one.
+        chosen = np.arange(len(self.H))
+        inside = (
+            (chosen >= first) & (chosen <= last) if first <= last else (chosen >= first) | (chosen <= last)
+        )
+        rows = _SCALE[:, None] * self.H[inside]
+        return math.sqrt(float(np.einsum("nij,nij->n", rows @ P, rows).max()))
+
+    def _nearest(self, t: float) -> int:
+        """Which instant is nearest to a time on the path in s, on whatever lap."""
+        lap = max(0, int(np.searchsorted(self._lap_starts, t, side="right")) - 1)
+        return int(np.abs(self.times - (t - self._lap_starts[lap] + self._lap_starts[0])).argmin())
 
     def _worst(self, A: np.ndarray, rate: float) -> tuple[float, int, np.ndarray]:
         """The worst standard deviation of the tip in m, its place on the path, and the information there."""

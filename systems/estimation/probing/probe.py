@@ -13,10 +13,11 @@ _SPEED_SHARE = 0.3
 _KNOCK_BEGIN, _KNOCK_LENGTH = 0.15, 0.4  # s
 _KNOCK_SIZE = np.array([0.01, 0.01, 0.01, 0.03, 0.03, 0.03])  # rad
 _INSTANTS = np.linspace(0.0, 1.0, 59)  # of the window, at which limits are looked at
+_NOT_YET = 0.02  # s before they begin, where oscillations wait: no tick passes over that
 _SHORTEST = 0.5  # s, a window in which it is worth while to move
-_AMPLITUDE = np.array([0.15, 0.15, 0.15, 0.4, 0.4, 0.4])  # rad
-_EXCURSION = 0.1  # m
-_USUAL_PERIOD, _MOST_GROWTH = 4e-3, 1.5  # s, of a camera for which both are enough; times, that both may grow
+_AMPLITUDE = np.array([0.19, 0.19, 0.19, 0.5, 0.5, 0.5])  # rad
+_EXCURSION = 0.125  # m
+_USUAL_PERIOD, _MOST_GROWTH = 4e-3, 1.2  # s, of a camera for which both are enough; times, that both may grow
 
 
 @dataclass
@@ -24,8 +25,8 @@ class ProbeConfig:
     """Whether and how far the joints move before the path begins."""
 
     kind: str = "smooth"  # or none
-    # Amplitudes in rad, at most, and how far the tip may go in m. If none are given, 0.15 rad of the first
-    # three axes, 0.4 rad of the others, and 0.1 m; up to half as much again with a camera that looks less
+    # Amplitudes in rad, at most, and how far the tip may go in m. If none are given, 0.19 rad of the first
+    # three axes, 0.5 rad of the others, and 0.125 m; up to a fifth more with a camera that looks less
     # often than every 4 ms: what samples show goes with their number and the square of the motion.
     amplitude: list[float] | None = None
     largest_excursion: float | None = None
@@ -142,14 +143,23 @@ class Probe:
         """How far the joints may go from q (rad, (6,)) without coming near their limits, rad, (6,)."""
         return _MARGIN * np.maximum(0.0, np.minimum(self._upper - q, q - self._lower))
 
-    def at(self, time: float, path_start: float, amplitude: np.ndarray) -> np.ndarray:
-        """Displacement of the joints in rad and its two derivatives at a time in s, (3, 6)."""
+    def waited(self, time: float, waited: float) -> float:
+        """How long oscillations that may not begin yet have waited at a time in s; once begun they go on."""
+        until = self._config.begin - _NOT_YET
+        return max(waited, time - until) if time - waited <= self._config.begin else waited
+
+    def at(self, time: float, path_start: float, amplitude: np.ndarray, waited: float = 0.0) -> np.ndarray:
+        """Displacement of the joints in rad and its two derivatives at a time in s, (3, 6).
+
+        Oscillations come later by what they have waited, in s; the path has to be held for as long.
+        """
         begin, length = self.window(path_start)
         if 0.0 < time - _KNOCK_BEGIN < _KNOCK_LENGTH:
             # sin^4: a step of the acceleration would be a step of the gears' deflection.
             s, w = 2.0 * np.pi * (time - _KNOCK_BEGIN) / _KNOCK_LENGTH, 2.0 * np.pi / _KNOCK_LENGTH
             u, du, ddu = 0.5 - 0.5 * np.cos(s), 0.5 * w * np.sin(s), 0.5 * w * w * np.cos(s)
             return np.outer((u * u, 2.0 * u * du, 2.0 * (du * du + u * ddu)), amplitude[0])
+        time -= waited
         if not 0.0 < time - begin < length:
             return np.zeros((3, NUM_JOINTS))
         pattern = self.pattern._replace(size=amplitude[1])

@@ -6,6 +6,7 @@ import pytest
 from diagrams.runs.simulation import Experiment, run
 from diagrams.scenario.scenario import load_scenario
 from robots.pose import pose_error
+from systems.estimation.drives.drive_model import DEAD_TIME
 
 WRONG = [  # what the controller believes of springs and load
     "servo.model.payload=6.65",
@@ -59,6 +60,12 @@ def test_a_dead_time_that_nobody_told_is_found_before_the_path_begins():
     law = experiment.servo.law
     memory = law.memory(law.GetMyContextFromRoot(experiment.context))
     assert memory.delay.target[0] == pytest.approx(0.204, abs=2e-3)
+    # What was planned while the dead time was wrong has taught the drives nothing.
+    assert abs(memory.drives.beta[DEAD_TIME]) < 1e-3
+    begin = memory.first[0] + memory.waited[0] + 0.8  # s, of the oscillations
+    assert begin == pytest.approx(memory.delay.settled[0], abs=0.03)
+    experiment.advance(until=4.2)
+    assert 3.0 < experiment.servo.path_time(experiment.context) < 4.2 - 0.9 * memory.waited[0]
     assert not any(experiment.log().guard_counts.values())
 
 
@@ -131,6 +138,41 @@ def test_a_camera_that_is_blind_on_the_path_costs_what_was_promised(gap):
     errors = np.linalg.norm(pose_error(log.X_WE_desired, log.X_WE_true)[:, 3:], axis=1)
     promised = log.learnt["path"]["before"]["tip_sigma_m"]
     assert errors[log.time >= 5.0].max() < 2.0 * promised
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("gap", "held"), [(0.5, 0.5), (30.0, 2.0)])  # s
+def test_the_path_waits_for_a_camera_that_is_blind_where_nothing_was_shown_but_not_for_ever(gap, held):
+    drawn = [f"{name}=3003" for name in ("seed", "station.errors.random.seed", "station.variation.seed")]
+    scenario = load_scenario("everything", [f"station.camera.dropouts=[[5, {5 + gap}]]", *drawn])
+    experiment = Experiment(scenario, "self_calibrating")
+    experiment.advance(until=9.0)
+    log = experiment.log()
+    errors = np.linalg.norm(pose_error(log.X_WE_desired, log.X_WE_true)[:, 3:], axis=1)
+    before = errors[(log.time >= 4.0) & (log.time < 5.0 + min(gap, held))]
+    assert before.max() < 0.06e-3  # 0.11 mm where it goes on for half a second
+    lost = 9.0 - experiment.servo.path_time(experiment.context)
+    assert held - 0.1 < lost < held + 0.1
+    assert not any(log.guard_counts.values())
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", [4001, 4002])
+def test_a_load_that_is_picked_up_is_made_up_for_and_named(seed):
+    drawn = [f"{name}={seed}" for name in ("seed", "station.errors.random.seed", "station.variation.seed")]
+    empty = ["station.payload=0", "servo.model.payload=0"]
+    picked = "station.events=[!PayloadChange {at: 6, payload: 7}]"
+    experiment = Experiment(load_scenario("everything", [*empty, picked, *drawn]), "self_calibrating")
+    experiment.advance(until=11.0)
+    log = experiment.log()
+    errors = np.linalg.norm(pose_error(log.X_WE_desired, log.X_WE_true)[:, 3:], axis=1)
+    assert errors[log.time >= 7.5].max() < 0.06e-3
+    assert log.learnt is not None
+    changes = [event for event in log.learnt["events"] if event["kind"] == "load changed"]
+    assert changes
+    assert changes[0]["time_s"] == pytest.approx(6.0, abs=0.1)
+    assert sum(event["size"] for event in changes) == pytest.approx(7.0, abs=2.0)  # beside what springs are
+    assert not any(log.guard_counts.values())
 
 
 @pytest.mark.slow

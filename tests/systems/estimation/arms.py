@@ -4,8 +4,7 @@ import numpy as np
 
 from robots.description.model import load_robot
 from systems.controller_model import ControllerModel
-from systems.estimation.tip_estimator import Pair
-from systems.estimation.tip_model import Spread, TipModel, moved
+from systems.estimation.tip_model import Pair, Spread, TipModel, moved
 
 PERIOD = 1e-2  # s, between two pairs
 CAMERA = np.repeat([1.75e-4, 5e-5], 3)  # rad and m, standard deviations of one sample

@@ -48,6 +48,19 @@ def test_a_path_again_and_again_needs_what_it_needs_once():
     assert thrice.expected(A, RATE) == pytest.approx(once.expected(A, RATE), rel=1e-6)
 
 
+def test_what_is_known_ahead_is_known_worst_between_two_times_of_any_lap():
+    path = make_path(ReferenceConfig(path=Circle(), settle=4.0, laps=2))
+    of = PathNeeds(MODEL, WEIGHTS, path, HOME, 0.5)
+    P = np.linalg.inv(of.prior + of.information(of.H[:1]))
+    standing, (first, second) = of.standing(P), path.lap_starts
+    # The scale of angles is not changed by a test: at the first instant all of the path's begin is known.
+    assert of.sigma_between(P, 0.0, 0.0) == of.sigma_between(P, first, first)
+    assert of.sigma_between(P, first, first + 0.5) < of.sigma_between(P, first, first + 2.0)
+    assert of.sigma_between(P, first, second - 0.1) == pytest.approx(standing.sigma)
+    assert of.sigma_between(P, second + 1.0, second + 2.0) == of.sigma_between(P, first + 1.0, first + 2.0)
+    assert of.sigma_between(P, second - 0.1, second + 0.1) < standing.sigma
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("shape", [Rectangle(), Circle()])
 def test_what_the_design_promises_its_motion_shows(shape):
