@@ -14,7 +14,9 @@ from systems.estimation.tip_model import TipModel
 _WINDOW = 12.0  # samples of the running mean
 _AVERAGING = math.sqrt(2.0 * _WINDOW - 1.0)  # times, by which the noise of the mean is smaller
 _SUSPICIOUS = 4.0  # sigmas of the camera alone, of one sample: below, nothing is to do
-_OUTLIER, _LONGEST_OUTLIER = 6.0, 5  # sigmas; and how many samples in a row may be so called
+# Sigmas; and how many samples in a row may be so called that do not agree with each other: of reflections in
+# every fifth image so many come in a row once in some months.
+_OUTLIER, _LONGEST_OUTLIER = 6.0, 12
 _JUMP, _CALM = 9.0, 4.0  # sigmas of the mean: what no parameter describes lasts longer than noise
 _MODEL_SHARE = 3.0 / _JUMP  # what the estimate is wrong by is within 5 sigmas
 _FIRST = 15  # samples, whose median is what the next ones are compared with
