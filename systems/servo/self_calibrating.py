@@ -81,7 +81,7 @@ class SelfCalibrating(LeafSystem):
         self._lead = ParameterLead(self.tip_model.size, config.lead_frequency, config.lead_acceleration)
         self._pace = Pace(model, config, learning)
         self._planner = PreviewPlanner(self.tip_model, model.period)
-        self._probe = Probe(model.robot, config.probe, model.camera_period)
+        self._probe = Probe(model.robot, config.probe, model.camera_period, self.tip_model.has_gear_errors)
         arrays = {
             "lead": self._lead.layout,
             "planner": self._planner.layout,

@@ -17,6 +17,7 @@ _NOT_YET = 0.02  # s before they begin, where oscillations wait: no tick passes 
 _SHORTEST = 0.5  # s, a window in which it is worth while to move
 _AMPLITUDE = np.array([0.19, 0.19, 0.19, 0.5, 0.5, 0.5])  # rad
 _EXCURSION = 0.125  # m
+_UNEVEN = 0.8  # times as far, where gears have errors: more of them is met farther away than is learnt there
 _USUAL_PERIOD, _MOST_GROWTH = 4e-3, 1.2  # s, of a camera for which both are enough; times, that both may grow
 
 
@@ -27,7 +28,8 @@ class ProbeConfig:
     kind: str = "smooth"  # or none
     # Amplitudes in rad, at most, and how far the tip may go in m. If none are given, 0.19 rad of the first
     # three axes, 0.5 rad of the others, and 0.125 m; up to a fifth more with a camera that looks less
-    # often than every 4 ms: what samples show goes with their number and the square of the motion.
+    # often than every 4 ms: what samples show goes with their number and the square of the motion. A
+    # fifth less where gears have errors.
     amplitude: list[float] | None = None
     largest_excursion: float | None = None
     begin: float = 0.8  # s after the start
@@ -72,13 +74,20 @@ class Probe:
     for who knows the path to say: `pattern` is the usual one, as large as it may be, until it is replaced.
     """
 
-    def __init__(self, robot: RobotModel, config: ProbeConfig, camera_period: float = _USUAL_PERIOD) -> None:
+    def __init__(
+        self,
+        robot: RobotModel,
+        config: ProbeConfig,
+        camera_period: float = _USUAL_PERIOD,
+        has_gear_errors: bool = False,
+    ) -> None:
         """Checks the configuration.
 
         Args:
             robot: whose limits hold.
             config: of the motion.
             camera_period: s, between two samples.
+            has_gear_errors: whether gears are believed to have more than springs.
 
         Raises:
             ValueError: if the kind is unknown, amplitudes are negative or not six, or the camera is blind for
@@ -87,6 +96,7 @@ class Probe:
         if config.kind not in ("smooth", "none"):
             raise ValueError(f"probe: kind must be smooth or none, got '{config.kind}'")
         growth = min(max(1.0, math.sqrt(camera_period / _USUAL_PERIOD)), _MOST_GROWTH)
+        growth *= _UNEVEN if has_gear_errors else 1.0
         given, excursion = config.amplitude, config.largest_excursion
         amplitude = growth * _AMPLITUDE if given is None else np.array(given, dtype=float)
         self._excursion = growth * _EXCURSION if excursion is None else excursion

@@ -66,6 +66,15 @@ def test_a_camera_that_looks_less_often_is_shown_more_unless_limits_are_given(pe
     np.testing.assert_allclose(free[1], growth * limited[1])
 
 
+def test_gears_with_errors_are_moved_less():
+    robot, config = load_robot("irb1200"), ProbeConfig()
+    even, uneven = (
+        Probe(robot, config, has_gear_errors=has).amplitude(HOME, JACOBIAN, PATH_START)
+        for has in (False, True)
+    )
+    np.testing.assert_allclose(uneven[1], 0.8 * even[1])
+
+
 @pytest.mark.parametrize(("kind", "path_start"), [("none", 4.0), ("smooth", 1.2)])
 def test_there_is_none_without_leave_or_time(kind, path_start):
     probe = Probe(load_robot("irb1200"), ProbeConfig(kind=kind))
