@@ -46,7 +46,7 @@ def verdict(plan: Plan, results: list[LegResult]) -> str:
     kept = "all limits are kept" if numbers["limits_kept"] else "not all limits are kept"
     binding = ", ".join(numbers["binding"]) or "none"
     rings, usually = numbers["criterion"], max(numbers["baseline_criterion"], STILL)
-    more = f" It rings more than the usual timing: C {rings:.3f} m/s, usually {usually:.3f} m/s."
+    more = f" It rings more than the usual timing: C {rings:.4f} m/s, usually {usually:.4f} m/s."
     return (
         f"{numbers['time_s']:.3f} s and {numbers['energy_j']:.0f} J, with {usual} in the same limits "
         f"{numbers['baseline_s']:.3f} s and {numbers['baseline_energy_j']:.0f} J: "

@@ -38,26 +38,33 @@ def kept_in_plant(make: Callable[[MotionLimits], T], driver: PlantDriver, limits
         limits: that the plant has to keep.
     """
     margins, kept = limits.scaled(_MARGIN), None
-    # A rate that is too high makes gears ring, and that is what exceeds the other limits mostly.
     for _ in range(_ROUNDS):
         timing = make(margins)
         run = driver.run(timing)
-        shares = exceeded(run, limits)
         keeps = largest_share(run, limits) <= 1.0 + ROUNDING
         kept = Kept(timing, run, keeps, margins)
         if keeps:
             break
-        if shares["gear_torque_rate"].max() > 1.0 + ROUNDING:
-            shares = {"gear_torque_rate": shares["gear_torque_rate"]}
-        margins = replace(
-            margins,
-            **{
-                name: getattr(margins, name) * np.where(share > 1.0, _STEP / np.maximum(share, 1.0), 1.0)
-                for name, share in shares.items()
-            },
-        )
+        margins = lowered(margins, run, limits)
     assert kept is not None
     return kept
+
+
+def lowered(margins: MotionLimits, run: PlantRun, limits: MotionLimits) -> MotionLimits:
+    """What a planner may use next, where the plant has exceeded limits with the present margins.
+
+    A rate that is too high makes gears ring, and that is what exceeds other limits mostly: it comes first.
+    """
+    shares = exceeded(run, limits)
+    if shares["gear_torque_rate"].max() > 1.0 + ROUNDING:
+        shares = {"gear_torque_rate": shares["gear_torque_rate"]}
+    return replace(
+        margins,
+        **{
+            name: getattr(margins, name) * np.where(share > 1.0, _STEP / np.maximum(share, 1.0), 1.0)
+            for name, share in shares.items()
+        },
+    )
 
 
 def exceeded(run: PlantRun, limits: MotionLimits) -> dict[str, np.ndarray]:

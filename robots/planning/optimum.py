@@ -10,7 +10,7 @@ from robots.planning.joint_path import PathError
 from robots.planning.limit_use import OVER_TIME, energy
 from robots.planning.limits import MotionLimits
 from robots.planning.path_dynamics import ORDERS, PathDynamics
-from robots.planning.ringing import ringing_rows
+from robots.planning.ringing import Band, ringing_rows
 from robots.planning.spline_program import PointProgram, Solution, solve
 from robots.planning.time_spline import AT_REST, TimeSpline, at_rest, bases, points, weights
 
@@ -56,7 +56,7 @@ class _Aim:
     recuperation: bool
     duration: float | None
     smoother: float = 1.0
-    band: tuple[float, float] | None = None
+    band: Band | None = None
     calm: float = 1.0
 
 
@@ -95,7 +95,7 @@ def calmed(
     dynamics: PathDynamics,
     limits: MotionLimits,
     found: Optimum,
-    band: tuple[float, float],
+    band: Band,
     slower: float = 0.0,
     energy_weight: float | None = None,
     recuperation: bool = False,
@@ -106,7 +106,7 @@ def calmed(
         dynamics: robot and path.
         limits: that are kept.
         found: the quickest or most frugal motion within them.
-        band: lowest and highest frequency in Hz at which the arm rings, see `ringing_band`.
+        band: frequencies at which the arm rings, see `ringing_band`.
         slower: share of its duration that is added.
         energy_weight: of twice its energy: what it costs to ring like it; None where energy does not count.
         recuperation: whether braking gives energy back.

@@ -2,10 +2,13 @@
 
 A feedforward makes up for what gears and structure yield as if they did so at once. What it leaves goes with
 higher derivatives of the motion, and only what of them lies near a mode stays when the motion is over: the
-Fourier transform of the fifth at the modes' frequencies. It is linear in the coefficients of the spline, so
-that a planner can keep it small without being slow, as shaping filters do (Singer and Seering, 1990), but
-within all limits.
+Fourier transform of the fifth at the modes' frequencies. What rings early has died away by then, the more the
+quicker it swings, so that a motion has to be calm near its end most of all. The transform is linear in the
+coefficients of the spline, so that a planner can keep it small without being slow, as shaping filters do
+(Singer and Seering, 1990), but within all limits.
 """
+
+from typing import NamedTuple
 
 import numpy as np
 from scipy.interpolate import BSpline
@@ -23,8 +26,16 @@ _ORDER = 5  # of the derivative: with the fourth or sixth KR 16 rings more in th
 _NODES = 8  # of the Gauss-Legendre rule in every interval of the spline
 
 
-def ringing_band(robot: RobotModel, payload: float, path: Curve) -> tuple[float, float]:
-    """The lowest and the highest frequency in Hz at which the arm rings at the end of a path.
+class Band(NamedTuple):
+    """The frequencies at which an arm rings."""
+
+    low: float  # Hz
+    high: float  # Hz
+    damping: float = 0.0  # ratio at the lowest; dampers beside springs make it grow with the frequency
+
+
+def ringing_band(robot: RobotModel, payload: float, path: Curve) -> Band:
+    """The frequencies at which the arm rings at the end of a path.
 
     Args:
         robot: as the planner knows it.
@@ -35,22 +46,25 @@ def ringing_band(robot: RobotModel, payload: float, path: Curve) -> tuple[float,
         ValueError: if the arm is too soft to carry itself.
     """
     analysis = ModalAnalysis(robot, "structure", payload)
-    lowest = min(float(analysis.at(q).frequency_hz[0]) for q in path.at(_PLACES))
-    return _BELOW * lowest, max(_HIGHEST, 2.0 * lowest)
+    modes = [analysis.at(q) for q in path.at(_PLACES)]
+    lowest = min(float(each.frequency_hz[0]) for each in modes)
+    damping = min(float(each.damping_ratio[0] / each.frequency_hz[0]) for each in modes)
+    low = _BELOW * lowest
+    return Band(low, max(_HIGHEST, 2.0 * lowest), damping * low)
 
 
-def ringing_rows(count: int, duration: float, band: tuple[float, float]) -> np.ndarray:
+def ringing_rows(count: int, duration: float, band: Band) -> np.ndarray:
     """The spectrum of the fifth derivative as a function of a spline's coefficients, shape (2 k, count).
 
     The sum of squares of what the rows give is the integral of its square over the band, with time in
-    durations: real parts first, then imaginary ones.
+    durations: real parts first, then imaginary ones. Each frequency counts as it has died away by the end.
 
     Args:
         count: of the coefficients.
         duration: s.
-        band: lowest and highest frequency in Hz.
+        band: frequencies at which the arm rings.
     """
-    low, high = band[0] * duration, band[1] * duration  # periods in a motion
+    low, high = band.low * duration, band.high * duration  # periods in a motion
     per_motion = np.linspace(low, high, max(2, round(_PER_PERIOD * (high - low))))
     breaks = knots(count)[DEGREE:-DEGREE]
     node, weight = np.polynomial.legendre.leggauss(_NODES)
@@ -58,6 +72,8 @@ def ringing_rows(count: int, duration: float, band: tuple[float, float]) -> np.n
     x = (breaks[:-1, None] + half[:, None] * (node + 1.0)).ravel()
     w = (half[:, None] * weight).ravel()
     basis = BSpline(knots(count), np.eye(count), DEGREE).derivative(_ORDER)(x)
-    waves = np.exp(-2j * np.pi * per_motion[:, None] * x)
+    damping = band.damping * per_motion / low
+    turn = 2.0 * np.pi * per_motion  # rad in a motion
+    waves = np.exp(np.outer(turn * (1j - damping), 1.0 - x))
     spectrum = (waves * w) @ basis * np.sqrt((high - low) / len(per_motion))
     return np.vstack([spectrum.real, spectrum.imag])
