@@ -11,7 +11,7 @@ from pydrake.systems.framework import (
     OutputPort,
     System,
 )
-from pydrake.systems.primitives import Adder, ConstantVectorSource
+from pydrake.systems.primitives import Adder, ConstantVectorSource, Demultiplexer
 
 from diagrams.live_watch import LiveWatch
 from diagrams.record.coverage import Prediction
@@ -111,13 +111,14 @@ class Servo(Diagram):
         feedforward = scenario.servo.feedforward
         self.has_torque = feedforward.kind != "none" or self.law.HasOutputPort("torque_feedforward")
         self.guard = guard = builder.AddNamedSystem("guard", self._guard(config, scenario.servo.guard))
+        self._issued = _issued(builder, guard)
         self._connect_reference(builder)
         if self.law.HasInputPort("deviation"):
             builder.Connect(guard.GetOutputPort("deviation"), self.law.GetInputPort("deviation"))
         joints = builder.ExportInput(guard.GetInputPort("joint_sample"), "joint_sample")
         builder.ConnectInput(joints, self.law.GetInputPort("joint_sample"))
         if watch:
-            self._add_watch(builder, watch, guard, joints)
+            self._add_watch(builder, watch, joints)
         commands = self._connect_camera(builder)
         for name in ("position_command", "velocity_command", "torque_feedforward"):
             if self.law.HasOutputPort(name):
@@ -135,7 +136,9 @@ class Servo(Diagram):
             )
         for name, port in commands.items():
             builder.Connect(port, guard.GetInputPort(name))
-        for name in ("position_command", "velocity_command", "torque_feedforward", "guard_status"):
+        for name in ("position_command", "velocity_command"):
+            builder.ExportOutput(self._issued[name], name)
+        for name in ("torque_feedforward", "guard_status"):
             if guard.HasOutputPort(name):
                 builder.ExportOutput(guard.GetOutputPort(name), name)
         for name in ("X_WE_desired", "path_time"):
@@ -192,7 +195,6 @@ class Servo(Diagram):
         self,
         builder: DiagramBuilder,
         watch: Watch | LiveWatch,
-        guard: CommandGuard,
         joints: InputPortIndex,
     ) -> None:
         """People in whole images, and the share of the speed that they allow."""
@@ -208,7 +210,7 @@ class Servo(Diagram):
             builder.Connect(watcher.GetOutputPort("person_sample"), monitor.GetInputPort("person_sample"))
             builder.ExportOutput(watcher.GetOutputPort("person_sample"), "person_sample")
         for source, port in (
-            (guard.GetOutputPort("velocity_command"), monitor.GetInputPort("velocity_command")),
+            (self._issued["velocity_command"], monitor.GetInputPort("velocity_command")),
             (self.reference.GetOutputPort("path_time"), monitor.GetInputPort("path_time")),
             (monitor.GetOutputPort("speed_share"), self.reference.GetInputPort("speed_share_separation")),
         ):
@@ -262,7 +264,7 @@ class Servo(Diagram):
         correction = builder.AddNamedSystem("predictive_correction", PredictiveCorrection(self.model, config))
         builder.Connect(self.reference.GetOutputPort("reference"), correction.GetInputPort("reference"))
         for name in ("position_command", "velocity_command"):
-            builder.Connect(self.guard.GetOutputPort(name), correction.GetInputPort(name))
+            builder.Connect(self._issued[name], correction.GetInputPort(name))
         total = builder.AddNamedSystem("corrected_torque", Adder(2, NUM_JOINTS))
         builder.Connect(commands["torque_feedforward"], total.get_input_port(0))
         builder.Connect(correction.GetOutputPort("torque"), total.get_input_port(1))
@@ -288,6 +290,15 @@ class Servo(Diagram):
             builder.Connect(commands[name], total.get_input_port(0))
             builder.Connect(ahead.GetOutputPort(offset), total.get_input_port(1))
             commands[name] = total.get_output_port()
+
+
+def _issued(builder: DiagramBuilder, guard: CommandGuard) -> dict[str, OutputPort]:
+    """The two parts of the command in what the guard decides; Drake's own system splits it without Python."""
+    decision = guard.GetOutputPort("decision")
+    parts = Demultiplexer([NUM_JOINTS, NUM_JOINTS, decision.size() - 2 * NUM_JOINTS])
+    issued = builder.AddNamedSystem("issued", parts)
+    builder.Connect(decision, issued.get_input_port())
+    return {"position_command": issued.get_output_port(0), "velocity_command": issued.get_output_port(1)}
 
 
 def _refuse_slow_camera(scenario: Scenario) -> None:

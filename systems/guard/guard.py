@@ -5,7 +5,7 @@ import math
 
 import numpy as np
 from pydrake.common.value import Value
-from pydrake.systems.framework import BasicVector, Context, DiscreteValues, LeafSystem, ValueProducer
+from pydrake.systems.framework import BasicVector, Context, DiscreteValues, LeafSystem
 
 from robots.description.model import NUM_JOINTS, RobotModel
 from robots.kinematics.forward import Kinematics, robust_solve
@@ -23,6 +23,8 @@ _VELOCITY, _ACCELERATION, _POSITION, _CORRECTION, _NO_COMMAND, _REFUSED, _HELD, 
 _ABSURD = 1e6  # rad and rad/s in sum: no command, and squares of it would not be numbers
 _GRACE = 1.05  # times its limit that a correction may reach: where a law stops it, it may overshoot by a step
 _NO_DEVIATION, _UNKNOWN = np.zeros(NUM_JOINTS), np.full(NUM_JOINTS, np.nan)
+# With these a torque would not belong to the motion that it was computed for.
+_NOT_FOLLOWED = (_NO_COMMAND, _STOPPED, _VELOCITY, _ACCELERATION, _POSITION)
 
 
 class CommandGuard(LeafSystem):
@@ -35,8 +37,9 @@ class CommandGuard(LeafSystem):
         in  ``measurement``       vector 3: when the last usable sample arrived (s), how many were refused,
                                   when the newest one was exposed (s)
         in  ``joint_sample``      JointSample
-        out ``position_command``  vector 6 in rad: finite, in range, within speed and acceleration
-        out ``velocity_command``  vector 6 in rad/s, likewise
+        out ``decision``          vector, see `systems.guard.state`; its first twelve numbers are the command:
+                                  positions in rad, finite, in range, within speed and acceleration, and
+                                  velocities in rad/s, likewise
     and where torques are fed forward:
         in  ``torque_feedforward``  vector 6 in N m
         out ``torque_feedforward``  vector 6 in N m, zero while the law's command is not followed
@@ -117,64 +120,56 @@ class CommandGuard(LeafSystem):
         counts = self.DeclareDiscreteState(len(KINDS))
         self.DeclareStateOutputPort("guard_status", counts)
         self.DeclareStateOutputPort("deviation", self.DeclareDiscreteState(NUM_JOINTS))
-        decided_by = {port.ticket() for port in self._inputs} | {self.discrete_state_ticket(state)}
-        # While the robot runs, its joints do not matter for what is issued: they need not be waited for.
-        self._next_in_motion = self.DeclareCacheEntry(
-            "next_in_motion", ValueProducer(Value[object], self._calc_next_in_motion), decided_by
+        # One port for all of it: every further one would be a call from Drake into Python.
+        decided_by = {port.ticket() for port in (*self._inputs, self._joints)}
+        decided_by.add(self.discrete_state_ticket(state))
+        self._decision = self.DeclareVectorOutputPort(
+            "decision", at.DECISION_WIDTH, self._calc_decision, decided_by
         )
-        # This one computes everything; the ports are slices of it.
-        self._next = self.DeclareCacheEntry(
-            "next", ValueProducer(Value[object], self._calc_next), decided_by | {self._joints.ticket()}
-        )
-        for name, part in (("position_command", at.POSITIONS), ("velocity_command", at.VELOCITIES)):
-            self.DeclareVectorOutputPort(name, NUM_JOINTS, self._slice(part), {self._next.ticket()})
         if passes_torque:
             torque = self.DeclareVectorInputPort("torque_feedforward", NUM_JOINTS)
             self._torque = torque
-            prerequisites = {self._next.ticket(), torque.ticket()}
+            prerequisites = {*decided_by, torque.ticket()}
             self.DeclareVectorOutputPort("torque_feedforward", NUM_JOINTS, self._calc_torque, prerequisites)
         self.DeclarePeriodicDiscreteUpdateEvent(period, 0.0, self._remember)
 
-    def _slice(self, part: slice):
-        def calc(context: Context, output: BasicVector) -> None:
-            output.set_value(self._next.Eval(context)[0][part])
-
-        return calc
-
     def _calc_torque(self, context: Context, output: BasicVector) -> None:
-        kinds, torque = self._next.Eval(context)[1], self._torque.Eval(context)
-        # A torque belongs to the motion that it was computed for.
-        follows = not {_NO_COMMAND, _STOPPED, _VELOCITY, _ACCELERATION, _POSITION}.intersection(kinds)
+        counted, torque = self._decision.Eval(context)[at.COUNTED], self._torque.Eval(context)
+        follows = not any(counted[kind] for kind in _NOT_FOLLOWED)
         output.set_value(torque if follows and np.isfinite(torque).all() else np.zeros(NUM_JOINTS))
 
-    def _calc_next(self, context: Context, value) -> None:
-        """The next state, the kinds of intervention it takes, the time of the last sample, the joints."""
+    def _calc_decision(self, context: Context, output: BasicVector) -> None:
+        state = context.get_discrete_state(0).value()
+        law = [port.Eval(context) for port in self._inputs]
         joints: JointSample = self._joints.Eval(context)
-        has_issued = not math.isnan(context.get_discrete_state(0).value()[0])
-        if not math.isfinite(sum(joints.position.tolist())):
-            value.set_value((*self._decided(context, None, are_joints_known=False), None))
-        elif not (joints.running and has_issued):
-            value.set_value((*self._decided(context, joints), None))
-        else:
-            value.set_value((*self._next_in_motion.Eval(context), joints.position))
-
-    def _calc_next_in_motion(self, context: Context, value) -> None:
-        value.set_value(self._decided(context, None))
+        decision = output.get_mutable_value()
+        if joints.running and not self._jerk.is_given:
+            limits = self._rows, *self._correction_limits, _ABSURD, self._is_speed_only, self._period
+            if self._kernels.decided(state, *law, joints.position, *limits, decision):
+                return
+        are_known = math.isfinite(sum(joints.position.tolist()))
+        # While the robot runs and has been commanded before, its joints do not matter for what is issued.
+        is_in_motion = joints.running and not math.isnan(state[0])
+        next_state, kinds = self._decided(state, *law[:3], joints, are_known, is_in_motion)
+        decision[: at.WIDTH], decision[at.COUNTED] = next_state, 0.0
+        decision[at.COUNTED][kinds] = 1.0
+        decision[at.JOINTS] = joints.position if are_known and is_in_motion else np.nan
+        self._kernels.note_camera(decision, law[3])
 
     def _decided(
-        self, context: Context, joints: JointSample | None, are_joints_known: bool = True
-    ) -> tuple[np.ndarray, list[int], float]:
-        """What `_calc_next` says; no joints stand for a robot that runs and has been commanded before."""
-        state = context.get_discrete_state(0).value()
-        position, velocity, correction, measurement = (port.Eval(context) for port in self._inputs)
-        if joints is None and are_joints_known and not self._jerk.is_given:
-            follow = self._kernels.follow
-            limits = self._rows, *self._correction_limits, _ABSURD, self._is_speed_only, self._period
-            followed, is_followed = follow(state, position, velocity, correction, *limits)
-            if is_followed:
-                return followed, *_seen(followed, [], measurement)
+        self,
+        state: np.ndarray,
+        position: np.ndarray,
+        velocity: np.ndarray,
+        correction: np.ndarray,
+        joints: JointSample,
+        are_joints_known: bool,
+        is_in_motion: bool,
+    ) -> tuple[np.ndarray, list[int]]:
+        """The next state and the kinds of intervention it takes, whatever has happened."""
+        is_led_by_joints = are_joints_known and not is_in_motion
         state, kinds = state.copy(), []
-        if joints is not None:
+        if is_led_by_joints:
             _take_from(state, joints)
         if not are_joints_known:
             kinds.append(_REFUSED)
@@ -187,7 +182,7 @@ class CommandGuard(LeafSystem):
                 state[at.MODE] = at.STOPPING
             elif excess > _GRACE:
                 position, velocity = self._within_correction(position, velocity, correction)
-        if joints is not None and not joints.running and state[at.LAST_COMMAND] > -math.inf:
+        if is_led_by_joints and not joints.running and state[at.LAST_COMMAND] > -math.inf:
             kinds.append(_STOPPED)
             state[at.BRAKING_FROM] = 0.0
             state[at.MODE] = at.IDLE
@@ -210,7 +205,7 @@ class CommandGuard(LeafSystem):
             self._follow(state, position, velocity, kinds)
         if last is not None:
             self._ease(state, last, kinds)
-        return state, *_seen(state, kinds, measurement)
+        return state, kinds
 
     def _within_correction(
         self, position: np.ndarray, velocity: np.ndarray, correction: np.ndarray
@@ -348,36 +343,17 @@ class CommandGuard(LeafSystem):
 
     def _remember(self, context: Context, discrete_state: DiscreteValues) -> None:
         """Makes the issued command the state and decides from the clocks how the next tick will go."""
-        state, kinds, last_sample, were_at = self._next.Eval(context)
-        config, has_no_command = self._config, _NO_COMMAND in kinds
+        decision, config = self._decision.Eval(context), self._config
         times = config.hold_after, config.stop_after, config.resume
-        state = self._kernels.remembered(
-            state, context.get_time(), last_sample, self._uses_camera, has_no_command, *times
-        )
-        if were_at is not None:
-            state[at.WERE_AT] = were_at
-        if kinds or state[at.DEVIATES]:
+        state, is_usual = self._kernels.remembered(decision, context.get_time(), self._uses_camera, *times)
+        if not is_usual:
             wished = self._inputs[0].Eval(context)
             aside = state[at.ASIDE] if self._is_speed_only else state[at.POSITIONS] - wished
             aside = aside if math.isfinite(sum(aside.tolist())) else _NO_DEVIATION
             state[at.DEVIATES] = float(aside.any())
             discrete_state.set_value(2, aside)
+            discrete_state.set_value(1, context.get_discrete_state(1).value() + decision[at.COUNTED])
         discrete_state.set_value(0, state)
-        if kinds:
-            counts = context.get_discrete_state(1).value().copy()
-            counts[kinds] += 1.0
-            discrete_state.set_value(1, counts)
-
-
-def _seen(state: np.ndarray, kinds: list[int], measurement: np.ndarray) -> tuple[list[int], float]:
-    """The kinds with those that the camera adds, which the state notes, and the time of the last sample."""
-    last_sample, refused, _ = measurement.tolist()
-    if state[at.MODE] == at.HOLDING:
-        kinds.append(_HELD)
-    if refused > state[at.REFUSED_SEEN]:
-        kinds.append(_REFUSED)
-        state[at.REFUSED_SEEN] = refused
-    return kinds, last_sample
 
 
 def _take_from(state: np.ndarray, joints: JointSample) -> None:

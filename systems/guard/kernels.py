@@ -6,6 +6,12 @@ import numpy as np
 
 from robots.kinematics.kernels import compiled
 from systems.guard import state as at
+from systems.guard.config import KINDS
+
+_COUNTED, _JOINTS, _WERE_AT = at.COUNTED.start, at.JOINTS.start, at.WERE_AT.start
+_NO_COMMAND, _REFUSED, _HELD = (
+    _COUNTED + KINDS.index(kind) for kind in ("no_command", "measurement_refused", "measurement_held")
+)
 
 
 @compiled
@@ -86,17 +92,43 @@ def may_be_sent(rows, position, velocity, mean, speed, last, passed, span, slack
 
 
 @compiled
-def follow(state, position, velocity, correction, rows, angle_limit, limit, absurd, is_speed_only, period):
-    """The state after a command that is passed on as it is, and whether it may be.
+def note_camera(decision, measurement):
+    """Adds to a decision what is counted of the camera, and when its last usable sample arrived."""
+    if decision[at.MODE] == at.HOLDING:
+        decision[_HELD] = 1.0
+    if measurement[1] > decision[at.REFUSED_SEEN]:
+        decision[_REFUSED], decision[at.REFUSED_SEEN] = 1.0, measurement[1]
+    decision[at.LAST_SAMPLE] = measurement[0]
 
-    So it is in almost every tick: the law is followed, gives a command, its correction is within its limits,
-    and the joints can do it. Everything else is the guard's to decide.
+
+@compiled
+def decided(
+    state,
+    position,
+    velocity,
+    correction,
+    measurement,
+    joints,
+    rows,
+    angle_limit,
+    limit,
+    absurd,
+    is_speed_only,
+    period,
+    decision,
+):
+    """Whether a command may be passed on as it is; then the decision at the end of the arguments says so.
+
+    So it is in almost every tick: the robot runs and has been commanded before, its joints are known, the law
+    is followed, gives a command, its correction is within its limits, and the joints can do it. Everything
+    else is the guard's to decide.
     """
-    followed = state.copy()
-    mode = state[at.MODE]
+    mode, known = state[at.MODE], state[0]
+    for i in range(6):
+        known += joints[i]
     is_followed = (mode == at.GOING or mode == at.HOLDING) and excess(correction, angle_limit, limit) == 0.0
-    if not (is_followed and is_command(position, velocity, absurd)):
-        return followed, False
+    if not (math.isfinite(known) and is_followed and is_command(position, velocity, absurd)):
+        return False
     start, before, last = np.empty(6), np.empty(6), np.empty(6)
     for i in range(6):
         start[i], before[i], last[i] = (
@@ -107,30 +139,39 @@ def follow(state, position, velocity, correction, rows, angle_limit, limit, absu
         if is_speed_only:  # from where the robot is, which what was issued before does not tell
             start[i] = position[i] - period * velocity[i]
             before[i] = start[i] - period * last[i]
-        followed[at.LAST_BUT_ONE + i] = state[at.POSITION + i]
-        followed[at.POSITION + i] = position[i]
-        followed[at.VELOCITY + i] = followed[at.BRAKING + i] = velocity[i]
-    return followed, is_allowed(rows, position, velocity, start, before, last)
+    if not is_allowed(rows, position, velocity, start, before, last):
+        return False
+    for i in range(len(decision)):
+        decision[i] = state[i] if i < at.WIDTH else 0.0
+    for i in range(6):
+        decision[at.LAST_BUT_ONE + i] = state[at.POSITION + i]
+        decision[at.POSITION + i] = position[i]
+        decision[at.VELOCITY + i] = decision[at.BRAKING + i] = velocity[i]
+        decision[_JOINTS + i] = joints[i]
+    note_camera(decision, measurement)
+    return True
 
 
 @compiled
-def remembered(state, time, last_sample, uses_camera, has_no_command, hold_after, stop_after, resume):
-    """The state for the next tick, a new one, with the mode that the clocks say.
+def remembered(decision, time, uses_camera, hold_after, stop_after, resume):
+    """The state for the next tick with the mode that the clocks say, and whether nothing is to be noted else.
 
     Args:
-        state: what was decided at this tick.
+        decision: at this tick.
         time: of this tick in s.
-        last_sample: when the last usable sample arrived, in s.
         uses_camera: whether the age of samples matters.
-        has_no_command: whether the law gave none.
         hold_after, stop_after, resume: of `GuardConfig`.
     """
-    state = state.copy()
+    state = decision[: at.WIDTH].copy()
+    is_usual = state[at.DEVIATES] == 0.0
+    for i in range(_COUNTED, at.LAST_SAMPLE):
+        is_usual = is_usual and decision[i] == 0.0
+    has_no_command = decision[_NO_COMMAND] > 0.0
     if not has_no_command:
         state[at.LAST_COMMAND] = time
     # A camera that has not spoken yet is not lost: its time starts with the guard's first tick.
     state[at.FIRST_TICK] = min(state[at.FIRST_TICK], time)
-    age = time - max(last_sample, state[at.FIRST_TICK]) if uses_camera else 0.0
+    age = time - max(decision[at.LAST_SAMPLE], state[at.FIRST_TICK]) if uses_camera else 0.0
     silence = time - state[at.LAST_COMMAND]
     mode = state[at.MODE]
     if mode == at.STOPPING:
@@ -145,17 +186,22 @@ def remembered(state, time, last_sample, uses_camera, has_no_command, hold_after
         state[at.MODE] = at.AWAY
     elif mode != at.IDLE and mode != at.RESUMING and mode != at.AWAY:
         state[at.MODE] = at.HOLDING if age >= hold_after - 1e-9 else at.GOING
-    return state
+    if not math.isnan(decision[_JOINTS]):
+        for i in range(6):
+            state[_WERE_AT + i] = decision[_JOINTS + i]
+    return state, is_usual
 
 
 def warm_up() -> None:
     """Calls everything once with arrays as a tick has them, so that no tick waits for a compiler."""
-    six = np.zeros(6)
+    six, three, decision = np.zeros(6), np.zeros(3), np.zeros(at.DECISION_WIDTH)
     state, locked = np.zeros(at.WIDTH), np.zeros(at.WIDTH)
     locked.flags.writeable = False  # as Drake hands out a state sometimes
     for each in (state, locked):
-        follow(each, six, six, six, np.zeros((6, 6)), 1.0, 1.0, 1.0, False, 1.0)
-    remembered(state, 0.0, 0.0, True, False, 1.0, 1.0, False)
+        rows = np.zeros((6, 6))
+        decided(each, six, six, six, three, six, rows, 1.0, 1.0, 1.0, False, 1.0, decision)
+    remembered(decision, 0.0, True, 1.0, 1.0, False)
+    note_camera(decision, three)
     excess(six, 1.0, 1.0)
     is_command(six, six, 1.0)
     is_allowed(np.zeros((6, 6)), six, six, six, six, six)

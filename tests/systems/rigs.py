@@ -111,6 +111,11 @@ class GuardRig:
         sample = JointSample(self.time, joints, np.zeros(6), np.zeros(6), self.running)
         self.guard.GetInputPort("joint_sample").FixValue(self.context, Value(sample))
 
+    def issued(self) -> tuple[np.ndarray, np.ndarray]:
+        """Position (rad) and velocity (rad/s) that are issued now, (6,) each."""
+        decision = self.guard.GetOutputPort("decision").Eval(self.context)
+        return decision[:6].copy(), decision[6:12].copy()
+
     def tick(self, position, velocity=None, seen: float = np.inf, refused: int = 0, correction=None):
         """Issues one command; ``seen`` is the time of the last sample in s, by default the present.
 
@@ -127,8 +132,7 @@ class GuardRig:
         for name, value in values.items():
             self.guard.GetInputPort(name).FixValue(self.context, value)
         self.hear(self.start)
-        ports = ("position_command", "velocity_command")
-        issued, speed = (self.guard.GetOutputPort(name).Eval(self.context).copy() for name in ports)
+        issued, speed = self.issued()
         self.context.SetDiscreteState(self.guard.EvalUniquePeriodicDiscreteUpdate(self.context))
         counts = self.guard.GetOutputPort("guard_status").Eval(self.context)
         self.ticks += 1

@@ -62,8 +62,7 @@ def test_a_robot_that_does_not_follow_is_commanded_where_it_was_read_last(is_com
     rig.tick(np.full(6, 0.01) if is_commanded else NOTHING)
     for joints in (np.full(6, 0.1), np.full(6, -0.2)):
         rig.hear(joints)
-        issued = rig.guard.GetOutputPort("position_command").Eval(rig.context)
-        np.testing.assert_array_equal(issued, joints)
+        np.testing.assert_array_equal(rig.issued()[0], joints)
 
 
 def test_a_command_within_the_limits_passes_unchanged_and_counts_nothing():
