@@ -140,21 +140,22 @@ class CommandGuard(LeafSystem):
 
     def _calc_decision(self, context: Context, output: BasicVector) -> None:
         state = context.get_discrete_state(0).value()
-        law = [port.Eval(context) for port in self._inputs]
+        position, velocity, correction, measurement = (port.Eval(context) for port in self._inputs)
+        law = position, velocity, correction
         joints: JointSample = self._joints.Eval(context)
         decision = output.get_mutable_value()
         if joints.running and not self._jerk.is_given:
             limits = self._rows, *self._correction_limits, _ABSURD, self._is_speed_only, self._period
-            if self._kernels.decided(state, *law, joints.position, *limits, decision):
+            if self._kernels.decided(state, *law, measurement, joints.position, *limits, decision):
                 return
         are_known = math.isfinite(sum(joints.position.tolist()))
         # While the robot runs and has been commanded before, its joints do not matter for what is issued.
         is_in_motion = joints.running and not math.isnan(state[0])
-        next_state, kinds = self._decided(state, *law[:3], joints, are_known, is_in_motion)
+        next_state, kinds = self._decided(state, *law, joints, are_known, is_in_motion)
         decision[: at.WIDTH], decision[at.COUNTED] = next_state, 0.0
         decision[at.COUNTED][kinds] = 1.0
         decision[at.JOINTS] = joints.position if are_known and is_in_motion else np.nan
-        self._kernels.note_camera(decision, law[3])
+        self._kernels.note_camera(decision, measurement)
 
     def _decided(
         self,
