@@ -78,14 +78,17 @@ def test_what_the_design_promises_its_motion_shows(shape):
 
 @pytest.mark.slow
 def test_what_a_slow_camera_misses_a_larger_motion_makes_up_for():
-    """With 100 samples a second in place of 250 a deviation could be larger by sqrt(2.5) = 1.6."""
+    """With 100 samples a second in place of 250 a deviation could be larger by sqrt(2.5) = 1.6.
+
+    A motion that is a fifth larger makes up for some of that.
+    """
     of, robot = needs(Rectangle()), load_robot("irb1200")
     _, fast = designed(of, Probe(robot, ProbeConfig()), 4.0, RATE, sharp=0.0)
     _, slow = designed(of, Probe(robot, ProbeConfig(), 0.01), 4.0, 100.0, sharp=0.0)
-    limits = ProbeConfig(amplitude=[0.15, 0.15, 0.15, 0.4, 0.4, 0.4], largest_excursion=0.1)
+    limits = ProbeConfig(amplitude=[0.19, 0.19, 0.19, 0.5, 0.5, 0.5], largest_excursion=0.125)
     _, limited = designed(of, Probe(robot, limits, 0.01), 4.0, 100.0, sharp=0.0)
-    assert slow.sigma < 1.25 * fast.sigma
-    assert limited.sigma > 1.1 * slow.sigma
+    assert slow.sigma < 1.4 * fast.sigma
+    assert limited.sigma > 1.05 * slow.sigma
 
 
 def test_the_longer_the_camera_may_be_blind_the_more_is_shown_before():
