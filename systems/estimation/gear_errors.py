@@ -15,11 +15,15 @@ from systems.estimation.memory import Layout
 SHAPE_NAMES = "sine_1", "cosine_1", "sine_2", "cosine_2", "hysteresis", "gap", "held_gap"
 NUM_SHAPES = len(SHAPE_NAMES)
 NUM_STATES = 3 * NUM_JOINTS  # the last three shapes of each joint
-# All assumed, as what gears have: half a gap of a third of an arc minute; grease of 40 N m s/rad in it, and
-# where the robot's is a quarter or four times as much, the tip is as near to its path to a hundredth of a
-# millimetre; and beside the teeth a hysteresis of a tenth of the gear's stiffness, which turns over within
-# half a milliradian. Where there is none the other column fits, where there is half of it the mean of both.
-_GAP = Gap(half=5e-5, impulse=2e-3, held=0.1, width=5e-4)
+# All assumed, as what gears have: a sixth of an arc minute of play at least; grease of 40 N m s/rad in it, and
+# where the robot's is a quarter or four times as much, the tip is as near to its path to a hundredth of a millimetre;
+# and beside the teeth a hysteresis of a tenth of the gear's stiffness, which turns over within 0.35 mrad: where a
+# gear shakes, elements that need 0.5 mrad at rest turn over within less.
+# Where there is no hysteresis the other column fits, where there is half of it the mean of both.
+_GAP = Gap(half=2.5e-5, least=0.2, grease=40.0, held=0.1, width=3.5e-4)
+# Of the spread, how large an open gap may be. Until a load has turned over slowly nothing tells it from one that
+# is held, and then a held one is the better guess.
+OPEN = 0.3
 _OTHERWISE = 0.1  # of the size of gear errors, what they have of other shapes than these; assumed
 _LEAST_TORQUE = 1e-6  # N m, so that a gear which nothing holds has a side
 
@@ -45,13 +49,30 @@ class GearErrors:
         """Gears as compiled functions take them; ``lag`` is that of their damping in s, (6,)."""
         return Gears(self._ratio, self._compliance, lag, _GAP)
 
-    def step(self, memory: SimpleNamespace, torque: np.ndarray, duration: float) -> np.ndarray:
-        """Loads the gears by torques in N m, (6,), for a time in s; returns their states in -1 to 1, (18,).
+    def springs(self, factors: np.ndarray, sizes: np.ndarray) -> np.ndarray:
+        """Compliance in rad per N m and half of the play in rad of gears as they are known, (2, 6).
+
+        Args:
+            factors: of the compliance that the robot's file says, (6,).
+            sizes: of the shapes in rad, (7, 6).
+        """
+        return kernels.gears.springs(self._compliance, _GAP, factors, sizes)
+
+    def step(
+        self, memory: SimpleNamespace, springs: np.ndarray, torque: np.ndarray, duration: float
+    ) -> np.ndarray:
+        """Loads the gears for a time; returns their states in -1 to 1, (18,).
 
         At first the teeth lie where the load has them, and the hysteresis is relaxed.
+
+        Args:
+            memory: of the layout.
+            springs: as of `springs`, (2, 6). How far they bend decides how far the hysteresis turns over.
+            torque: in N m, (6,).
+            duration: in s.
         """
         is_first = memory.started[0] == 0.0
-        kernels.gears.step(self._compliance, _GAP, torque, float(duration), is_first, memory.state)
+        kernels.gears.step(springs, _GAP, torque, float(duration), is_first, memory.state)
         memory.started[0] = 1.0
         return memory.state[1:].flatten()
 

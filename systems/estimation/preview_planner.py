@@ -116,7 +116,8 @@ class PreviewPlanner:
         model = self._model
         if not model.has_gear_errors:
             return yields, np.zeros(NUM_STATES)
-        states = model.gear_errors.step(memory.gears, model.total_load(x, loads)[:6], 0.0)
+        springs = model.gear_errors.springs(x[model.K][:6], x[model.E].reshape(-1, 6))
+        states = model.gear_errors.step(memory.gears, springs, model.total_load(x, loads)[:6], 0.0)
         shapes = model.gear_shapes(q + yields, states)
         return yields - model.gear_error(x, shapes), states
 

@@ -12,7 +12,7 @@ from systems.controller_model import ControllerModel
 from systems.estimation import kernels
 from systems.estimation.arm_geometry import Arm, ArmGeometry, Constants
 from systems.estimation.arm_loads import ArmLoads
-from systems.estimation.gear_errors import NUM_SHAPES, NUM_STATES, GearErrors
+from systems.estimation.gear_errors import NUM_SHAPES, NUM_STATES, OPEN, SHAPE_NAMES, GearErrors
 from systems.estimation.kernels.arrays import Seen, SeenOnce, Unknowns
 from systems.estimation.learnt_robot import known_before
 
@@ -112,7 +112,10 @@ class TipModel:
         self.sigma[g + 18] = spread.payload
         self.sigma[g + 19 : g + 22] = spread.payload_centre * max(model.payload, 0.1)
         self.sigma[self.C], self.sigma[self.D] = spread.clock, spread.clock_drift
-        self.sigma[self.E] = spread.gear_error
+        if self.has_gear_errors:
+            shares = np.ones((NUM_SHAPES, NUM_JOINTS))
+            shares[SHAPE_NAMES.index("gap")] = OPEN
+            self.sigma[self.E] = spread.gear_error * shares.ravel()
         self._tool, self._world = self._directions(TOOL), self._directions(_BASE)
         self.prior = np.eye(self.size)  # information, in units of the spreads
         self.prior[self.D, self.D] = HELD

@@ -132,8 +132,9 @@ class DriveMemory(NamedTuple):
 class Gap(NamedTuple):
     """Play of a gear, and what stands beside its teeth."""
 
-    half: float  # rad, half of the play
-    impulse: float  # N m s, that brings teeth from the middle to a side
+    half: float  # rad, half of the least play
+    least: float  # of the compliance that the robot's file says
+    grease: float  # N m s/rad, that teeth move against
     held: float  # of the stiffness of the gear, what the hysteresis has
     width: float  # rad of deflection, after which it has turned over
 

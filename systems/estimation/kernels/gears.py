@@ -2,15 +2,27 @@
 
 import math
 
+import numpy as np
+
 from systems.estimation.kernels.poses import compiled
 
 
 @compiled
-def step(compliance, gap, torque, duration, is_first, state):
+def springs(compliance, gap, factors, sizes):
+    """See `GearErrors.springs`; ``sizes`` are those of all shapes, open and held gap last, (7, n)."""
+    out = np.empty((2, len(compliance)))
+    for j in range(len(compliance)):
+        out[0, j] = max(factors[j], gap.least) * compliance[j]
+        out[1, j] = max(sizes[5, j] + sizes[6, j], gap.half)
+    return out
+
+
+@compiled
+def step(springs, gap, torque, duration, is_first, state):
     """Loads gears for a time; see `GearErrors.step`.
 
     Args:
-        compliance: of the springs, rad per N m, (n,).
+        springs: their compliance in rad per N m and half of their play in rad, (2, n).
         gap: `Gap`.
         torque: of the gears, N m, (n,), for the duration in s.
         is_first: whether nothing is known of what was before.
@@ -18,20 +30,22 @@ def step(compliance, gap, torque, duration, is_first, state):
             width, and where the teeth are in an open gap and in one that is held; is renewed.
     """
     for j in range(len(torque)):
-        held = gap.held / compliance[j]  # N m/rad
+        compliance, half = springs[0, j], springs[1, j]
+        held = gap.held / compliance  # N m/rad
         if is_first:
             side = -1.0 if torque[j] > 0.0 else 1.0 if torque[j] < 0.0 else 0.0
             state[1, j], state[2, j], state[3, j] = 0.0, side, side
-            state[0, j] = gap.half * side - compliance[j] * torque[j]
+            state[0, j] = half * side - compliance * torque[j]
             continue
-        free = state[2, j] - duration / gap.impulse * torque[j]
+        pace = duration / (gap.grease * half)  # per N m
+        free = state[2, j] - pace * torque[j]
         state[2, j] = min(max(free, -1.0), 1.0)
         # Implicit in the spring of the hysteresis, which goes along with the teeth.
-        z, teeth, spring = gap.width * state[1, j], state[3, j], held * gap.half
+        z, teeth, spring = gap.width * state[1, j], state[3, j], held * half
         push = torque[j] + held * z - spring * teeth
-        way = (teeth - duration / gap.impulse * push) / (1.0 + duration / gap.impulse * spring)
+        way = (teeth - pace * push) / (1.0 + pace * spring)
         state[3, j] = min(max(way, -1.0), 1.0)
-        deflection = gap.half * state[3, j] - compliance[j] * (torque[j] + held * z)
+        deflection = half * state[3, j] - compliance * (torque[j] + held * z)
         turn = deflection - state[0, j]
         end = 1.0 if turn > 0.0 else -1.0
         state[0, j] = deflection

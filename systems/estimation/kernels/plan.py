@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 
-from systems.estimation.kernels.gears import shapes
+from systems.estimation.kernels.gears import shapes, springs
 from systems.estimation.kernels.gears import step as step_gears
 from systems.estimation.kernels.geometry import place
 from systems.estimation.kernels.loads import load
@@ -143,16 +143,17 @@ def _add_gear_errors(gears, unknowns, g, step, planned, state, yields):
         for k in range(4):
             torque[j] += x[g + 18 + k] * planned.loads[1 + k, j]
         turns[j] = gears.ratio[j] * (planned.moving[0, j] + yields[j])
-    step_gears(gears.compliance, gears.gap, torque, step, False, state.gears)
-    number = (len(x) - g - 24) // 6
-    waves = np.empty((number, 6))
+    sizes = x[g + 24 :].reshape(-1, 6)
+    bend = springs(gears.compliance, gears.gap, x[g : g + 6], sizes)
+    step_gears(bend, gears.gap, torque, step, False, state.gears)
+    waves = np.empty(sizes.shape)
     for k in range(3):
         for j in range(6):
             planned.states[6 * k + j] = state.gears[1 + k, j]
     shapes(turns, planned.states, waves)
-    for k in range(number):
+    for k in range(len(sizes)):
         for j in range(6):
-            yields[j] -= waves[k, j] * x[g + 24 + 6 * k + j]
+            yields[j] -= waves[k, j] * sizes[k, j]
 
 
 @compiled

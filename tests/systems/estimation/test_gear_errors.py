@@ -22,6 +22,12 @@ def hysteresis(gears: GearErrors):
     return gears.layout.view(np.zeros(gears.layout.size))
 
 
+def springs(gears: GearErrors, half_gap: float = 5e-5):
+    sizes = np.zeros((7, 6))
+    sizes[5:] = 0.5 * half_gap
+    return gears.springs(np.ones(6), sizes)
+
+
 def test_waves_are_of_one_and_two_turns_of_the_motor(robot):
     gears, states = GearErrors(robot), np.zeros(18)
     one_turn = 2.0 * np.pi / robot.gear_ratio
@@ -35,7 +41,10 @@ def test_waves_are_of_one_and_two_turns_of_the_motor(robot):
 def test_teeth_lie_where_the_spring_yields_to_and_stay_there_without_a_load(robot):
     gears, torque = GearErrors(robot), np.array([5.0, -5.0, 0.3, -0.3, 2.0, -2.0])
     memory = hysteresis(gears)
-    teeth = [gears.shapes(np.zeros(6), gears.step(memory, each, 4e-3))[5] for each in (torque, 0.0 * torque)]
+    teeth = [
+        gears.shapes(np.zeros(6), gears.step(memory, springs(gears), each, 4e-3))[5]
+        for each in (torque, 0.0 * torque)
+    ]
     np.testing.assert_array_equal(teeth, [-np.sign(torque)] * 2)
 
 
@@ -45,7 +54,7 @@ def test_teeth_cross_their_gap_against_the_grease_which_takes_an_impulse(robot):
     for period in (4e-3, 1e-3):
         memory = hysteresis(gears)
         times = np.arange(-0.1, 0.1, period)
-        states = [gears.step(memory, np.full(6, ramp * t), period) for t in times]
+        states = [gears.step(memory, springs(gears), np.full(6, ramp * t), period) for t in times]
         way = np.array([gears.shapes(np.zeros(6), state)[5, 0] for state in states])
         assert (way[times < 0.0] == 1.0).all()
         ways.append(times[np.argmax(way < 0.0)])
@@ -55,13 +64,26 @@ def test_teeth_cross_their_gap_against_the_grease_which_takes_an_impulse(robot):
     assert ways[0] == pytest.approx(ways[1], abs=4e-3)
 
 
+def test_how_far_a_gear_yields_decides_how_far_its_hysteresis_turns_over(robot):
+    """Dahl's state after a turn by 2 c T across no gap, and by twice the half gap more with one."""
+    gears, torque = GearErrors(robot), 2e-4 * robot.joint_stiffness
+    for factor, half_gap in ((1.0, 2.5e-5), (1.5, 2.5e-5), (1.0, 1e-4)):
+        known = gears.springs(np.full(6, factor), np.full((7, 6), 0.5 * half_gap))
+        memory = hysteresis(gears)
+        for share in (-1.0, *np.linspace(-1.0, 1.0, 4001)):
+            state = gears.step(memory, known, share * torque, 1e-3)[:6]
+        # It carries a tenth of what it turns over by, so much less is left to the spring.
+        turn = 2.0 * (factor * 2e-4 + half_gap) - factor * 0.1 * 3.5e-4 * np.abs(state)
+        np.testing.assert_allclose(state, -(1.0 - np.exp(-turn / 3.5e-4)), rtol=0.02)
+
+
 def test_hysteresis_tells_from_which_side_a_load_was_reached(robot):
     gears = GearErrors(robot)
     large = 3e-3 * robot.joint_stiffness  # N m, six times the larger width
 
     def after(torques):
         memory = hysteresis(gears)
-        return [gears.step(memory, torque, 4e-3)[:6] for torque in torques][-1]
+        return [gears.step(memory, springs(gears), torque, 4e-3)[:6] for torque in torques][-1]
 
     loaded = after([np.zeros(6), -large])
     np.testing.assert_allclose(loaded, 1.0, atol=3e-3)  # it follows the deflection
@@ -75,7 +97,7 @@ def test_hysteresis_tells_from_which_side_a_load_was_reached(robot):
 def test_gears_may_be_off_by_the_side_of_teeth_that_nearly_nothing_pushes(robot, load):
     """Against teeth whose side is drawn, by a push that is known to no more than what hysteresis does."""
     gears, turned, spring = GearErrors(robot), 0.3, 0.1 * np.asarray(robot.joint_stiffness)
-    carried, crossing = spring * 5e-4 * turned, spring * 2.0 * 70e-6  # N m, before and while they cross
+    carried, crossing = spring * 3.5e-4 * turned, spring * 2.0 * 70e-6  # N m, before and while they cross
     push = (load + 0.5) * carried
     drawn = np.random.default_rng(0).normal(size=(20000, 1)) * np.hypot(carried, crossing)
     sizes, states = np.zeros((7, 6)), np.concatenate((np.full(6, turned), np.full(6, 1.0), np.full(6, -0.4)))
@@ -127,13 +149,13 @@ def test_two_gaps_make_up_the_motion_of_a_gear_whose_hysteresis_carries_in_its_g
         found = train.torques(z, still, (np.array([each]), np.array([speed])), np.zeros(1))
         z = z + period * found.state_rate
         torque = np.full(6, found.link[0])
-        states = gears.step(memory, torque, period)
+        states = gears.step(memory, springs(gears, 0.5 * gap), torque, period)
         columns.append([torque[0] / k, *gears.shapes(np.zeros(6), states)[4:, 0]])
 
     def left(chosen):
         A = np.array(columns)[:, chosen]
         return np.abs(x - A @ np.linalg.lstsq(A, x, rcond=None)[0]).max()
 
-    assert left([0, 1, 2, 3]) < 0.5 * gap
+    assert left([0, 1, 2, 3]) < 0.6 * gap  # the grease is half as thick as is believed: it is crossed earlier
     if share:
         assert left([0, 1, 2]) > 0.7 * gap  # open, it is crossed at another time
