@@ -15,14 +15,14 @@ from systems.estimation.memory import Layout
 SHAPE_NAMES = "sine_1", "cosine_1", "sine_2", "cosine_2", "hysteresis", "gap", "held_gap"
 NUM_SHAPES = len(SHAPE_NAMES)
 NUM_STATES = 3 * NUM_JOINTS  # the last three shapes of each joint
-# All assumed, as what gears have: a sixth of an arc minute of play at least; grease of 40 N m s/rad in it, and
-# where the robot's is a quarter or four times as much, the tip is as near to its path to a hundredth of a millimetre;
-# and beside the teeth a hysteresis of a tenth of the gear's stiffness, which turns over within 0.35 mrad: where a
-# gear shakes, elements that need 0.5 mrad at rest turn over within less.
+# All assumed, as what gears have: a sixth of an arc minute of play at least; grease of 40 N m s/rad in it,
+# and where the robot's is a quarter or four times as much, the tip is as near to its path to a hundredth of a
+# millimetre; and beside the teeth a hysteresis of a tenth of the gear's stiffness, which turns over within
+# 0.35 mrad: where a gear shakes, elements that need 0.5 mrad at rest turn over within less.
 # Where there is no hysteresis the other column fits, where there is half of it the mean of both.
 _GAP = Gap(half=2.5e-5, least=0.2, grease=40.0, held=0.1, width=3.5e-4)
-# Of the spread, how large an open gap may be. Until a load has turned over slowly nothing tells it from one that
-# is held, and then a held one is the better guess.
+# Of the spread, how large an open gap may be. Until a load has turned over slowly nothing tells it from one
+# that is held, and then a held one is the better guess.
 OPEN = 0.3
 _OTHERWISE = 0.1  # of the size of gear errors, what they have of other shapes than these; assumed
 _LEAST_TORQUE = 1e-6  # N m, so that a gear which nothing holds has a side
