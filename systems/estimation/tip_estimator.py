@@ -83,8 +83,7 @@ class TipEstimator:
             samples=(1,),
             weight=(1,),
             first_theta=(6,),
-            # Of theta, gears, motion, twist, time and shapes.
-            sums=(31 + 6 * NUM_SHAPES * model.has_gear_errors,),
+            sums=(31 + 6 * NUM_SHAPES * model.has_gear_errors,),  # theta, gears, motion, twist, time, shapes
             first_time=(1,),  # of the camera's clock
             last_time=(1,),
             sum_y=(6,),
@@ -143,6 +142,12 @@ class TipEstimator:
         by_prior = P @ self.model.prior @ P
         is_taken_back = (np.diag(by_prior) > np.diag(P)).any()
         return P if is_taken_back else factor * P + (1.0 - factor) * by_prior
+
+    def sigma(self, memory: SimpleNamespace, rows: np.ndarray) -> float:
+        """The largest standard deviation of n vectors that are linear in the unknowns, rows (n, k, size)."""
+        H = rows.reshape(-1, self.model.size)
+        variances = (H * self._solve_columns(memory, H).T).sum(axis=1).reshape(rows.shape[:2]).sum(axis=1)
+        return math.sqrt(max(1.0, self.variance_factor(memory)) * float(variances.max()))
 
     def covariance_of_robot(self, memory: SimpleNamespace) -> np.ndarray:
         """The same of `x_robot`."""

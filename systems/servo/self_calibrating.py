@@ -45,8 +45,9 @@ class SelfCalibrating(LeafSystem):
                                     moves the tip by
         out ``measurement``         vector 3: when the last usable sample arrived (s), how many were refused,
                                     when the newest one was exposed (s)
-        out ``speed_share``         1: less than all of the planned speed while the dead time is wrong, none
-                                    before it is found, nor while a blind camera is waited for
+        out ``speed_share``         1: less than all of the planned speed while the dead time is wrong or
+                                    the tip ahead little known, none before the dead time is found, nor
+                                    while a blind camera is waited for
         out ``look_ahead``          1 in s: how far ahead of now the plan is
 
     Of each camera sample the encoder positions of the same instant are found; the pair teaches the
@@ -89,6 +90,7 @@ class SelfCalibrating(LeafSystem):
             "start_time": (1,),
             "planned": (1,),  # the last instant of the plan
             "amplitude": (2, NUM_JOINTS),  # of the probe: knock, oscillations
+            "by_knowledge": (1,),  # share of the planned speed, see `Pace.look`
             "waited": (1,),  # s, by its oscillations for the dead time to be found and followed
             **learning.arrays,
         }
@@ -142,6 +144,7 @@ class SelfCalibrating(LeafSystem):
         memory = self._layout.view(vector)
         self._learning.start(memory)
         memory.lead.x[:] = self.tip_model.mean
+        memory.by_knowledge[0] = 1.0
         return vector
 
     def _rehearse(self) -> None:
@@ -371,3 +374,4 @@ class SelfCalibrating(LeafSystem):
             coming.commands[i] = part
         memory.planned[0], coming.path_time[0] = instant, reference.path_time(instant)
         coming.begins_path[0] = last < path_start <= instant
+        self._pace.look(memory, reference, time)

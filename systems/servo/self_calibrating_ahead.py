@@ -14,6 +14,9 @@ from systems.servo.self_calibrating_learning import PLAN, Learning
 _CAREFUL = 0.25  # of the planned speed, while the dead time or the load is not what it was
 _BEFORE_PATH = 0.6  # s, at which it is held until the dead time is found; a slowed path needs time to stop
 _MISSED = 5.0  # samples one after the other that no camera loses by chance: it is blind
+_LOOK_EVERY = 0.2  # s, between two looks at how well the path ahead is known
+_STEP = 0.7  # from one speed to the next slower one; larger ones make the arm ring
+_CLEARLY = 0.8  # of what a speed allows, before it is gone back to
 _NEXT = 0.3  # s of the path that are looked at while it is; about what is still run while it is slowed
 
 
@@ -88,6 +91,7 @@ class Pace:
     def __init__(self, model: ControllerModel, config: SelfCalibratingConfig, learning: Learning) -> None:
         """Takes what it asks."""
         self._period, self._config, self._learning = model.period, config, learning
+        self._looked_at = max(1, round(_LOOK_EVERY / model.period))
         self._blind_after = _MISSED * max(model.period, model.camera_period)  # s
 
     def share(self, memory: SimpleNamespace, reference: PathAhead, time: float) -> float:
@@ -107,8 +111,34 @@ class Pace:
             return 0.0
         if self._awaits_camera(memory, path_time, time):
             return 0.0
+        by_knowledge = float(memory.by_knowledge[0])
         is_upset = time < memory.paused_until[0] or not self._learning.delay.is_settled(memory.delay, instant)
-        return _CAREFUL if is_upset else 1.0
+        return min(_CAREFUL, by_knowledge) if is_upset else by_knowledge
+
+    def look(self, memory: SimpleNamespace, reference: PathAhead, time: float) -> None:
+        """Now and then: how fast the path may go on with what is known of the tip where it is planned next.
+
+        What a camera shows acts on the path a dead time later. On a path that is run slowly it comes in time,
+        and more of it. Where the tip is known n times less well than it should be, the path goes on at one
+        nth of its speed.
+
+        Args:
+            memory: of the law, whose ``by_knowledge`` is renewed.
+            reference: the path.
+            time: of the tick, s.
+        """
+        if self.needs is None or round(time / self._period) % self._looked_at:
+            return
+        path_time = reference.path_time(float(memory.planned[0]))
+        if path_time < reference.path.path_start - _NEXT:
+            return
+        rows = self.needs.rows_between(path_time, path_time + _NEXT)
+        beyond = self._learning.estimator.sigma(memory.estimator, rows) / self._config.known_on_path
+        share, faster = memory.by_knowledge, memory.by_knowledge[0] / _STEP
+        if beyond * share[0] > 1.0 and share[0] > _CAREFUL:
+            share[0] *= _STEP
+        elif beyond * faster < _CLEARLY:
+            share[0] = min(1.0, faster)
 
     def _awaits_camera(self, memory: SimpleNamespace, path_time: float, time: float) -> bool:
         """Whether the camera has gone blind before it has shown what the path needs next; not for ever."""

@@ -22,4 +22,6 @@ class SelfCalibratingConfig(LawConfig):
     lead_acceleration: float = 0.5  # m/s^2, at most, that this gives the tip
     # m, standard deviation: where the tip ahead is known less well, the path waits for a camera that is blind
     known_ahead: float = 2e-5
+    # m, likewise: where it is known n times less well, the path goes on at one nth of its speed, or a quarter
+    known_on_path: float = 3e-5
     longest_wait: float = 2.0  # s, that it waits

@@ -120,14 +120,22 @@ class PathNeeds:
             P: covariance of the unknowns in units of their spreads, (size, size).
             begin, end: s; before the path begins the tip counts as at its begin, after it as at its end.
         """
+        rows = self.rows_between(begin, end)
+        return math.sqrt(float(np.einsum("nij,nij->n", rows @ P, rows).max()))
+
+    def rows_between(self, begin: float, end: float) -> np.ndarray:
+        """How the tip moves with the unknowns at instants between two times, as of `sigma_between`.
+
+        Returns:
+            In units of the spreads, (n, 6, size), all in m: turns counted at an arm of 0.25 m.
+        """
         first, last = (self._nearest(t) for t in (begin, end))
         # Where a lap ends between the two, what is left of it and what has begun of the next one.
         chosen = np.arange(len(self.H))
         inside = (
             (chosen >= first) & (chosen <= last) if first <= last else (chosen >= first) | (chosen <= last)
         )
-        rows = _SCALE[:, None] * self.H[inside]
-        return math.sqrt(float(np.einsum("nij,nij->n", rows @ P, rows).max()))
+        return _SCALE[:, None] * self.H[inside]
 
     def _nearest(self, t: float) -> int:
         """Which instant is nearest to a time on the path in s, on whatever lap."""

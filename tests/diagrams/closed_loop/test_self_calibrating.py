@@ -144,7 +144,8 @@ def test_a_camera_that_is_blind_on_the_path_costs_what_was_promised(gap):
 @pytest.mark.parametrize(("gap", "held"), [(0.5, 0.5), (30.0, 2.0)])  # s
 def test_the_path_waits_for_a_camera_that_is_blind_where_nothing_was_shown_but_not_for_ever(gap, held):
     drawn = [f"{name}=3003" for name in ("seed", "station.errors.random.seed", "station.variation.seed")]
-    scenario = load_scenario("everything", [f"station.camera.dropouts=[[5, {5 + gap}]]", *drawn])
+    only = "servo.laws.self_calibrating.known_on_path=1"  # nothing else makes it slower
+    scenario = load_scenario("everything", [f"station.camera.dropouts=[[5, {5 + gap}]]", only, *drawn])
     experiment = Experiment(scenario, "self_calibrating")
     experiment.advance(until=9.0)
     log = experiment.log()
@@ -212,3 +213,18 @@ def test_a_camera_clock_that_drifts_is_learnt_before_it_matters():
     assert log.learnt is not None
     assert [event["kind"] for event in log.learnt["events"]] == ["clock drifts"]
     assert log.learnt["clock_drift_ppm"] == pytest.approx(-500.0, abs=50.0)  # of what corrects the stamps
+
+
+@pytest.mark.slow
+def test_a_path_ahead_that_is_little_known_is_run_slowly_and_more_exactly():
+    """With a dead time of 300 ms that nobody knew, what is seen acts late on the first lap."""
+    drawn = [f"{name}=3008" for name in ("seed", "station.errors.random.seed", "station.variation.seed")]
+    largest, ends = [], []
+    for known in ("1", "3e-5"):
+        settings = ["station.drive.dead_time=0.296", f"servo.laws.self_calibrating.known_on_path={known}"]
+        log = run(load_scenario("everything", [*settings, *drawn]), "self_calibrating")
+        errors = np.linalg.norm(pose_error(log.X_WE_desired, log.X_WE_true)[:, 3:], axis=1)
+        largest.append(errors[log.time >= log.path_start].max())
+        ends.append(log.time[-1])
+    assert largest[1] < min(0.06e-3, 0.7 * largest[0])  # m
+    assert 0.5 < ends[1] - ends[0] < 3.0  # s, of a path of 9 s

@@ -1,0 +1,73 @@
+"""How fast the self-calibrating law lets the path go on, by how well the tip ahead is known."""
+
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from systems.servo.self_calibrating_ahead import Pace
+from systems.servo.self_calibrating_config import SelfCalibratingConfig
+
+PERIOD, PATH_START = 4e-3, 4.0
+
+
+class Known:
+    """A law whose path is known ahead as well as is said."""
+
+    def __init__(self, sigma: float) -> None:
+        self.sigma = sigma
+        model: Any = SimpleNamespace(period=PERIOD, camera_period=PERIOD)
+        learning: Any = SimpleNamespace(estimator=SimpleNamespace(sigma=lambda memory, rows: self.sigma))
+        self.pace, self.time = Pace(model, SelfCalibratingConfig(known_on_path=3e-5), learning), PATH_START
+        needs: Any = SimpleNamespace(rows_between=lambda begin, end: np.zeros((1, 6, 1)))
+        self.pace.needs = needs
+        self.memory = SimpleNamespace(by_knowledge=np.ones(1), planned=np.zeros(1), estimator=None)
+        path = SimpleNamespace(path_start=PATH_START)
+        self.reference: Any = SimpleNamespace(path=path, path_time=lambda instant: instant)
+
+    def after(self, seconds: float) -> list[float]:
+        """The shares of the planned speed that were allowed since then, tick after tick."""
+        shares = []
+        for _ in range(round(seconds / PERIOD)):
+            self.time += PERIOD
+            self.memory.planned[0] = self.time
+            self.pace.look(self.memory, self.reference, self.time)
+            shares.append(float(self.memory.by_knowledge[0]))
+        return shares
+
+
+def test_a_path_that_is_known_is_run_as_it_is_planned():
+    assert set(Known(3e-5).after(4.0)) == {1.0}
+
+
+@pytest.mark.parametrize("times", [1.2, 2.0, 3.0, 10.0])
+def test_a_tip_that_is_known_n_times_less_well_goes_on_at_about_one_nth_and_at_no_less_than_a_quarter(times):
+    share = Known(times * 3e-5).after(4.0)[-1]
+    assert max(0.7 / times, 0.7 * 0.25) < share <= max(1.0 / times, 0.25)
+
+
+def test_no_step_is_so_large_that_the_arm_rings_and_none_comes_soon_after_another():
+    law = Known(3e-4)
+    shares = law.after(4.0)
+    law.sigma = 1e-6
+    shares = np.array([*shares, *law.after(4.0)])
+    assert shares[-1] == 1.0
+    steps = np.flatnonzero(np.diff(shares))
+    ratios = shares[steps + 1] / shares[steps]
+    assert (np.minimum(ratios, 1.0 / ratios) >= 0.7 - 1e-9).all()
+    assert np.diff(steps).min() * PERIOD >= 0.2 - 1e-9
+
+
+def test_what_is_known_just_well_enough_does_not_make_it_faster_and_slower_in_turns():
+    law = Known(3.3e-5)
+    law.after(1.0)
+    for sigma in (2.95e-5, 3.05e-5, 2.9e-5, 3.1e-5):
+        law.sigma = sigma
+        assert set(law.after(1.0)) == {0.7}
+
+
+def test_nothing_is_looked_at_long_before_the_path_begins():
+    law = Known(3e-4)
+    law.time = 0.0
+    assert set(law.after(PATH_START - 0.4)) == {1.0}
