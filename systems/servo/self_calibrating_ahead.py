@@ -120,7 +120,7 @@ class Pace:
 
         What a camera shows acts on the path a dead time later. On a path that is run slowly it comes in time,
         and more of it. Where the tip is known n times less well than it should be, the path goes on at one
-        nth of its speed.
+        nth of its speed. Without a camera that shows anything nothing is gained by going slowly.
 
         Args:
             memory: of the law, whose ``by_knowledge`` is renewed.
@@ -132,8 +132,10 @@ class Pace:
         path_time = reference.path_time(float(memory.planned[0]))
         if path_time < reference.path.path_start - _NEXT:
             return
-        rows = self.needs.rows_between(path_time, path_time + _NEXT)
-        beyond = self._learning.estimator.sigma(memory.estimator, rows) / self._config.known_on_path
+        beyond, is_shown = 0.0, time - memory.heard.accepted[0] < self._config.longest_wait
+        if is_shown and not memory.estimator.is_foreign[0]:
+            rows = self.needs.rows_between(path_time, path_time + _NEXT)
+            beyond = self._learning.estimator.sigma(memory.estimator, rows) / self._config.known_on_path
         share, faster = memory.by_knowledge, memory.by_knowledge[0] / _STEP
         if beyond * share[0] > 1.0 and share[0] > _CAREFUL:
             share[0] *= _STEP

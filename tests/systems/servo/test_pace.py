@@ -22,7 +22,14 @@ class Known:
         self.pace, self.time = Pace(model, SelfCalibratingConfig(known_on_path=3e-5), learning), PATH_START
         needs: Any = SimpleNamespace(rows_between=lambda begin, end: np.zeros((1, 6, 1)))
         self.pace.needs = needs
-        self.memory = SimpleNamespace(by_knowledge=np.ones(1), planned=np.zeros(1), estimator=None)
+        self.foreign, self.seen = np.zeros(1), np.zeros(1)
+        self.is_seeing = True
+        self.memory = SimpleNamespace(
+            by_knowledge=np.ones(1),
+            planned=np.zeros(1),
+            estimator=SimpleNamespace(is_foreign=self.foreign),
+            heard=SimpleNamespace(accepted=self.seen),
+        )
         path = SimpleNamespace(path_start=PATH_START)
         self.reference: Any = SimpleNamespace(path=path, path_time=lambda instant: instant)
 
@@ -32,6 +39,7 @@ class Known:
         for _ in range(round(seconds / PERIOD)):
             self.time += PERIOD
             self.memory.planned[0] = self.time
+            self.seen[0] = self.time if self.is_seeing else self.seen[0]
             self.pace.look(self.memory, self.reference, self.time)
             shares.append(float(self.memory.by_knowledge[0]))
         return shares
@@ -71,3 +79,12 @@ def test_nothing_is_looked_at_long_before_the_path_begins():
     law = Known(3e-4)
     law.time = 0.0
     assert set(law.after(PATH_START - 0.4)) == {1.0}
+
+
+def test_a_camera_that_shows_nothing_is_not_waited_for_by_going_slowly():
+    """It sees no more, or it sees another frame, from which nothing is learnt."""
+    for blind, foreign in ((True, 0.0), (False, 1.0)):
+        law = Known(3e-4)
+        assert law.after(2.0)[-1] < 0.3
+        law.is_seeing, law.foreign[0] = not blind, foreign
+        assert law.after(5.0)[-1] == 1.0  # two seconds of patience, then step by step
