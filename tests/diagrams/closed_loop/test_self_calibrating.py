@@ -178,7 +178,8 @@ def test_a_load_that_is_picked_up_is_made_up_for_and_named(seed):
 
 @pytest.mark.slow
 def test_a_dead_time_that_changes_on_the_path_is_learnt_while_the_tip_stays_on_its_track():
-    settings = ["station.events=[!DeadTimeChange {at: 6, dead_time: 0.033}]", "seed=1001"]
+    only = "servo.laws.self_calibrating.known_on_path=1"  # nothing else makes it slower
+    settings = ["station.events=[!DeadTimeChange {at: 6, dead_time: 0.033}]", "seed=1001", only]
     experiment = Experiment(load_scenario("everything", settings), "self_calibrating")
     experiment.advance(until=8.0)
     log = experiment.log()
@@ -227,4 +228,4 @@ def test_a_path_ahead_that_is_little_known_is_run_slowly_and_more_exactly():
         largest.append(errors[log.time >= log.path_start].max())
         ends.append(log.time[-1])
     assert largest[1] < min(0.06e-3, 0.7 * largest[0])  # m
-    assert 0.5 < ends[1] - ends[0] < 3.0  # s, of a path of 9 s
+    assert 1.0 < ends[1] - ends[0] < 8.0  # s, of a path of 15 s
