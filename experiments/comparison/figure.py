@@ -30,8 +30,8 @@ def write_figure(path: str | Path, title: str, logs: Mapping[str, RunLog]) -> No
         OSError: if the folder is missing or cannot be written.
     """
     curves = {law: _distance_mm(log) for law, log in logs.items()}
-    first = next(iter(logs.values()))
-    end = max(first.path_end, 1e-9)
+    longest = max(logs.values(), key=lambda log: log.path_end)  # a law may let the path go on more slowly
+    end = max(longest.path_end, 1e-9)
     low = math.floor(math.log10(min(float(d.min()) for _, d in curves.values())))
     high = math.ceil(math.log10(max(float(d.max()) for _, d in curves.values())))
     high = max(high, low + 1)
@@ -42,7 +42,7 @@ def write_figure(path: str | Path, title: str, logs: Mapping[str, RunLog]) -> No
     def y(distance: float) -> float:
         return HEIGHT - BOTTOM - (HEIGHT - TOP - BOTTOM) * (math.log10(distance) - low) / (high - low)
 
-    parts = _frame(title, first, x, y, range(low, high + 1))
+    parts = _frame(title, longest, x, y, range(low, high + 1))
     ends = {law: y(10.0 ** float(np.log10(d[-20:]).mean())) for law, (_, d) in curves.items()}
     for law, label_y in _spread(ends).items():
         color = law_colors(logs)[law]
