@@ -43,6 +43,9 @@ class RunLog:
     dwell_start: float  # s
     path_end: float  # s
     lap_starts: tuple[float, ...] = ()  # s, of the laps if the path is run several times, else empty
+    path_time: np.ndarray | None = (
+        None  # (n,) s on the path where it was slowed, else None: then it is ``time``
+    )
     learnt: dict[str, Any] | None = None  # what the law says that it has learnt; None of others
     # the robot as a law knows it that calibrates robots
     calibrated: RobotModel | None = field(default=None, compare=False)

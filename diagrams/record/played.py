@@ -14,13 +14,14 @@ def played(path: CartesianPath, times: np.ndarray, data: dict[str, np.ndarray]) 
 
 
 def path_marks(path: CartesianPath | PlayedPath) -> dict[str, Any]:
-    """The times of a `RunLog` that a path sets."""
+    """The times of a `RunLog` that a path sets, and the time on the path where it was slowed."""
     starts = path.lap_starts.tolist()
     return {
         "path_start": path.path_start,
         "dwell_start": path.dwell_start,
         "path_end": path.duration,
         "lap_starts": tuple(starts) if len(starts) > 1 else (),
+        "path_time": path.path_time if isinstance(path, PlayedPath) and path.is_slowed else None,
     }
 
 

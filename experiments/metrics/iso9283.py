@@ -24,40 +24,72 @@ def iso_9283(cycles: Sequence[RunLog], source: str) -> dict[str, Any]:
       angle of the mean rotation vector.
     - RP: mean distance of the attained end positions from their barycentre plus three standard deviations.
     - AT: largest distance of the path of the barycentres from the commanded path as a curve.
-    - RT: largest such radius as of RP over the path, cycles compared at the same time. The standard looks
-      only across the path; this radius also holds the scatter along it and is never smaller.
+    - RT: largest such radius as of RP over the path, cycles compared at the same time, or where the path was
+      slowed, at the same time of the path. The standard looks only across the path; this radius also holds
+      the scatter along it and is never smaller.
 
     Repeatability is None for a single cycle. ``source`` is "true" or "measured"; where a cycle has no
     measurement the time is left out for all of them.
 
     Raises:
-        ValueError: if the cycles were not sampled at the same times.
+        ValueError: if the cycles were not sampled at the same times, though none of them was slowed.
     """
     first = cycles[0]
-    if any(not np.array_equal(log.time, first.time) for log in cycles[1:]):
-        raise ValueError(f"law '{first.law}': ISO 9283 needs cycles sampled at the same times")
-    X = np.stack([log.X_WE_true if source == "true" else log.X_WE_measured for log in cycles])
-    slack = 0.25 * float(first.time[1] - first.time[0]) if len(first.time) > 1 else 0.0
-    on_path = (first.time >= first.path_start - slack) & (first.time <= first.path_end + slack)
+    time, X_WE_desired, X = _in_step(cycles, source)
+    path_start, dwell_start, path_end = np.interp(
+        (first.path_start, first.dwell_start, first.path_end), first.time, _on_path(first)
+    )
+    slack = 0.25 * float(time[1] - time[0]) if len(time) > 1 else 0.0
+    on_path = (time >= path_start - slack) & (time <= path_end + slack)
     usable = on_path & np.isfinite(X).all(axis=(0, 2, 3))
-    at_end = usable & (first.time >= max(first.dwell_start, first.path_end - POSE_WINDOW) - slack)
+    at_end = usable & (time >= max(dwell_start, path_end - POSE_WINDOW) - slack)
     result: dict[str, Any] = dict.fromkeys(("AP_mm", "RP_mm", "AT_mm", "RT_mm", "AP_deg"))
     result["cycles"] = len(cycles)
     if at_end.any():
-        e = pose_error(first.X_WE_desired[at_end], X[:, at_end]).mean(axis=1)
+        e = pose_error(X_WE_desired[at_end], X[:, at_end]).mean(axis=1)
         result["AP_mm"] = 1e3 * float(np.linalg.norm(e[:, 3:].mean(axis=0)))
         result["AP_deg"] = float(np.rad2deg(np.linalg.norm(e[:, :3].mean(axis=0))))
         if len(cycles) > 1:
             result["RP_mm"] = 1e3 * float(repeatability(e[:, 3:]))
     if usable.any():
         p = X[:, usable][..., :3, 3]
-        distances = path_distance(
-            first.time[usable], p.mean(axis=0), first.time[on_path], first.X_WE_desired[on_path, :3, 3]
-        )
+        distances = path_distance(time[usable], p.mean(axis=0), time[on_path], X_WE_desired[on_path, :3, 3])
         result["AT_mm"] = 1e3 * float(distances.max())
         if len(cycles) > 1:
             result["RT_mm"] = 1e3 * float(repeatability(p).max())
     return result
+
+
+def _on_path(log: RunLog) -> np.ndarray:
+    """The time on the path in s at the times of a log, (n,)."""
+    return log.time if log.path_time is None else log.path_time
+
+
+def _in_step(cycles: Sequence[RunLog], source: str) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Times on the path in s, (n,), wanted poses then, (n, 4, 4), and those of the cycles, (cycles, n, 4, 4).
+
+    A cycle that was slowed came to a place at another time, between two samples perhaps: it is off the first
+    cycle's wanted pose by what it was off its own at its next sample.
+    """
+    first = cycles[0]
+    poses = [log.X_WE_true if source == "true" else log.X_WE_measured for log in cycles]
+    if all(log.path_time is None for log in cycles):
+        if any(not np.array_equal(log.time, first.time) for log in cycles[1:]):
+            raise ValueError(f"law '{first.law}': ISO 9283 needs cycles sampled at the same times")
+        return first.time, first.X_WE_desired, np.stack(poses)
+    period = float(np.median(np.diff(first.time)))
+    times = np.arange(_on_path(first)[0], min(_on_path(log)[-1] for log in cycles) + 0.5 * period, period)
+    rows = [np.searchsorted(_on_path(log), times - 1e-9) for log in cycles]
+    rows = [np.minimum(row, len(log.time) - 1) for row, log in zip(rows, cycles, strict=True)]
+    wanted = first.X_WE_desired[rows[0]]
+    carried = []
+    for log, row, X in zip(cycles, rows, poses, strict=True):
+        own, moved = log.X_WE_desired[row], X[row]
+        turn = wanted[:, :3, :3] @ own[:, :3, :3].swapaxes(1, 2)
+        moved[:, :3, :3] = turn @ moved[:, :3, :3]
+        moved[:, :3, 3] += wanted[:, :3, 3] - own[:, :3, 3]
+        carried.append(moved)
+    return times, wanted, np.stack(carried)
 
 
 def repeatability(p: np.ndarray) -> np.ndarray:

@@ -23,10 +23,10 @@ def plot_data(result: Mapping[str, Any], logs: Comparison) -> dict[str, Any]:
 
     ``result`` is the `metrics.summary` of ``logs``.
     """
-    first = next(iter(logs.values()))[0]
+    longest = max((cycles[0] for cycles in logs.values()), key=lambda log: log.path_end)
     colors = law_colors(logs)
     return {
-        "marks": {name: getattr(first, name) for name in ("path_start", "dwell_start", "path_end")},
+        "marks": {name: getattr(longest, name) for name in ("path_start", "dwell_start", "path_end")},
         "laws": [
             {
                 "id": law,

@@ -13,6 +13,7 @@ class PlayedPath:
         path_start, dwell_start, duration: s of the station, as of a `CartesianPath`; what had not begun when
             the record ends is due as much later as it then had to go at the planned speed.
         lap_starts: s of the station, shape (laps,).
+        path_time: s on the path at the times of the record, shape (n,).
     """
 
     def __init__(self, path: CartesianPath, times: np.ndarray, path_time: np.ndarray) -> None:
@@ -23,7 +24,7 @@ class PlayedPath:
             times: s of the station, increasing, shape (n,), n > 0.
             path_time: s on the path then and its rate, shape (n, 2).
         """
-        self._path, self._times, self._path_times = path, times, path_time[:, 0]
+        self._path, self._times, self.path_time = path, times, path_time[:, 0]
         self._at = None
         if len(times) > 1 and not np.array_equal(times, path_time[:, 0]):
             self._at = CubicHermiteSpline(times, path_time[:, 0], path_time[:, 1])
@@ -31,6 +32,11 @@ class PlayedPath:
             self._when(mark) for mark in (path.path_start, path.dwell_start, path.duration)
         )
         self.lap_starts = np.array([self._when(start) for start in path.lap_starts])
+
+    @property
+    def is_slowed(self) -> bool:
+        """Whether the path was not run as it is planned all the time."""
+        return self._at is not None
 
     def sample(self, t: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Where the tool was to be at times of the station in s, as `CartesianPath.sample` has it."""
@@ -46,7 +52,7 @@ class PlayedPath:
         """The time of the station in s at which the path came to s seconds."""
         if self._at is None:
             return s
-        reached = self._path_times >= s - 1e-9
+        reached = self.path_time >= s - 1e-9
         if not reached.any():
-            return float(self._times[-1] + s - self._path_times[-1])
+            return float(self._times[-1] + s - self.path_time[-1])
         return float(self._times[np.argmax(reached)])

@@ -18,7 +18,7 @@ from experiments.metrics.run_metrics import (
     with_timing,
 )
 from experiments.report.files import write_json
-from tests.experiments.synthetic import comparison, displaced, make_log, rectangle, straight
+from tests.experiments.synthetic import DWELL, comparison, displaced, make_log, rectangle, straight
 
 TIME = np.arange(0.0, 6.002, 0.004)
 ROUNDING = 1e-9  # mm and degrees; double precision on metres leaves about 1e-12
@@ -155,6 +155,27 @@ def test_cycles_scatter_about_their_barycentre():
     assert numbers["RP_mm"] == pytest.approx(1.0, abs=ROUNDING)
     assert numbers["RT_mm"] == pytest.approx(1.0, abs=ROUNDING)
     assert numbers["cycles"] == 2
+
+
+def test_cycles_that_were_slowed_are_compared_at_the_same_places_of_the_path():
+    """One 0.1 mm aside at full speed, one 0.3 mm at changing speed, which comes to its end later."""
+    X = straight(TIME)
+    cycles = [make_log(TIME, X, displaced(X, np.array([0, 0, 0, 0, 1e-4, 0])))]
+    longer = np.arange(0.0, 1.5 * TIME[-1], TIME[1] - TIME[0])
+    on_path = np.minimum(longer - 0.1 * (1.0 - np.cos(longer)), TIME[-1])
+    on_path = np.maximum.accumulate(on_path)
+    X = straight(on_path)
+    slowed = make_log(longer, X, displaced(X, np.array([0, 0, 0, 0, 3e-4, 0])))
+    arrived = float(longer[np.argmax(on_path >= TIME[-1])])
+    cycles.append(
+        dataclasses.replace(slowed, path_time=on_path, dwell_start=arrived - DWELL, path_end=arrived)
+    )
+    for order in (cycles, cycles[::-1]):
+        numbers = iso_9283(order, "true")
+        assert numbers["AP_mm"] == pytest.approx(0.2, abs=ROUNDING)
+        assert numbers["RP_mm"] == pytest.approx(0.1, abs=ROUNDING)
+        assert numbers["AT_mm"] == pytest.approx(0.2, abs=1e-3)  # to a polyline of samples
+        assert numbers["RT_mm"] == pytest.approx(0.1, abs=ROUNDING)
 
 
 def test_cycles_of_different_length_are_refused():
