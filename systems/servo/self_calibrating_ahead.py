@@ -15,7 +15,7 @@ _CAREFUL = 0.25  # of the planned speed, while the dead time or the load is not 
 _BEFORE_PATH = 0.6  # s, at which it is held until the dead time is found; a slowed path needs time to stop
 _MISSED = 5.0  # samples one after the other that no camera loses by chance: it is blind
 _LOOK_EVERY = 0.2  # s, between two looks at how well the path ahead is known
-_STEP = 0.7  # from one speed to the next slower one; larger ones make the arm ring
+_STEP = 0.85  # from one speed to the next slower one; larger ones make the arm ring
 _CLEARLY = 0.8  # of what a speed allows, before it is gone back to
 _NEXT = 0.3  # s of the path that are looked at while it is; about what is still run while it is slowed
 

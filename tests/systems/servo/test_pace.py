@@ -52,7 +52,7 @@ def test_a_path_that_is_known_is_run_as_it_is_planned():
 @pytest.mark.parametrize("times", [1.2, 2.0, 3.0, 10.0])
 def test_a_tip_that_is_known_n_times_less_well_goes_on_at_about_one_nth_and_at_no_less_than_a_quarter(times):
     share = Known(times * 3e-5).after(4.0)[-1]
-    assert max(0.7 / times, 0.7 * 0.25) < share <= max(1.0 / times, 0.25)
+    assert max(0.85 / times, 0.85 * 0.25) < share <= max(1.0 / times, 0.25)
 
 
 def test_no_step_is_so_large_that_the_arm_rings_and_none_comes_soon_after_another():
@@ -63,7 +63,7 @@ def test_no_step_is_so_large_that_the_arm_rings_and_none_comes_soon_after_anothe
     assert shares[-1] == 1.0
     steps = np.flatnonzero(np.diff(shares))
     ratios = shares[steps + 1] / shares[steps]
-    assert (np.minimum(ratios, 1.0 / ratios) >= 0.7 - 1e-9).all()
+    assert (np.minimum(ratios, 1.0 / ratios) >= 0.85 - 1e-9).all()
     assert np.diff(steps).min() * PERIOD >= 0.2 - 1e-9
 
 
@@ -72,7 +72,7 @@ def test_what_is_known_just_well_enough_does_not_make_it_faster_and_slower_in_tu
     law.after(1.0)
     for sigma in (2.95e-5, 3.05e-5, 2.9e-5, 3.1e-5):
         law.sigma = sigma
-        assert set(law.after(1.0)) == {0.7}
+        assert set(law.after(1.0)) == {0.85}
 
 
 def test_nothing_is_looked_at_long_before_the_path_begins():
