@@ -24,7 +24,8 @@ _FILTERED = 8
 COLUMNS = 6 * (_FILTERED - 1)
 SIZE = 41
 DEAD_TIME, MASS, MOMENT = 0, 37, slice(38, 41)
-_STEEPEST = 0.05  # rad/s, what learning may add to the speed of a joint
+_STEEPEST = 0.5  # rad/s, what learning may add to the speed of a joint
+_LED_IN = 0.05  # s, the time constant with which commands follow what was learnt
 
 
 @dataclass
@@ -97,6 +98,7 @@ class DriveModel:
             z=(_FILTERED, 6, 2),  # integral of e, and e
             w=(_FILTERED, 6),
             beta=(SIZE,),
+            led=(SIZE,),  # beta as commands use it
             P=(SIZE, SIZE),
             correction=(6,),
         )
@@ -121,9 +123,10 @@ class DriveModel:
             mass: of the payload as the drives' own gravity compensation has it in kg.
 
         """
-        known = DriveMemory(memory.started, memory.z, memory.w, memory.beta, memory.correction)
+        known = DriveMemory(memory.started, memory.z, memory.w, memory.beta, memory.led, memory.correction)
         out, columns = np.empty((3, 6)), np.empty(COLUMNS)
-        kernels.drives.command(self._drives, *self._held, known, motion, loads, mass, _STEEPEST, out, columns)
+        limits = _LED_IN, _STEEPEST
+        kernels.drives.command(self._drives, *self._held, known, motion, loads, mass, limits, out, columns)
         position, velocity, torque = out
         return DriveCommand(position, velocity, torque, columns)
 

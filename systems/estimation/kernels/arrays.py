@@ -123,9 +123,10 @@ class DriveMemory(NamedTuple):
     """What one command hands on to the next."""
 
     started: np.ndarray  # (1,)
-    z: np.ndarray  # (5, 6, 2), integral of a following error, and the error, of each of five torques
-    w: np.ndarray  # (5, 6), those torques
-    beta: np.ndarray  # (38,), parameters of the regression
+    z: np.ndarray  # (8, 6, 2), integral of a following error, and the error, of each of eight torques
+    w: np.ndarray  # (8, 6), those torques
+    beta: np.ndarray  # (41,), parameters of the regression
+    led: np.ndarray  # (41,), the same as they are used: they follow those
     correction: np.ndarray  # (6,) rad
 
 

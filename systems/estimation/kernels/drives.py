@@ -129,7 +129,7 @@ def _filter(step, z, last, w):
 
 
 @compiled
-def command(drives, arm, masses, memory, motion, loads, mass, steepest, out, filtered):
+def command(drives, arm, masses, memory, motion, loads, mass, limits, out, filtered):
     """What to command so that motors move as planned, see `DriveModel.command`.
 
     Args:
@@ -139,7 +139,8 @@ def command(drives, arm, masses, memory, motion, loads, mass, steepest, out, fil
         motion: position, velocity and acceleration of the motors, (6,) each.
         loads: of the gears, (5, 18).
         mass: of the payload, kg.
-        steepest: rad/s, what the correction may add to the speed of a joint.
+        limits: the time constant in s with which parameters that were learnt are used, and what the
+            correction may add to the speed of a joint in rad/s.
         out: (3, 6), position, velocity and torque; filtered: (42,), what `features` takes, of rotor, viscous
             and Coulomb friction, of a kilogram and of a kg m along each axis; are written.
     """
@@ -147,10 +148,13 @@ def command(drives, arm, masses, memory, motion, loads, mass, steepest, out, fil
     X_WE, frames, held, w = np.empty((4, 4)), np.empty((7, 4, 4)), np.empty(6), np.empty(8)
     place_links(arm, theta, X_WE, frames)
     hold(masses, drives.payload, frames, theta, held)
-    is_first, most = memory.started[0] == 0.0, drives.period * steepest
+    is_first, most = memory.started[0] == 0.0, drives.period * limits[1]
+    led, share = memory.led, 1.0 if is_first else min(1.0, drives.period / limits[0])
+    for k in range(len(led)):
+        led[k] += share * (memory.beta[k] - led[k])
     # Periods that a torque has to be sent ahead: it arrives late by what was learnt, and is held for a period
     # in whose middle it should be right. A dead time that is wrong by more is corrected by the plan.
-    ahead = 0.5 + min(max(memory.beta[0] / drives.period, -_MOST_PERIODS), _MOST_PERIODS)
+    ahead = 0.5 + min(max(led[0] / drives.period, -_MOST_PERIODS), _MOST_PERIODS)
     for i in range(6):
         w[1], w[2] = drives.rotor[i] * a[i], drives.viscous[i] * v[i]
         w[3], w[4] = drives.coulomb[i] * math.tanh(v[i] / drives.width[i]), loads[1, i]
@@ -174,7 +178,7 @@ def command(drives, arm, masses, memory, motion, loads, mass, steepest, out, fil
         last[0] = needed
         for k in range(1, 8):
             last[k], filtered[6 * (k - 1) + i] = w[k], z[k, 1]
-        correction = _behind(v[i], a[i], filtered, memory.beta, i)
+        correction = _behind(v[i], a[i], filtered, led, i)
         before = correction if is_first else memory.correction[i]
         correction = before + min(max(correction - before, -most), most)
         memory.correction[i] = correction

@@ -118,13 +118,18 @@ def load(masses, frames, q, velocity, acceleration, loads):
         _copy(a, motion[i, 2])
     flange = frames[6]
     wrench = np.zeros((5, 2, 3))  # force, and moment about the world's origin
-    # A mass m at c exerts m (a + A c), and its moment about the flange changes with c by c x m a.
+    # A mass m at c exerts m (a + A c) and the moment c x m (a + A c) about the flange. With a way d from c
+    # that changes by d x m (a + A c) + c x m A d.
+    centre, there = room[0], about[0]
+    _turned(flange, masses.centres[6], centre)
+    _copy(a, there)
+    _acceleration(w, alpha, centre, there)
     for s in range(3):
         for k in range(3):
-            axis[k], way[k] = flange[k, s], flange[k, 3]
+            axis[k], way[k] = flange[k, s], flange[k, 3] + centre[k]
         _acceleration(w, alpha, axis, wrench[2 + s, 0])
         _add_cross(way, wrench[2 + s, 0], wrench[2 + s, 1])
-        _add_cross(axis, a, wrench[2 + s, 1])
+        _add_cross(axis, there, wrench[2 + s, 1])
     for body in range(6, -1, -1):
         i = min(body, 5)
         frame = frames[i + 1]

@@ -49,8 +49,16 @@ def test_loads_are_those_of_inverse_dynamics_with_calibrated_geometry(name):
     still = np.zeros_like(q)
     found = loads.at(frames, q, still, still)
     found = found[:, 0] + mass * found[:, 1] + np.einsum("k,nkj->nj", mass * shift, found[:, 2:])
-    moved.payload.center_of_mass = np.asarray(moved.payload.center_of_mass) + shift
+    centre = np.array(moved.payload.center_of_mass)
+    moved.payload.center_of_mass = centre + shift
     np.testing.assert_allclose(found, drake_loads(moved, mass, q, still, still), rtol=1e-9, atol=1e-9)
+    # In motion its moment of inertia about the flange is quadratic in the shift: half of what is between one
+    # way and the other is the linear part, exactly.
+    there = drake_loads(moved, mass, q, v, a)
+    moved.payload.center_of_mass = centre - shift
+    linear = 0.5 * (there - drake_loads(moved, mass, q, v, a))
+    found = np.einsum("k,nkj->nj", mass * shift, carried[:, 2:])
+    np.testing.assert_allclose(found, linear, rtol=1e-9, atol=1e-9)
 
 
 @pytest.mark.parametrize("name", ["irb1200", "kr16", "kr210"])
