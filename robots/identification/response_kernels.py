@@ -1,23 +1,20 @@
 """One case of an elastic arm, step by step with all derivatives, as loops that numba compiles.
 
-numba takes a third of a second to import: `ArmResponse` imports this module when it is made. The equations
-and their source stand there.
+`ArmResponse` imports this module when it is made, see `robots.compiled`. The equations and their source stand
+there.
 """
 
 import math
 
 import numpy as np
-from numba import njit
 
+from robots.compiled import compiled
 from robots.identification.elastic_parameters import PLAY, RIPPLE
 from robots.identification.motion import BETA, GAMMA
 
 _GEARS = 6
 _NEWTON_STEPS = 6
 _SOLVED = 1e-9  # of the largest acceleration of a gear
-
-# Compiled once a machine, then read from a file; a division by zero gives inf or NaN, as numpy's does.
-compiled = njit(cache=True, error_model="numpy")
 
 
 @compiled

@@ -1,23 +1,16 @@
 """Kinematics and linear equations of one configuration as loops that numba compiles.
 
-numba takes a third of a second to import. Only who computes in every tick imports this module, when it is
-made.
+Who computes in every tick imports this module when it is made, see `robots.compiled`.
 """
 
 import math
-from typing import Any
 
 import numpy as np
-from numba import njit
 
+from robots.compiled import compiled
 from robots.kinematics.forward import DAMPING, MANIPULABILITY_THRESHOLD
 
 _TINY = np.finfo(float).tiny
-
-_jit: Any = njit
-# Compiled once a machine, then read from a file; a division by zero gives inf or NaN, as numpy's does. The
-# way into C is not needed; numba takes that option without declaring it.
-compiled = _jit(cache=True, error_model="numpy", no_cfunc_wrapper=True)
 
 
 @compiled

@@ -38,6 +38,12 @@ class MotorPlan(NamedTuple):
     twist: np.ndarray  # (6,), of the tip
     columns: np.ndarray  # (6, 18 + g), as `ArmGeometry.arm` gives them
     states: np.ndarray  # (18,), of the gears, see `GearErrors`
+    ratios: np.ndarray  # (6,), speed of each joint for that of its motor, 1 but for the waves of its gear
+
+    @property
+    def on_motors(self) -> np.ndarray:
+        """The loads of the gears as motors feel them, (5, 6): what turns faster takes more torque."""
+        return self.loads[:, : len(self.ratios)] * self.ratios
 
 
 class PreviewPlanner:
@@ -154,11 +160,13 @@ class PreviewPlanner:
         )
         motion, moving, loads = np.empty((4, 6)), np.empty((3, 6)), np.empty((NUM_SETS, 18))
         columns, states = np.empty((6, len(constants.frame))), np.zeros(NUM_STATES)
-        planned = Planned(motion, moving, loads, columns, states)
+        ratios = np.empty(6)
+        planned = Planned(motion, moving, loads, columns, states, ratios)
         arm = constants, model.loads.masses, model.unknowns(x), self._gears
         kernels.plan.plan(*arm, instant, state, planned)
         theta, velocity, acceleration, twist = motion
-        return MotorPlan(theta, velocity, acceleration, loads, moving[1:].ravel(), twist, columns, states)
+        links = moving[1:].ravel()
+        return MotorPlan(theta, velocity, acceleration, loads, links, twist, columns, states, ratios)
 
 
 def _blend(since_start: float) -> tuple[float, float]:

@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 
-from robots.kinematics.kernels import compiled
+from robots.compiled import compiled
 from systems.guard import state as at
 from systems.guard.config import KINDS
 

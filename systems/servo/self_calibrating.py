@@ -161,7 +161,7 @@ class SelfCalibrating(LeafSystem):
         for _ in range(2):
             plan = self._planner.step(memory.planner, parameters, wanted, 0.0, self.period)
             motion = plan.theta, plan.velocity, plan.acceleration
-            command = self._drives.command(memory.drives, motion, plan.loads, self._model.payload)
+            command = self._drives.command(memory.drives, motion, plan.on_motors, self._model.payload)
         self._drives.look_back(memory.drives, motion, command.columns, still, q)
         pair = Pair(q, plan.loads, plan.motion, plan.twist, X_WE)
         self._lead.step(memory.lead, model.mean, memory.columns, self.period)
@@ -354,7 +354,7 @@ class SelfCalibrating(LeafSystem):
         memory.columns[:] = plan.columns[:, 18:]
         motion = plan.theta, plan.velocity, plan.acceleration
         drives = memory.drives
-        command = self._drives.command(drives, motion, plan.loads, self._model.payload)
+        command = self._drives.command(drives, motion, plan.on_motors, self._model.payload)
         is_starting = since_start < _STARTING and np.abs(memory.planner.start_error).max() > 1e-3
         unrest = 0.0 if self._learning.delay.is_settled(memory.delay, instant) and not is_starting else UNREST
         row = (

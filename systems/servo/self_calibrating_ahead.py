@@ -33,7 +33,7 @@ def _renewed(memory: SimpleNamespace) -> list[np.ndarray]:
         drives.z.ravel(),
         drives.w.ravel(),
         drives.correction,
-        drives.led,
+        drives.led.ravel(),
         delay.delay,
         delay.rate,
         delay.settled,

@@ -2,8 +2,9 @@
 
 import numpy as np
 
+from robots.compiled import compiled
 from robots.identification.motion import BETA, GAMMA
-from robots.identification.response_kernels import accelerate, between, compiled, place_of
+from robots.identification.response_kernels import accelerate, between, place_of
 
 _GEARS = 6
 _PASSES = 3  # a motor turns so little in a step that each pass gains two digits

@@ -18,14 +18,16 @@ from systems.estimation.arm_loads import ArmLoads
 from systems.estimation.kernels.arrays import DriveMemory, Drives
 from systems.estimation.memory import Layout
 
-# Torque that is needed beside the feedforward; rotor, viscous, Coulomb; the load of a kilogram, and of a kg m
-# of its first moment along x, y, z.
-_FILTERED = 8
+# Torque that is needed beside the feedforward; rotor, viscous, Coulomb, and what that has more at low speeds;
+# the load of a kilogram, and of a kg m of its first moment along x, y, z.
+_FILTERED = 9
 COLUMNS = 6 * (_FILTERED - 1)
-SIZE = 41
-DEAD_TIME, MASS, MOMENT = 0, 37, slice(38, 41)
+_CONSTANTS = slice(37, 43)
+DEAD_TIME, MASS, MOMENT = 0, 43, slice(44, 47)
+SIZE = MOMENT.stop
+_SLOW = 0.05  # rad/s, of Stribeck's effect, exp(-|v| / _SLOW) as Tustin has it; assumed
 _STEEPEST = 0.5  # rad/s, what learning may add to the speed of a joint
-_LED_IN = 0.05  # s, the time constant with which commands follow what was learnt
+_LED_IN = 40.0  # rad/s, with which commands follow what was learnt, critically damped
 
 
 @dataclass
@@ -50,7 +52,7 @@ class DriveCommand(NamedTuple):
     position: np.ndarray  # (6,) rad
     velocity: np.ndarray  # (6,) rad/s
     torque: np.ndarray  # (6,) N m, joint side, on top of what the drives do for gravity
-    columns: np.ndarray  # (42,), what `DriveModel.features` needs of this instant
+    columns: np.ndarray  # (48,), what `DriveModel.features` needs of this instant
 
 
 class DriveModel:
@@ -58,8 +60,9 @@ class DriveModel:
 
     A drive is e = G w: the torque w that a motion needs and nobody gives it leaves the motor behind by e,
     with k_d e' + k_p e + k_i int e dt = w. The model is e = Phi beta with columns for a shared dead time, a
-    lag and an inertia of each joint, the torques of rotor, viscous and Coulomb friction through G, a constant
-    and the load of a kilogram and of its first moment through G; beta is learnt by recursive least squares.
+    lag and an inertia of each joint, the torques of rotor, viscous and Coulomb friction and of its hump at
+    low speeds through G, a constant, and the load of a kilogram and of its first moment through G; beta is
+    learnt by recursive least squares.
     Without the moment friction is taken for what a payload whose centre is elsewhere weighs at the wrist:
     both turn over with the motion. Mass and moment in it make up for all that loads are wrong by. They are
     not those of the payload, and nobody else may take them for that.
@@ -79,6 +82,7 @@ class DriveModel:
             robot.joint_viscous_friction,
             robot.joint_coulomb_friction,
             robot.coulomb_velocity,
+            _SLOW,
             kp,
             ki,
             kd,
@@ -91,14 +95,14 @@ class DriveModel:
         drawn = ArmGeometry(robot, np.array([], dtype=int))
         self._held = drawn.constants(np.zeros(NUM_PARAMETERS)), ArmLoads(robot).masses
         spread = [config.dead_time_sigma, *[config.lag_sigma] * 6, *[1e-4] * 6]
-        spread += [0.3, 0.3, 0.5] * 6 + [1e-5] * 6 + [config.payload_sigma] + [config.moment_sigma] * 3
+        spread += [0.3, 0.3, 0.5, 0.3] * 6 + [1e-5] * 6 + [config.payload_sigma] + [config.moment_sigma] * 3
         self._prior = np.diag(np.array(spread) ** 2)
         self.layout = Layout(
             started=(1,),
             z=(_FILTERED, 6, 2),  # integral of e, and e
             w=(_FILTERED, 6),
             beta=(SIZE,),
-            led=(SIZE,),  # beta as commands use it
+            led=(2, SIZE),  # beta as commands use it, and its rate
             P=(SIZE, SIZE),
             correction=(6,),
         )
@@ -119,7 +123,7 @@ class DriveModel:
         Args:
             memory: of the layout.
             motion: planned position, velocity and acceleration of the motors, (6,) each.
-            loads: of the gears, (5, 18) as `ArmLoads.at` gives them.
+            loads: of the gears as motors feel them, (5, 6) or wider, in the order of `ArmLoads.at`.
             mass: of the payload as the drives' own gravity compensation has it in kg.
 
         """
@@ -131,7 +135,7 @@ class DriveModel:
         return DriveCommand(position, velocity, torque, columns)
 
     def features(self, v: np.ndarray, a: np.ndarray, columns: np.ndarray) -> np.ndarray:
-        """Rows of the regression, shape (6, 41), from motion and the filtered torques (42,)."""
+        """Rows of the regression, shape (6, 47), from motion and the filtered torques (48,)."""
         Phi = np.zeros((6, SIZE))
         kernels.drives.features(v, a, columns, Phi)
         return Phi
@@ -150,7 +154,7 @@ class DriveModel:
         Args:
             memory: of the layout.
             planned: position, velocity and acceleration, (6,) each.
-            columns, correction: of the command of that instant, (42,) and (6,) in rad.
+            columns, correction: of the command of that instant, (48,) and (6,) in rad.
             actual: where the motors were, rad, (6,).
             most: nothing is learnt if more than this is not explained yet, rad.
 
@@ -167,7 +171,7 @@ class DriveModel:
     def widen(self, memory: SimpleNamespace) -> None:
         """Load or dead time have changed: constants, payload and dead time are open again."""
         extra = np.zeros(SIZE)
-        extra[31:37], extra[MASS], extra[DEAD_TIME] = 3e-5, 5.0, 1e-3
+        extra[_CONSTANTS], extra[MASS], extra[DEAD_TIME] = 3e-5, 5.0, 1e-3
         extra[MOMENT] = self._config.moment_sigma
         memory.P[_DIAGONAL, _DIAGONAL] += extra**2
 

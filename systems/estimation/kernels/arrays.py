@@ -108,6 +108,7 @@ class Drives(NamedTuple):
     viscous: np.ndarray  # (6,) N m s/rad
     coulomb: np.ndarray  # (6,) N m
     width: np.ndarray  # (6,) rad/s, of the speeds in which friction turns over
+    slow: float  # rad/s, at which what friction has more at low speeds has fallen to a third
     kp: np.ndarray  # (6,) N m/rad, gains of a following error, of its integral and of its rate
     ki: np.ndarray  # (6,)
     kd: np.ndarray  # (6,)
@@ -123,10 +124,10 @@ class DriveMemory(NamedTuple):
     """What one command hands on to the next."""
 
     started: np.ndarray  # (1,)
-    z: np.ndarray  # (8, 6, 2), integral of a following error, and the error, of each of eight torques
-    w: np.ndarray  # (8, 6), those torques
-    beta: np.ndarray  # (41,), parameters of the regression
-    led: np.ndarray  # (41,), the same as they are used: they follow those
+    z: np.ndarray  # (9, 6, 2), integral of a following error, and the error, of each of nine torques
+    w: np.ndarray  # (9, 6), those torques
+    beta: np.ndarray  # (47,), parameters of the regression
+    led: np.ndarray  # (2, 47), the same as they are used, which follow those, and their rates
     correction: np.ndarray  # (6,) rad
 
 
@@ -157,6 +158,7 @@ class Planned(NamedTuple):
     loads: np.ndarray  # (5, 18)
     columns: np.ndarray  # (6, C)
     states: np.ndarray  # (18,) of the gears
+    ratios: np.ndarray  # (6,) speed of the joint for that of the motor, 1 but for the waves of its gear
 
 
 class Ring(NamedTuple):

@@ -4,8 +4,8 @@ import math
 
 import numpy as np
 
+from robots.compiled import compiled
 from systems.estimation.kernels.history import around, between
-from systems.estimation.kernels.poses import compiled
 
 
 @compiled

@@ -4,35 +4,34 @@ import math
 
 import numpy as np
 
+from robots.compiled import compiled, inner
 from systems.estimation.kernels.geometry import place_links
 from systems.estimation.kernels.loads import hold
-from systems.estimation.kernels.poses import compiled, inner
 
 _MOST_PERIODS = 1.5  # by which torques are sent ahead or held back
 
 
 @compiled
 def features(v, a, filtered, Phi):
-    """Rows of the regression, (6, 41), which are zero before; see `DriveModel.features`."""
+    """Rows of the regression, (6, 47), which are zero before; see `DriveModel.features`."""
     for i in range(6):
         Phi[i, 0] = Phi[i, 1 + i] = v[i]
         Phi[i, 7 + i] = 1e-2 * a[i]
-        for k in range(3):
-            Phi[i, 13 + 3 * i + k] = filtered[6 * k + i]
-        Phi[i, 31 + i] = 1.0
         for k in range(4):
-            Phi[i, 37 + k] = filtered[6 * (3 + k) + i]
+            Phi[i, 13 + 4 * i + k] = filtered[6 * k + i]
+        Phi[i, 37 + i] = 1.0
+        for k in range(4):
+            Phi[i, 43 + k] = filtered[6 * (4 + k) + i]
 
 
 @inner
 def _behind(v, a, filtered, beta, i):
     """The row of a joint times the parameters."""
     total = v * beta[0] + v * beta[1 + i] + 1e-2 * a * beta[7 + i]
-    for k in range(3):
-        total += filtered[6 * k + i] * beta[13 + 3 * i + k]
     for k in range(4):
-        total += filtered[6 * (3 + k) + i] * beta[37 + k]
-    return total + beta[31 + i]
+        total += filtered[6 * k + i] * beta[13 + 4 * i + k]
+        total += filtered[6 * (4 + k) + i] * beta[43 + k]
+    return total + beta[37 + i]
 
 
 @compiled
@@ -128,6 +127,18 @@ def _filter(step, z, last, w):
             z[k, i] = row[0] * integral + row[1] * e + row[2] * before + row[3] * change
 
 
+@inner
+def _follow(target, frequency, period, is_first, led):
+    """A critically damped step of values and their rates, (2, n), towards a target, (n,)."""
+    w = frequency * period
+    for k in range(len(target)):
+        if is_first:
+            led[0, k], led[1, k] = target[k], 0.0
+        else:
+            led[1, k] = (led[1, k] + frequency * w * (target[k] - led[0, k])) / (1.0 + w * (2.0 + w))
+            led[0, k] += period * led[1, k]
+
+
 @compiled
 def command(drives, arm, masses, memory, motion, loads, mass, limits, out, filtered):
     """What to command so that motors move as planned, see `DriveModel.command`.
@@ -137,29 +148,29 @@ def command(drives, arm, masses, memory, motion, loads, mass, limits, out, filte
         arm, masses: with which the drives hold it, `Constants` and `Masses`.
         memory: `DriveMemory`; is renewed.
         motion: position, velocity and acceleration of the motors, (6,) each.
-        loads: of the gears, (5, 18).
+        loads: of the gears as motors feel them, (5, 6) or wider.
         mass: of the payload, kg.
-        limits: the time constant in s with which parameters that were learnt are used, and what the
-            correction may add to the speed of a joint in rad/s.
-        out: (3, 6), position, velocity and torque; filtered: (42,), what `features` takes, of rotor, viscous
-            and Coulomb friction, of a kilogram and of a kg m along each axis; are written.
+        limits: the frequency in rad/s with which commands follow what was learnt, and what the correction
+            may add to the speed of a joint in rad/s.
+        out: (3, 6), position, velocity and torque; filtered: (48,), what `features` takes, of rotor, viscous
+            and Coulomb friction and its hump, of a kilogram and of a kg m along each axis; are written.
     """
     theta, v, a = motion
-    X_WE, frames, held, w = np.empty((4, 4)), np.empty((7, 4, 4)), np.empty(6), np.empty(8)
+    X_WE, frames, held, w = np.empty((4, 4)), np.empty((7, 4, 4)), np.empty(6), np.empty(9)
     place_links(arm, theta, X_WE, frames)
     hold(masses, drives.payload, frames, theta, held)
     is_first, most = memory.started[0] == 0.0, drives.period * limits[1]
-    led, share = memory.led, 1.0 if is_first else min(1.0, drives.period / limits[0])
-    for k in range(len(led)):
-        led[k] += share * (memory.beta[k] - led[k])
+    _follow(memory.beta, limits[0], drives.period, is_first, memory.led)
+    led = memory.led[0]
     # Periods that a torque has to be sent ahead: it arrives late by what was learnt, and is held for a period
     # in whose middle it should be right. A dead time that is wrong by more is corrected by the plan.
     ahead = 0.5 + min(max(led[0] / drives.period, -_MOST_PERIODS), _MOST_PERIODS)
     for i in range(6):
         w[1], w[2] = drives.rotor[i] * a[i], drives.viscous[i] * v[i]
-        w[3], w[4] = drives.coulomb[i] * math.tanh(v[i] / drives.width[i]), loads[1, i]
-        for k in range(3):
-            w[5 + k] = loads[2 + k, i]
+        w[3] = drives.coulomb[i] * math.tanh(v[i] / drives.width[i])
+        w[4] = w[3] * math.exp(-abs(v[i]) / drives.slow)
+        for k in range(4):
+            w[5 + k] = loads[1 + k, i]
         w[0] = needed = w[1] + w[2] + w[3] + loads[0, i] + mass * loads[1, i] - held[i]
         z, last = memory.z[:, i], memory.w[:, i]
         out[0, i], out[1, i], out[2, i] = theta[i], v[i], 0.0
@@ -167,7 +178,7 @@ def command(drives, arm, masses, memory, motion, loads, mass, limits, out, filte
             out[2, i] = needed if is_first else needed + ahead * (needed - last[0])
             last[0] = w[0] = 0.0  # nothing is missing
         if is_first:
-            for k in range(8):
+            for k in range(9):
                 z[k, 0] = w[k] / drives.ki[i]
         else:
             _filter(drives.step[i], z, last, w)
@@ -176,7 +187,7 @@ def command(drives, arm, masses, memory, motion, loads, mass, limits, out, filte
             out[0, i] += e
             out[1, i] += (needed - drives.kp[i] * e - drives.ki[i] * integral) / drives.kd[i]
         last[0] = needed
-        for k in range(1, 8):
+        for k in range(1, 9):
             last[k], filtered[6 * (k - 1) + i] = w[k], z[k, 1]
         correction = _behind(v[i], a[i], filtered, led, i)
         before = correction if is_first else memory.correction[i]

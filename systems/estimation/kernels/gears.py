@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 
-from systems.estimation.kernels.poses import compiled
+from robots.compiled import compiled
 
 
 @compiled

@@ -4,8 +4,9 @@ import math
 
 import numpy as np
 
+from robots.compiled import compiled, inner
 from systems.estimation.kernels.arrays import SHIFTS, TURNS_BEFORE, TURNS_BEHIND
-from systems.estimation.kernels.poses import compiled, inner, multiply
+from systems.estimation.kernels.poses import multiply
 
 
 @inner

@@ -1,6 +1,6 @@
 """Rows of numbers found by time in a ring; the steps between readings."""
 
-from systems.estimation.kernels.poses import compiled, inner
+from robots.compiled import compiled, inner
 
 
 @inner

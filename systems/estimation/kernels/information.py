@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 
-from systems.estimation.kernels.poses import compiled, inner
+from robots.compiled import compiled, inner
 
 
 @compiled

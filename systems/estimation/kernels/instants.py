@@ -2,8 +2,9 @@
 
 import numpy as np
 
+from robots.compiled import compiled
 from systems.estimation.kernels.history import cubic_at, row_at
-from systems.estimation.kernels.poses import compiled, move
+from systems.estimation.kernels.poses import move
 from systems.estimation.kernels.tip import largest_change
 
 

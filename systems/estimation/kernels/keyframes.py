@@ -2,6 +2,7 @@
 
 import numpy as np
 
+from robots.compiled import compiled
 from systems.estimation.kernels.arrays import (
     GEARS,
     MOTION,
@@ -14,7 +15,7 @@ from systems.estimation.kernels.arrays import (
     SeenOnce,
 )
 from systems.estimation.kernels.information import add_squares, complete
-from systems.estimation.kernels.poses import compiled, error, move
+from systems.estimation.kernels.poses import error, move
 from systems.estimation.kernels.tip import predict_one_anew
 
 

@@ -4,11 +4,12 @@ import math
 
 import numpy as np
 
+from robots.compiled import compiled, inner
 from systems.estimation.kernels.gears import shapes, springs
 from systems.estimation.kernels.gears import step as step_gears
 from systems.estimation.kernels.geometry import place
 from systems.estimation.kernels.loads import load
-from systems.estimation.kernels.poses import compiled, error, inner
+from systems.estimation.kernels.poses import error
 from systems.estimation.kernels.tip import deflect, move_by_geometry
 
 
@@ -154,6 +155,10 @@ def _add_gear_errors(gears, unknowns, g, step, planned, state, yields):
     for k in range(len(sizes)):
         for j in range(6):
             yields[j] -= waves[k, j] * sizes[k, j]
+    for j in range(6):
+        once = sizes[0, j] * waves[1, j] - sizes[1, j] * waves[0, j]
+        twice = sizes[2, j] * waves[3, j] - sizes[3, j] * waves[2, j]
+        planned.ratios[j] = 1.0 + gears.ratio[j] * (once + 2.0 * twice)
 
 
 @compiled
@@ -167,6 +172,7 @@ def plan(c, masses, unknowns, gears, wanted, state, planned):
         planned: `Planned`; is written.
     """
     yields, g = np.empty(6), len(c.chosen)
+    planned.ratios[:] = 1.0
     _follow(c, masses, unknowns, wanted, state, planned.moving, planned.columns, planned.loads, yields)
     if len(unknowns.x) > g + 24:
         _add_gear_errors(gears, unknowns, g, wanted.step, planned, state, yields)

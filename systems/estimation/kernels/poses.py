@@ -1,18 +1,12 @@
 """Products of rotations, small motions and errors of poses."""
 
 import math
-from typing import Any
 
 import numpy as np
-from numba import njit
+
+from robots.compiled import compiled, inner
 
 _HALF_TURN_SINE = 1e-2  # as in `robots.pose`: below, the sine of an angle near pi does not show its axis
-
-# The way into C is not needed; numba takes the last options without declaring them.
-_jit: Any = njit
-compiled = _jit(cache=True, error_model="numpy", no_cfunc_wrapper=True)
-# What only other loops call: its way into Python need not be compiled either.
-inner = _jit(cache=True, error_model="numpy", no_cfunc_wrapper=True, no_cpython_wrapper=True)
 
 
 @inner

@@ -2,10 +2,11 @@
 
 import numpy as np
 
+from robots.compiled import compiled, inner
 from systems.estimation.kernels.arrays import SeenOnce
 from systems.estimation.kernels.geometry import place
 from systems.estimation.kernels.loads import load
-from systems.estimation.kernels.poses import compiled, error, inner, move
+from systems.estimation.kernels.poses import error, move
 
 
 @compiled

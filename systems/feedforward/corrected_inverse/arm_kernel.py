@@ -5,8 +5,9 @@ numba takes a third of a second to import: `BelievedArm` imports this module whe
 
 import numpy as np
 
+from robots.compiled import compiled
 from robots.identification.motion import BETA, GAMMA
-from robots.identification.response_kernels import advance, between, compiled, place_of
+from robots.identification.response_kernels import advance, between, place_of
 
 _GEARS = 6
 MOVED = 3  # axes whose motors move otherwise than planned: those that move the tip

@@ -2,7 +2,7 @@
 
 import math
 
-from robots.kinematics.kernels import compiled
+from robots.compiled import compiled
 
 
 @compiled

@@ -7,7 +7,8 @@ import math
 
 import numpy as np
 
-from robots.kinematics.kernels import compiled, robust_solve
+from robots.compiled import compiled
+from robots.kinematics.kernels import robust_solve
 from systems.estimation.kernels.poses import error
 
 _SMALLEST_COSINE = math.cos(math.radians(60.0))  # L is singular at 90 degrees

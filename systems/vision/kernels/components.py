@@ -6,7 +6,7 @@ statistics, which have no weighted sums; here only bright pixels cost more than 
 
 import numpy as np
 
-from robots.kinematics.kernels import compiled
+from robots.compiled import compiled
 
 _BLOCK = 64  # pixels of a row that are looked at in one go
 

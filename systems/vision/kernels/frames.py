@@ -5,7 +5,7 @@ Ten cameras with ten markers are so few numbers that an operation of numpy on th
 
 import numpy as np
 
-from robots.kinematics.kernels import compiled
+from robots.compiled import compiled
 
 
 @compiled

@@ -83,3 +83,19 @@ def test_parameters_that_move_do_not_reach_the_loads(model):
     np.testing.assert_allclose(one.motion, other.motion, atol=1e-9)
     np.testing.assert_allclose(one.loads, other.loads, atol=1e-4)
     assert np.abs(one.velocity - other.velocity).max() > 1e-4
+
+
+def test_what_turns_faster_takes_more_torque(model):
+    # Without losses motors and gears have the same power: torque goes with the speed of joint for motor.
+    x = true_unknowns(model, 3)
+    session = Session(x, model)
+    while session.time < 3.5:
+        plan, _ = session.step()
+    h = 1e-6  # rad, of a wave of a hundredth
+    there, here = (
+        model.gear_error(x, model.gear_shapes(plan.theta + side * h, plan.states)) for side in (1.0, -1.0)
+    )
+    ratios = 1.0 + (there - here) / (2.0 * h)
+    assert np.abs(ratios - 1.0).max() > 1e-3
+    np.testing.assert_allclose(plan.ratios, ratios, atol=2e-4)
+    np.testing.assert_allclose(plan.on_motors, plan.loads[:, :6] * plan.ratios)

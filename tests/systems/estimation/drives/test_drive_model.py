@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
+from scipy.signal import lsim
 
 from robots.description.model import load_robot
 from systems.controller_model import ControllerModel
@@ -49,7 +50,7 @@ def run(model, memory, duration: float, beta: np.ndarray):
 def test_a_dead_time_and_wrong_friction_are_learnt():
     model, memory = drives()
     beta = np.zeros(SIZE)
-    beta[DEAD_TIME], beta[1:7], beta[14:31:3] = 3e-3, 1e-4 * np.array([1, -1, 2, 0, 1, -2]), 0.3
+    beta[DEAD_TIME], beta[1:7], beta[14:37:4] = 3e-3, 1e-4 * np.array([1, -1, 2, 0, 1, -2]), 0.3
     behind = run(model, memory, 3.0, beta)
     assert behind[0] > 1e-3
     assert behind[-250:].max() < 2e-5
@@ -71,7 +72,7 @@ def test_a_load_that_turns_over_with_the_motion_is_not_taken_for_friction():
             behind = 0.05 * Phi[:, MOMENT.start]
             Phi[:, last + 1 :] = 0.0  # columns that the model is to do without
             model.learn(memory, Phi, behind)
-            worst = np.maximum(worst, np.abs(memory.beta[15:33:3]))
+            worst = np.maximum(worst, np.abs(memory.beta[15:37:4]))
         return worst
 
     with_moment, without = friction(MOMENT.stop), friction(MASS)
@@ -136,16 +137,36 @@ def test_confidence_is_honest_about_errors_that_last():
 
 
 def test_what_is_learnt_does_not_make_the_command_jump():
+    # All at once the dead time is known to be 20 ms longer: the command goes there smoothly, within 0.2 s.
     model, memory = drives()
-    beta = np.zeros(SIZE)
-    beta[DEAD_TIME] = 20e-3
-    last = None
+    added = []
     for k in range(300):
+        memory.beta[DEAD_TIME] = 0.0 if k < 200 else 20e-3
         theta, v, a = motion(k * PERIOD)
-        position, velocity, _, columns = model.command(memory, (theta, v, a), LOADS, 7.0)
-        if last is not None:
-            assert np.abs(position - theta - last).max() <= 0.05 * PERIOD + 1e-12
-        last = position - theta
-        Phi = model.features(v, a, columns)
-        model.learn(memory, Phi, Phi @ beta)
+        position, velocity, *_ = model.command(memory, (theta, v, a), LOADS, 7.0)
+        added.append(position - theta)
         assert np.isfinite(velocity).all()
+    np.testing.assert_allclose(added[199], 0.0, atol=1e-12)
+    there = np.abs(20e-3 * v).max()
+    assert np.abs(np.diff(added[199:], n=2, axis=0)).max() < 0.05 * there
+    np.testing.assert_allclose(added[-1], 20e-3 * v, atol=1e-3 * there)
+
+
+@pytest.mark.parametrize("velocity", [0.02, 0.06])
+def test_friction_that_is_larger_at_low_speeds_is_made_up_for(velocity):
+    # The hump of these motors is Reiner's (2.4), highest at a velocity; that of the model is Tustin's.
+    model, memory = drives()
+    times = PERIOD * np.arange(1500)
+    v = 0.3 * motion(times[:, None])[1]
+    hump = 0.3 * model._drives.coulomb * 2.0 * v * velocity / (v**2 + velocity**2)
+    gains = zip(model._drives.kd, model._drives.kp, model._drives.ki, strict=True)
+    behind = np.transpose(
+        [lsim(([1.0, 0.0], gain), torque, times)[1] for gain, torque in zip(gains, hump.T, strict=True)]
+    )
+    left = np.empty_like(behind)
+    for k, time in enumerate(times):
+        theta, rate, a = (0.3 * each for each in motion(time))
+        columns = model.command(memory, (theta, rate, a), LOADS, 7.0).columns
+        left[k] = behind[k] - memory.correction
+        model.learn(memory, model.features(rate, a, columns), behind[k])
+    assert left[-500:].std() < 0.3 * behind[-500:].std()
