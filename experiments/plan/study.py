@@ -224,17 +224,21 @@ def calm_enough(
     is_frugal = plan.objective == "energy"
     usual = ready.usual.run.energy(plan.recuperation)
 
+    near = found.motion
+
     def tried(step: float) -> tuple[Kept[TimeSpline], Optimum] | None:
+        nonlocal near
         weighed = (0.0, step) if is_frugal else (step * room, None)
         margins = kept.margins
         for _ in range(_ROUNDS):
             try:
-                calm = calmed(ready.dynamics, margins, found, band, *weighed, plan.recuperation)
+                calm = calmed(ready.dynamics, margins, found, band, *weighed, plan.recuperation, near)
             except PathError:
                 return None
             if not calm.is_solved:
                 return None
-            run = ready.driver.run(calm.motion)
+            near = calm.motion
+            run = ready.driver.run(near)
             if largest_share(run, plan.limits) <= 1.0 + ROUNDING:
                 return Kept(calm.motion, run, True, margins), calm
             margins = lowered(margins, run, plan.limits)

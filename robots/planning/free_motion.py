@@ -168,7 +168,7 @@ def _program(
 ) -> PointProgram:
     """y of a point: joints and three derivatives by the share of the duration, then the duration in units."""
     joints, count = len(moving), NUM_JOINTS
-    y, w = ca.SX.sym("y", _ORDERS * joints + 1), ca.SX.sym("w")
+    y, w, z = ca.SX.sym("y", _ORDERS * joints + 1), ca.SX.sym("w"), ca.SX.sym("z", 0)
     T = y[_ORDERS * joints]
     rates = [ca.SX(ca.DM(start))] + [ca.SX.zeros(count) for _ in range(_ORDERS - 1)]
     for order in range(_ORDERS):
@@ -199,11 +199,11 @@ def _program(
     means = [(motor[i] / float(limits.continuous_torque[i])) ** 2 for i in lasting]
     smooth = _SMOOTH * w * ca.sumsqr(y[3 * joints : 4 * joints])
     return PointProgram(
-        ca.Function("bounded", [y], [ca.vertcat(*rows)]),
+        ca.Function("bounded", [y, z], [ca.vertcat(*rows)]),
         -np.ones(len(rows)),
         np.ones(len(rows)),
-        ca.Function("means", [y], [ca.vertcat(*means)]),
-        ca.Function("cost", [y, w], [w * T + smooth]),
+        ca.Function("means", [y, z], [ca.vertcat(*means)]),
+        ca.Function("cost", [y, w, z], [w * T + smooth]),
     )
 
 

@@ -26,10 +26,12 @@ class Curve:
 
     def at(self, s: np.ndarray, order: int = 0) -> np.ndarray:
         """The curve or a derivative by s at parameters of shape (n,), shape (n, ...)."""
-        coefficients = self.coefficients
-        if order:
-            coefficients = chebyshev.chebder(coefficients, order, scl=2.0)
+        coefficients = self.derivative(order).coefficients
         return np.moveaxis(chebyshev.chebval(2.0 * np.asarray(s) - 1.0, coefficients), -1, 0)
+
+    def derivative(self, order: int) -> "Curve":
+        """The derivative by s of an order, the curve itself at 0."""
+        return Curve(chebyshev.chebder(self.coefficients, order, scl=2.0)) if order else self
 
 
 def nodes(degree: int) -> np.ndarray:

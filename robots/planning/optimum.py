@@ -99,6 +99,7 @@ def calmed(
     slower: float = 0.0,
     energy_weight: float | None = None,
     recuperation: bool = False,
+    begin: TimeSpline | None = None,
 ) -> Optimum:
     """The motion that makes the arm ring least, where a quickest or most frugal one gives a little away.
 
@@ -110,6 +111,7 @@ def calmed(
         slower: share of its duration that is added.
         energy_weight: of twice its energy: what it costs to ring like it; None where energy does not count.
         recuperation: whether braking gives energy back.
+        begin: a motion near to what is looked for; None for the one that was found.
 
     Raises:
         PathError: if the limits admit no such motion.
@@ -117,18 +119,24 @@ def calmed(
     start = TimeSpline(found.motion.coefficients, (1.0 + slower) * found.motion.duration)
     objective = "calm" if energy_weight is None else "energy"
     weight = 1.0 if energy_weight is None else energy_weight
-    calm = _found(
-        dynamics, limits, start, _Aim(objective, recuperation, start.duration, band=band, calm=weight)
-    )
+    aim = _Aim(objective, recuperation, start.duration, band=band, calm=weight)
+    calm = _found(dynamics, limits, start, aim, begin)
     return replace(calm, iterations=max(found.iterations, calm.iterations))
 
 
-def _found(dynamics: PathDynamics, limits: MotionLimits, start: TimeSpline, aim: _Aim) -> Optimum:
+def _found(
+    dynamics: PathDynamics,
+    limits: MotionLimits,
+    start: TimeSpline,
+    aim: _Aim,
+    begin: TimeSpline | None = None,
+) -> Optimum:
+    """What is best, in units of the start; the optimiser begins there if nothing else is given."""
     iterations = 0
     rows = _used(dynamics, limits, start) > _NEAR
-    motion = start
+    motion = begin or start
     for _ in range(_ROUNDS):
-        found, motion = _solved(dynamics, limits, motion, rows, aim)
+        found, motion = _solved(dynamics, limits, start, motion, rows, aim)
         iterations += found.iterations
         if "Infeasible" in found.status:
             break
@@ -140,13 +148,13 @@ def _found(dynamics: PathDynamics, limits: MotionLimits, start: TimeSpline, aim:
 
 
 def _scales(limits: MotionLimits) -> np.ndarray:
-    """What is one in each row of `PathDynamics.function`."""
+    """What is one in each row of `PathDynamics.near`."""
     of_tool = np.square([limits.tool_speed, limits.tool_acceleration])
     return np.concatenate([*(getattr(limits, name) for name in OVER_TIME), of_tool])
 
 
 def _used(dynamics: PathDynamics, limits: MotionLimits, motion: TimeSpline) -> np.ndarray:
-    """The largest share of each row of `PathDynamics.function`."""
+    """The largest share of each row of `PathDynamics.near`."""
     rates = motion.rates(points(len(motion.coefficients)) * motion.duration)
     return np.abs(dynamics.rows(rates)).max(axis=1) / _scales(limits)
 
@@ -155,6 +163,7 @@ def _solved(
     dynamics: PathDynamics,
     limits: MotionLimits,
     start: TimeSpline,
+    begin: TimeSpline,
     rows: np.ndarray,
     aim: _Aim,
 ) -> tuple[Solution, TimeSpline]:
@@ -181,7 +190,7 @@ def _solved(
         ca.sparsify(ca.DM(matrix.reshape(-1, matrix.shape[-1]))),
         offset.ravel(),
         weights(count),
-        np.append(start.coefficients[free], first),
+        np.append(begin.coefficients[free], begin.duration / unit if duration is None else first),
         (np.append(-0.5 * inside, low), np.append(1.5 * inside, high)),
         ITERATIONS,
         squares,
@@ -199,10 +208,10 @@ def _program(
     aim: _Aim,
 ) -> PointProgram:
     objective, smoother, unit = aim.objective, aim.smoother, start.duration
-    y, w = ca.SX.sym("y", ORDERS + 1), ca.SX.sym("w")
+    y, w, z = ca.SX.sym("y", ORDERS + 1), ca.SX.sym("w"), ca.SX.sym("z", dynamics.places.size1_out(0))
     T = y[ORDERS]
     rates = ca.vertcat(*[y[d] / (T * unit) ** d for d in range(ORDERS)])
-    values = dynamics.function(rates)
+    values = dynamics.near(rates, z)
     scales, chosen = _scales(limits), [int(row) for row in np.flatnonzero(rows)]
     bounded = [values[row] / scales[row] for row in chosen] + [y[1]]  # never backwards
     speed, torque = values[:NUM_JOINTS], values[3 * NUM_JOINTS : 4 * NUM_JOINTS]
@@ -218,9 +227,10 @@ def _program(
             power = ca.sqrt(power**2 + (_ROUNDED * of_start / unit) ** 2)
         cost = w * ca.sum1(power) * T * unit / of_start + smooth
     return PointProgram(
-        ca.Function("bounded", [y], [ca.vertcat(*bounded)]),
+        ca.Function("bounded", [y, z], [ca.vertcat(*bounded)]),
         np.append([-1.0 if row < 6 * NUM_JOINTS else -0.1 for row in chosen], 0.0),
         np.append(np.ones(len(chosen)), np.inf),
-        ca.Function("means", [y], [ca.vertcat(*means)]),
-        ca.Function("cost", [y, w], [cost]),
+        ca.Function("means", [y, z], [ca.vertcat(*means)]),
+        ca.Function("cost", [y, w, z], [cost]),
+        dynamics.places,
     )

@@ -20,6 +20,8 @@ from robots.planning.joint_path import Curve, smooth_curve
 # What the planner knows to yield, and what of the plant that is.
 DYNAMICS = {"rigid": "rigid", "flexible_joint": "joints", "elastic_structure": "structure"}
 ORDERS = 5  # s and four derivatives
+_OF_LOADS, _OF_PATH = 2, 3  # derivatives by s that a demand contains
+_BY_OPTIMISER = 2  # more of them that an optimiser takes
 _DAMPING = 0.05  # of the turns that make up for the structure, where the arm is nearly singular
 _ROTATION = 0.12  # what a radian weighs beside the reach, as in the feedforward
 _SCALE = np.append(np.tile(np.repeat([1e3, 1e-3], 6), 3), np.ones(3))  # N m, rad; m
@@ -56,8 +58,10 @@ class PathDynamics:
 
     Attributes:
         path: q(s) in rad.
-        function: casadi's, of (s, s', s'', s''', s''''): speed, acceleration, jerk, motor torque, gear
-            torque and its rate (6 each), then speed and acceleration of the tool, squared.
+        places: casadi's, of s: values of the polynomials and of their derivatives at a place of the path.
+        near: casadi's, of (s less that of the place, s', s'', s''', s'''') and ``places``: speed,
+            acceleration, jerk, motor torque, gear torque and its rate (6 each), then speed and acceleration
+            of the tool, squared. At the place it and its first two derivatives are exact.
     """
 
     def __init__(self, robot: RobotModel, payload: float, path: Curve, dynamics: str) -> None:
@@ -81,7 +85,9 @@ class PathDynamics:
         self._curve = smooth_curve(
             lambda s: arm.coefficients(path, s), "the load of the gears", _SCALE, _ACCURATE
         )
-        self.function = self._function()
+        self.places, self.near = self._functions()
+        s = ca.MX.sym("s", ORDERS)
+        self._here = ca.Function("here", [s], [self.near(ca.vertcat(0.0, s[1:]), self.places(s[0]))])
         self._mapped: dict[int, ca.Function] = {}
 
     def demand(self, rates: np.ndarray) -> Demand:
@@ -105,25 +111,33 @@ class PathDynamics:
         return demand.motor_torque + robot.joint_coulomb_friction * (sharp - blunt)
 
     def rows(self, rates: np.ndarray) -> np.ndarray:
-        """The values of ``function`` at s and its derivatives (5, n); shape (38, n)."""
+        """The values of ``near`` at s and its derivatives (5, n); shape (38, n)."""
         count = rates.shape[1]
         if count not in self._mapped:
-            self._mapped[count] = self.function.map(count)
+            self._mapped[count] = self._here.map(count)
         return np.array(self._mapped[count](rates))
 
-    def _function(self) -> ca.Function:
-        s = ca.SX.sym("s", ORDERS)
-        robot = self._robot
+    def _functions(self) -> tuple[ca.Function, ca.Function]:
+        # A polynomial that an optimiser differentiates at every point is most of its work. Its values and
+        # derivatives at a place are numbers, and a Taylor series of these is as good there.
+        s, robot = ca.SX.sym("s", ORDERS), self._robot
+        of_curve = [self._curve.derivative(order) for order in range(_OF_LOADS + _BY_OPTIMISER + 1)]
+        of_path = [self.path.derivative(order) for order in range(_OF_PATH + _BY_OPTIMISER + 1)]
+        places = _values([*of_curve, *of_path])
+        z = ca.SX.sym("z", places.size1_out(0))
+        ends = np.cumsum([curve.coefficients.shape[1] for curve in (*of_curve, *of_path)])
+        parts = ca.vertsplit(z, [0, *(int(end) for end in ends)])
 
         def rate(expression: ca.SX) -> ca.SX:
             return ca.jtimes(expression, s[: ORDERS - 1], s[1:])
 
-        values = _sum(self._curve.coefficients, s[0])
+        values = _taylor(parts[: len(of_curve)], s[0])
         g, a, b, tool = ca.vertsplit(values, [0, 12, 24, 36, 39])
         yields = g + a * s[2] + b * s[1] ** 2
         load, ahead = yields[:6], yields[6:]
-        q = _sum(self.path.coefficients, s[0])
-        self._ahead = ca.Function("ahead", [s], [ahead])
+        q = _taylor(parts[len(of_curve) :], s[0])
+        of_place, at = ca.Function("ahead", [s, z], [ahead]), ca.MX.sym("s", ORDERS)
+        self._ahead = ca.Function("ahead", [at], [of_place(ca.vertcat(0.0, at[1:]), places(at[0]))])
         velocity = rate(q)
         acceleration = rate(velocity)
         theta_rate = velocity + rate(ahead)
@@ -144,7 +158,7 @@ class PathDynamics:
             ca.sumsqr(tool_velocity),
             ca.sumsqr(tool_acceleration),
         )
-        return ca.Function("demand", [s], [ca.vertcat(*outputs)])
+        return places, ca.Function("near", [s, z], [ca.vertcat(*outputs)])
 
 
 class _Arm:
@@ -208,10 +222,24 @@ class _Arm:
         return ahead
 
 
-def _sum(coefficients: np.ndarray, s: ca.SX) -> ca.SX:
-    """A sum of Chebyshev polynomials of 2 s - 1 for each column of coefficients, (degree + 1, k)."""
-    x = 2.0 * s - 1.0
-    polynomials = [ca.SX(1.0), x]
-    while len(polynomials) < len(coefficients):
-        polynomials.append(2.0 * x * polynomials[-1] - polynomials[-2])
-    return ca.DM(coefficients.T) @ ca.vertcat(*polynomials[: len(coefficients)])
+def _values(curves: list[Curve]) -> ca.Function:
+    """The values of curves, one behind the other, as a function of s: sums of Chebyshev polynomials."""
+    most = max(len(curve.coefficients) for curve in curves)
+    s, at = ca.SX.sym("s"), ca.MX.sym("s")
+    polynomials = [ca.SX(1.0), 2.0 * s - 1.0]
+    while len(polynomials) < most:
+        polynomials.append(2.0 * polynomials[1] * polynomials[-1] - polynomials[-2])
+    all_of_them = ca.Function("polynomials", [s], [ca.vertcat(*polynomials[:most])])
+    coefficients = [
+        np.pad(curve.coefficients.T, ((0, 0), (0, most - len(curve.coefficients)))) for curve in curves
+    ]
+    # One product of numbers: as an expression it would be thousands of operations.
+    return ca.Function("values", [at], [ca.DM(np.concatenate(coefficients)) @ all_of_them(at)])
+
+
+def _taylor(derivatives: list[ca.SX], step: ca.SX) -> ca.SX:
+    """A value a step away from where these derivatives are."""
+    total = derivatives[-1]
+    for order in range(len(derivatives) - 1, 0, -1):
+        total = derivatives[order - 1] + step / order * total
+    return total

@@ -20,11 +20,13 @@ class PointProgram:
     """Functions of y at one point; y has n numbers and the weight of the point in integrals is w.
 
     Attributes:
-        bounded: of y, r numbers.
+        bounded: of (y, z), r numbers.
         lower: their limits, shape (r,).
         upper: likewise.
-        means: of y, m numbers whose weighted sums over all points are at most 1.
-        cost: of (y, w), whose sum over all points is minimised.
+        means: of (y, z), m numbers whose weighted sums over all points are at most 1.
+        cost: of (y, w, z), whose sum over all points is minimised.
+        places: of the first of y, the numbers z. The functions of these take the first of y less what it is
+            there: such as derivatives of a curve at a place, of which they make a series. None for no z.
     """
 
     bounded: ca.Function
@@ -32,6 +34,7 @@ class PointProgram:
     upper: np.ndarray
     means: ca.Function
     cost: ca.Function
+    places: ca.Function | None = None
 
 
 @dataclass(frozen=True)
@@ -71,27 +74,29 @@ def solve(
     n, r, m = program.bounded.size1_in(0), len(program.lower), program.means.size1_out(0)
     x, w = ca.MX.sym("x", size), ca.DM(weights).T
     y = ca.reshape(matrix @ x + ca.DM(offset), n, count)
-    bounded = program.bounded.map(count)(y)
-    means = program.means.map(count)(y) @ w.T
-    g = ca.vertcat(ca.vec(bounded), means)
-    f = ca.sum2(program.cost.map(count)(y, w))
+    z = program.places.map(count)(y[0, :]) if program.places else ca.MX(0, count)
     parts = _parts(program, n, r, m)
+    means = parts["means"].map(count)(y, z) @ w.T
+    g = ca.vertcat(ca.vec(parts["bounded"].map(count)(y, z)), means)
+    f = ca.sum2(parts["cost"].map(count)(y, w, z))
+    gradient = matrix.T @ ca.vec(parts["steepness"].map(count)(y, w, z))
     nothing, of_f, of_g = (
         ca.MX.sym("p", 0),
         ca.MX.sym("lam_f"),
         ca.MX.sym("lam_g", g.shape[0] + (0 if linear is None else len(linear[0]))),
     )
-    slopes = _blocks(parts["slope"].map(count)(y), n) @ matrix
-    of_means = ca.reshape(parts["mean_slope"].map(count)(y), m, n * count)
+    slopes = _blocks(parts["slope"].map(count)(y, z), n) @ matrix
+    of_means = ca.reshape(parts["mean_slope"].map(count)(y, z), m, n * count)
     spread = ca.repmat(w, n, 1)
     jacobian = ca.vertcat(slopes, (of_means * ca.repmat(ca.vec(spread).T, m, 1)) @ matrix)
     multipliers = ca.reshape(of_g[: r * count], r, count)
     of_each = ca.repmat(of_g[r * count : r * count + m], 1, count)
-    curvature = parts["curvature"].map(count)(y, w, multipliers, of_each, ca.repmat(of_f, 1, count))
+    curvature = parts["curvature"].map(count)(y, w, z, multipliers, of_each, ca.repmat(of_f, 1, count))
     full = matrix.T @ _blocks(curvature, n) @ matrix
     if squares is not None:
         A = ca.DM(squares[0])
-        f = f + 0.5 * ca.sumsqr(A @ x + ca.DM(squares[1]))
+        rest = A @ x + ca.DM(squares[1])
+        f, gradient = f + 0.5 * ca.sumsqr(rest), gradient + A.T @ rest
         full = full + of_f * (A.T @ A)
     hessian = ca.triu(full)
     A, *between = linear or (np.zeros((0, size)), np.zeros(0), np.zeros(0))
@@ -106,6 +111,7 @@ def solve(
         "ipopt.acceptable_tol": _ACCEPTABLE,
         "ipopt.acceptable_iter": 5,
         "ipopt.mu_strategy": "adaptive",
+        "grad_f": ca.Function("grad_f", [x, nothing], [f, gradient]),
         "jac_g": ca.Function("jac_g", [x, nothing], [g, jacobian]),
         "hess_lag": ca.Function("hess_lag", [x, nothing, of_f, of_g], [hessian]),
     }
@@ -122,18 +128,27 @@ def solve(
 
 
 def _parts(program: PointProgram, n: int, r: int, m: int) -> dict[str, ca.Function]:
-    """Derivatives at one point: of what is bounded, of the means, and of the Lagrangian twice."""
+    """At one point: the functions, their derivatives, and that of the Lagrangian twice."""
     y, w = ca.SX.sym("y", n), ca.SX.sym("w")
+    z = ca.SX.sym("z", 0 if program.places is None else program.places.size1_out(0))
     of_rows, of_means, of_cost = ca.SX.sym("mu", r), ca.SX.sym("nu", m), ca.SX.sym("lam")
-    bounded, means = program.bounded(y), program.means(y)
-    lagrangian = ca.dot(of_rows, bounded) + w * ca.dot(of_means, means) + of_cost * program.cost(y, w)
+    bounded, means, cost = program.bounded(y, z), program.means(y, z), program.cost(y, w, z)
+    lagrangian = ca.dot(of_rows, bounded) + w * ca.dot(of_means, means) + of_cost * cost
+
+    def at_place(name: str, inputs: list[ca.SX], value: ca.SX) -> ca.Function:
+        if program.places is not None:
+            value = ca.substitute(value, y[0], 0.0)
+        return ca.Function(name, inputs, [ca.densify(value)])
+
     return {
-        "slope": ca.Function("slope", [y], [ca.densify(ca.jacobian(bounded, y))]),
-        "mean_slope": ca.Function("mean_slope", [y], [ca.densify(ca.jacobian(means, y))]),
-        "curvature": ca.Function(
-            "curvature",
-            [y, w, of_rows, of_means, of_cost],
-            [ca.densify(ca.hessian(lagrangian, y)[0])],
+        "bounded": at_place("bounded", [y, z], bounded),
+        "means": at_place("means", [y, z], means),
+        "cost": at_place("cost", [y, w, z], cost),
+        "steepness": at_place("steepness", [y, w, z], ca.gradient(cost, y)),
+        "slope": at_place("slope", [y, z], ca.jacobian(bounded, y)),
+        "mean_slope": at_place("mean_slope", [y, z], ca.jacobian(means, y)),
+        "curvature": at_place(
+            "curvature", [y, w, z, of_rows, of_means, of_cost], ca.hessian(lagrangian, y)[0]
         ),
     }
 

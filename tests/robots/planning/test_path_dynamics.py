@@ -2,6 +2,7 @@
 
 from typing import Any
 
+import casadi as ca
 import numpy as np
 import pytest
 from pydrake.autodiffutils import AutoDiffXd, ExtractGradient
@@ -87,6 +88,23 @@ def test_motors_turn_ahead_of_the_links_by_what_gears_yield(robot, path, motion,
         assert now.speed == pytest.approx(
             rigid.speed + now.gear_torque_rate / robot.joint_stiffness, rel=1e-6, abs=1e-7
         )
+
+
+@pytest.mark.parametrize("order", [1, 2])
+def test_at_a_place_its_series_has_the_derivatives_of_the_path(robot, path, motion, order):
+    dynamics = PathDynamics(robot, PAYLOAD, path, "elastic_structure")
+    rates = motion.rates(np.array([0.25]))
+    step, z = ca.SX.sym("step"), dynamics.places(rates[0, 0])
+    values = dynamics.near(ca.vertcat(step, rates[1:, 0]), z)
+    for _ in range(order):
+        values = ca.jacobian(values, step)
+    found = np.array(ca.Function("found", [step], [values])(0.0)).ravel()
+    h = 1e-3
+    apart = np.repeat(rates, 5, axis=1)
+    apart[0] += h * np.arange(-2, 3)
+    weights = {1: [1.0, -8.0, 0.0, 8.0, -1.0], 2: [-1.0, 16.0, -30.0, 16.0, -1.0]}[order]
+    expected = dynamics.rows(apart) @ weights / (12.0 * h**order)
+    np.testing.assert_allclose(found, expected, rtol=1e-5, atol=1e-5 * np.abs(expected).max())
 
 
 def test_a_motion_is_at_rest_at_its_ends_with_five_derivatives(motion):

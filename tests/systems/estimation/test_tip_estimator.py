@@ -209,6 +209,20 @@ def test_a_load_that_is_picked_up_is_named():
     assert session.error(seen=True) < 60e-6
 
 
+def test_a_load_that_may_have_changed_is_as_unknown_as_one_may_be_and_nothing_else_is():
+    session = Session(2)
+    session.learn(5.0)
+    model, memory = session.model, session.memory
+    before = np.linalg.inv(memory.keyframes.A + memory.A_open)
+    session.estimator.open_load(session.memory)
+    opened = session.estimator.covariance(session.memory)
+    assert np.linalg.eigvalsh(opened).min() > 0.0
+    mass = model.sigma[model.M][0] * np.sqrt(opened[model.M, model.M][0, 0])
+    assert 3.5 < mass < 4.5  # kg: a robot that carries 7 kg had some of them or none
+    rest = np.setdiff1d(np.arange(model.size), np.r_[model.M])
+    np.testing.assert_allclose(opened[np.ix_(rest, rest)], before[np.ix_(rest, rest)], rtol=1e-3, atol=1e-9)
+
+
 def test_a_camera_frame_that_is_turned_around_is_named_and_teaches_nothing():
     session, believed = Session(5), Session(5)
     turned = np.diag([-1.0, -1.0, 1.0, 1.0])  # half a turn about z

@@ -20,7 +20,7 @@ PERIOD = 4e-3
 LOADS = np.zeros((5, 18))
 
 
-def motion(time: float):
+def motion(time: float | np.ndarray):
     """Position, velocity and acceleration of six joints."""
     w, u = 2.0 + 0.4 * np.arange(6), 1.0 + np.arange(6)
     return 0.3 * np.sin(w * time + u), 0.3 * w * np.cos(w * time + u), -0.3 * w**2 * np.sin(w * time + u)
