@@ -249,8 +249,7 @@ class Innovations:
         """
         if memory.changes[0] < _LEAST_SCATTER:
             return 1.0
-        factors = memory.scatter / self._variances
-        return max(float(factors[:3].mean()), float(factors[3:].mean()))
+        return float((memory.scatter / self._variances).reshape(2, 3).sum(axis=1).max()) / 3.0
 
     def _is_sudden(self, memory: SimpleNamespace) -> bool:
         """Whether a step explains the last samples better than a parabola does."""

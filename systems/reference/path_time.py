@@ -1,7 +1,8 @@
 """The time on the path: how a path is slowed, held and resumed without being left."""
 
 import math
-from typing import NamedTuple
+from itertools import takewhile
+from typing import NamedTuple, TypeVar
 
 import numpy as np
 
@@ -10,6 +11,7 @@ from systems.reference.timing import PolynomialProfile
 _MEMORY = 1.0  # s, for which a change that is over can still be asked for: camera samples are late
 MOST_CHANGES = 96  # that are kept; one more waits until there is room
 _STATE_HEAD = 4  # numbers of a state before its changes
+_Share = TypeVar("_Share", float, np.ndarray)
 
 
 class PathTime(NamedTuple):
@@ -33,11 +35,24 @@ class PathTime(NamedTuple):
         return self.changes[-1][1] if self.changes else self.share
 
     def at(self, t: float) -> tuple[float, float, float]:
-        """The time on the path in s, its rate and the rate's rate in 1/s, at a time of the station in s."""
-        if self.changes and t > self.changes[0][0]:
-            s, rate, acceleration = (float(row[0]) for row in self.at_times(np.array([t])))
-            return s, rate, acceleration
-        return self.at_start + self.share * (t - self.start), self.share, 0.0
+        """The time on the path in s, its rate and the rate's rate in 1/s, at a time of the station in s.
+
+        It is asked for several times in a tick, so this is `at_times` without arrays.
+        """
+        s, rate, acceleration = self.at_start + self.share * (t - self.start), self.share, 0.0
+        before, slowing = self.share, self.slowing
+        for time, asked in self.changes:
+            since, jump = t - time, asked - before
+            if since <= 0.0:
+                break
+            if since >= slowing:
+                s, rate = s + jump * (since - 0.5 * slowing), rate + jump
+            else:
+                x = since / slowing
+                s, rate = s + jump * slowing * _ramp(x), rate + jump * _step(x)
+                acceleration += jump * 2772.0 * (x * (1.0 - x)) ** 5 / slowing
+            before = asked
+        return s, rate, acceleration
 
     def at_times(self, t: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """The same for an array of times of shape (n,)."""
@@ -97,11 +112,17 @@ class PathTime(NamedTuple):
     @classmethod
     def from_state(cls, state: np.ndarray) -> "PathTime":
         """What `to_state` has written."""
-        slowing, start, at_start, share, *rest = state[~np.isnan(state)].tolist()
-        return cls(slowing, start, at_start, share, tuple(zip(rest[::2], rest[1::2], strict=True)))
+        slowing, start, at_start, share, *rest = state.tolist()
+        changes = takewhile(lambda change: not math.isnan(change[0]), zip(rest[::2], rest[1::2], strict=True))
+        return cls(slowing, start, at_start, share, tuple(changes))
 
 
-def _ramp(x: np.ndarray) -> np.ndarray:
+def _step(x: float) -> float:
+    """The smooth step of degree 11 at x <= 1; its derivative is 2772 x^5 (1 - x)^5."""
+    return x**6 * (462.0 - x * (1980.0 - x * (3465.0 - x * (3080.0 - x * (1386.0 - x * 252.0)))))
+
+
+def _ramp(x: _Share) -> _Share:
     """The integral of the smooth step of degree 11 from 0 to x <= 1; it is 1/2 at 1."""
     x_7 = x**7
     return x_7 * (66.0 - x * (247.5 - x * (385.0 - x * (308.0 - x * (126.0 - x * 21.0)))))

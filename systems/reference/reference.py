@@ -125,6 +125,7 @@ class Reference(LeafSystem):
         super().__init__()
         self._ahead = ahead = PathAhead(make_path(config), period, config.preview)
         self.is_slowed = bool(slowed_by) or bool(config.override)
+        self._at_state, self._slowed_path = b"", ahead
         asked: set[DependencyTicket] = {self.nothing_ticket()}
         if self.is_slowed:
             self._overrides = _overrides(config)
@@ -155,7 +156,14 @@ class Reference(LeafSystem):
         return next((share for at, share in reversed(self._overrides) if at <= t + _EPSILON), 1.0)
 
     def _path_ahead(self, context: Context) -> PathAhead:
-        return replace(self._ahead, time=_path_time(context)) if self.is_slowed else self._ahead
+        if not self.is_slowed:
+            return self._ahead
+        # A function of the state alone, which seldom changes, kept to save time.
+        state = context.get_discrete_state(0).value()
+        if state.tobytes() != self._at_state:
+            self._at_state = state.tobytes()
+            self._slowed_path = replace(self._ahead, time=PathTime.from_state(state))
+        return self._slowed_path
 
     def _slow(self, context: Context, discrete_state: DiscreteValues) -> None:
         """Takes over another share, behind what the law has planned already."""
@@ -166,7 +174,7 @@ class Reference(LeafSystem):
         planned = self._ahead.preview
         if self._look_ahead.HasValue(context):
             planned = float(self._look_ahead.Eval(context)[0])
-        time = _path_time(context)
+        time = self._ahead_port.Eval(context).time
         then = now + max(planned, 0.0) + self._ahead.period
         changed = time.changed(now, then, min(max(share, 0.0), 1.0))
         if changed != time:
@@ -205,10 +213,6 @@ def _overrides(config: ReferenceConfig) -> list[tuple[float, float]]:
             f"got {rows[-1][1]:g} from {rows[-1][0]:g} s on"
         )
     return rows
-
-
-def _path_time(context: Context) -> PathTime:
-    return PathTime.from_state(context.get_discrete_state(0).value())
 
 
 def _slowed(V_WE, A_WE, rate, acceleration) -> tuple[np.ndarray, np.ndarray]:

@@ -33,6 +33,9 @@ def test_rate_is_between_the_shares_and_is_the_derivative(rows):
     time, last = asked(rows)
     t = np.linspace(max(0.0, last - 0.9), last + 1.5, 4001)
     s, rate, acceleration = time.at_times(t)
+    np.testing.assert_allclose(
+        np.transpose([time.at(each) for each in t]), (s, rate, acceleration), atol=1e-9
+    )
     assert rate.min() >= -1e-12
     assert rate.max() <= 1.0 + 1e-12
     h = t[1] - t[0]
