@@ -312,6 +312,8 @@ class SelfCalibrating(LeafSystem):
         self._learning.plan.append(memory.plan, float(memory.planned[0]), coming.row.all)
         self._learning.delay.search.command(memory.delay.search, time, coming.row.theta)
         forecast = self._forecast
+        if coming.begins_path[0]:
+            self._drives.open_humps(memory.drives)
         if coming.begins_path[0] and forecast and forecast.sigma > self._config.probe.vague:
             event = Event(PATH_UNSEEN, forecast.sigma, forecast.sigma)
             self._learning.events.note(memory.events, time, event)

@@ -22,9 +22,10 @@ from systems.estimation.memory import Layout
 # the load of a kilogram, and of a kg m of its first moment along x, y, z.
 _FILTERED = 9
 COLUMNS = 6 * (_FILTERED - 1)
-_CONSTANTS = slice(37, 43)
+_HUMPS, _CONSTANTS = slice(16, 37, 4), slice(37, 43)
 DEAD_TIME, MASS, MOMENT = 0, 43, slice(44, 47)
 SIZE = MOMENT.stop
+_HUMP = 0.3  # of Coulomb's friction, the spread of what there may be more of it
 _SLOW = 0.05  # rad/s, of Stribeck's effect, exp(-|v| / _SLOW) as Tustin has it; assumed
 _STEEPEST = 0.5  # rad/s, what learning may add to the speed of a joint
 _LED_IN = 40.0  # rad/s, with which commands follow what was learnt, critically damped
@@ -95,7 +96,7 @@ class DriveModel:
         drawn = ArmGeometry(robot, np.array([], dtype=int))
         self._held = drawn.constants(np.zeros(NUM_PARAMETERS)), ArmLoads(robot).masses
         spread = [config.dead_time_sigma, *[config.lag_sigma] * 6, *[1e-4] * 6]
-        spread += [0.3, 0.3, 0.5, 0.3] * 6 + [1e-5] * 6 + [config.payload_sigma] + [config.moment_sigma] * 3
+        spread += [0.3, 0.3, 0.5, 0.0] * 6 + [1e-5] * 6 + [config.payload_sigma] + [config.moment_sigma] * 3
         self._prior = np.diag(np.array(spread) ** 2)
         self.layout = Layout(
             started=(1,),
@@ -167,6 +168,14 @@ class DriveModel:
     def learn(self, memory: SimpleNamespace, Phi: np.ndarray, y: np.ndarray) -> None:
         """One step of recursive least squares: the motors were y behind a plan without correction, (6,)."""
         kernels.drives.learn(memory.P, memory.beta, Phi, y, self._config.following_sigma**2)
+
+    def open_humps(self, memory: SimpleNamespace) -> None:
+        """From now on friction may have a hump, which it is supposed not to have before.
+
+        Friction goes by the speed of a motor, and in the model by the planned one. As long as motors are far
+        off their plan, it turns over at other times, and a hump would be what makes up for that.
+        """
+        memory.P[_DIAGONAL[_HUMPS], _DIAGONAL[_HUMPS]] = _HUMP**2
 
     def widen(self, memory: SimpleNamespace) -> None:
         """Load or dead time have changed: constants, payload and dead time are open again."""

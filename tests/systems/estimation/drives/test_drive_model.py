@@ -164,6 +164,7 @@ def test_friction_that_is_larger_at_low_speeds_is_made_up_for(velocity):
         [lsim(([1.0, 0.0], gain), torque, times)[1] for gain, torque in zip(gains, hump.T, strict=True)]
     )
     left = np.empty_like(behind)
+    model.open_humps(memory)
     for k, time in enumerate(times):
         theta, rate, a = (0.3 * each for each in motion(time))
         columns = model.command(memory, (theta, rate, a), LOADS, 7.0).columns
