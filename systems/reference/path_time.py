@@ -48,9 +48,9 @@ class PathTime(NamedTuple):
             if since >= slowing:
                 s, rate = s + jump * (since - 0.5 * slowing), rate + jump
             else:
-                x = since / slowing
-                s, rate = s + jump * slowing * _ramp(x), rate + jump * _step(x)
-                acceleration += jump * 2772.0 * (x * (1.0 - x)) ** 5 / slowing
+                step, slope, _ = PolynomialProfile.lasting(slowing).at(since)
+                s, rate = s + jump * slowing * _ramp(since / slowing), rate + jump * step
+                acceleration += jump * slope
             before = asked
         return s, rate, acceleration
 
@@ -115,11 +115,6 @@ class PathTime(NamedTuple):
         slowing, start, at_start, share, *rest = state.tolist()
         changes = takewhile(lambda change: not math.isnan(change[0]), zip(rest[::2], rest[1::2], strict=True))
         return cls(slowing, start, at_start, share, tuple(changes))
-
-
-def _step(x: float) -> float:
-    """The smooth step of degree 11 at x <= 1; its derivative is 2772 x^5 (1 - x)^5."""
-    return x**6 * (462.0 - x * (1980.0 - x * (3465.0 - x * (3080.0 - x * (1386.0 - x * 252.0)))))
 
 
 def _ramp(x: _Share) -> _Share:

@@ -7,6 +7,7 @@ import numpy as np
 from robots.compiled import compiled, inner
 from systems.estimation.kernels.geometry import place_links
 from systems.estimation.kernels.loads import hold
+from systems.estimation.kernels.plan import follow
 
 _MOST_PERIODS = 1.5  # by which torques are sent ahead or held back
 
@@ -127,18 +128,6 @@ def _filter(step, z, last, w):
             z[k, i] = row[0] * integral + row[1] * e + row[2] * before + row[3] * change
 
 
-@inner
-def _follow(target, frequency, period, is_first, led):
-    """A critically damped step of values and their rates, (2, n), towards a target, (n,)."""
-    w = frequency * period
-    for k in range(len(target)):
-        if is_first:
-            led[0, k], led[1, k] = target[k], 0.0
-        else:
-            led[1, k] = (led[1, k] + frequency * w * (target[k] - led[0, k])) / (1.0 + w * (2.0 + w))
-            led[0, k] += period * led[1, k]
-
-
 @compiled
 def command(drives, arm, masses, memory, motion, loads, mass, limits, out, filtered):
     """What to command so that motors move as planned, see `DriveModel.command`.
@@ -160,8 +149,10 @@ def command(drives, arm, masses, memory, motion, loads, mass, limits, out, filte
     place_links(arm, theta, X_WE, frames)
     hold(masses, drives.payload, frames, theta, held)
     is_first, most = memory.started[0] == 0.0, drives.period * limits[1]
-    _follow(memory.beta, limits[0], drives.period, is_first, memory.led)
-    led = memory.led[0]
+    led, rate = memory.led
+    if is_first:
+        led[:], rate[:] = memory.beta, 0.0
+    follow(memory.beta, limits[0], drives.period, led, rate)
     # Periods that a torque has to be sent ahead: it arrives late by what was learnt, and is held for a period
     # in whose middle it should be right. A dead time that is wrong by more is corrected by the plan.
     ahead = 0.5 + min(max(led[0] / drives.period, -_MOST_PERIODS), _MOST_PERIODS)

@@ -182,6 +182,16 @@ def plan(c, masses, unknowns, gears, wanted, state, planned):
     _motors(planned.moving, state.wander, yields, history, wanted.step, gears.lag, columns, planned.motion)
 
 
+@inner
+def follow(target, frequency, period, x, rate):
+    """A step of values and their rates towards a target, critically damped, (n,) each, in place."""
+    w = frequency * period
+    slowing = 1.0 + w * (2.0 + w)
+    for k in range(len(target)):
+        rate[k] = (rate[k] + frequency * w * (target[k] - x[k])) / slowing
+        x[k] += period * rate[k]
+
+
 @compiled
 def lead(x, rate, target, columns, limits, arm, period):
     """A step of `ParameterLead`, in place; returns the acceleration of the tip in m/s^2.
@@ -202,8 +212,5 @@ def lead(x, rate, target, columns, limits, arm, period):
         square += effect * effect * (arm * arm if i < 3 else 1.0)
     size = math.sqrt(square) if is_known else 0.05
     w = min(limits[0], math.sqrt(limits[1] / max(size, 1e-9)))
-    slowing = 1.0 + w * period * (2.0 + w * period)
-    for k in range(len(x)):
-        rate[k] = (rate[k] + period * w * w * (target[k] - x[k])) / slowing
-        x[k] += period * rate[k]
+    follow(target, w, period, x, rate)
     return w * w * size
