@@ -13,7 +13,7 @@ from robots.drivetrain.monotone import monotone_inverse
 class DirectionalEfficiency:
     """Efficiency eta_1 where the input drives, eta_2 where it is driven, each falling with the speed.
 
-    eta = at_rest - per_speed |w|, kept above ``_LEAST``.
+    eta = at_rest - per_speed |w|, kept above ``LEAST``.
     """
 
     forward: float  # eta_1 at rest, in (0, 1]
@@ -23,7 +23,7 @@ class DirectionalEfficiency:
     rest_width: float = 0.01  # rad/s, over which `loss` changes its sign
 
     invertible: ClassVar[bool] = False  # at rest it holds like sticking friction
-    _LEAST: ClassVar[float] = 0.05
+    LEAST: ClassVar[float] = 0.05
 
     def __post_init__(self) -> None:
         for label in ("forward", "backward"):
@@ -44,7 +44,7 @@ class DirectionalEfficiency:
         """eta_1 and eta_2 at a speed in rad/s."""
         forward = self.forward - self.forward_per_speed * np.abs(speed)
         backward = self.backward - self.backward_per_speed * np.abs(speed)
-        return np.clip(forward, self._LEAST, 1.0), np.clip(backward, self._LEAST, 1.0)
+        return np.clip(forward, self.LEAST, 1.0), np.clip(backward, self.LEAST, 1.0)
 
     def factor(self, torque_A: np.ndarray, speed_A: np.ndarray) -> np.ndarray:
         """What remains of the input torque: eta_1 if power flows in, 1 / eta_2 else, Reiner (2010) (2.10).

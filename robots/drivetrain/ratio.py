@@ -25,7 +25,7 @@ class FourierRatio:
 
     _terms: np.ndarray = field(init=False, repr=False, compare=False)
     _waves: list = field(init=False, repr=False, compare=False)  # amplitude over base, frequency, phase
-    _steps: int = field(init=False, repr=False, compare=False)
+    newton_steps: int = field(init=False, repr=False, compare=False)  # of `position_error`
 
     def __post_init__(self) -> None:
         if not np.shape(self.amplitudes) == np.shape(self.frequencies) == np.shape(self.phases):
@@ -44,7 +44,7 @@ class FourierRatio:
         object.__setattr__(self, "_terms", terms)
         waves = [(a / self.base, f, p) for a, f, p in zip(*np.moveaxis(terms, -1, 1), strict=True)]
         object.__setattr__(self, "_waves", waves)
-        object.__setattr__(self, "_steps", self._newton_steps(*np.abs(terms[:2])))
+        object.__setattr__(self, "newton_steps", self._newton_steps(*np.abs(terms[:2])))
 
     def _newton_steps(self, amplitude: np.ndarray, frequency: np.ndarray) -> int:
         """How many steps from an even gear are exact enough.
@@ -88,7 +88,7 @@ class FourierRatio:
             theta: input angle over the mean ratio in rad, with no start.
         """
         lead = theta
-        for _ in range(self._steps):
+        for _ in range(self.newton_steps):
             excess, slope = lead - theta, np.ones_like(lead)
             for weight, frequency, phase in self._waves:
                 angle = frequency * lead + phase

@@ -3,13 +3,14 @@
 All quantities are on the side of the link. theta is the position of a motor there, q that of a link.
 """
 
-from collections.abc import Sequence
+import importlib
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import cached_property, partial
 from typing import Any
 
 import numpy as np
 
-from robots.drivetrain.backlash import contact
 from robots.drivetrain.dahl import DahlHysteresis
 from robots.drivetrain.efficiency import DirectionalEfficiency
 from robots.drivetrain.friction import (
@@ -21,7 +22,14 @@ from robots.drivetrain.friction import (
 )
 from robots.drivetrain.ratio import FourierRatio
 from robots.drivetrain.stacked import stacked
-from robots.drivetrain.stiffness import CubicSpring, GearSpring, SpringRow
+from robots.drivetrain.stiffness import GearSpring, SpringRow
+from robots.drivetrain.train_table import (
+    TrainTable,
+    efficiency_rows,
+    element_table,
+    friction_rows,
+    spring_rows,
+)
 
 _ACCELERATION_UNIT = 100.0  # rad/s^2
 
@@ -80,19 +88,15 @@ class DriveTrains:
         self.trains, n = tuple(trains), len(trains)
         self.size = n
         self._spring = SpringRow([train.spring for train in trains])
-        is_linear = all(isinstance(t.spring, CubicSpring) and t.spring.gamma == 0.0 for t in trains)
-        self._linear = self._spring.c_0 if is_linear else None
         self._damping = np.array([train.damping for train in trains])
         self.inertia = np.array([train.inertia for train in trains])  # kg m^2, of the rotors
         lag = np.array([train.motor_lag for train in trains])
-        self._lags, self._has_lag = lag > 0.0, bool(lag.any())
+        self._has_lag = bool(lag.any())
         # An integrator takes the errors of all states for equally important.
         self.torque_unit = _ACCELERATION_UNIT * self.inertia  # N m
-        self._lag_time = np.where(self._lags, lag, 1.0)
         self._half_gap = 0.5 * np.array([train.gap for train in trains])
         self._lubricant = np.array([train.lubricant for train in trains])
         self._has_gap = bool(self._half_gap.any())
-        self._gaps = None if self._half_gap.all() else self._half_gap > 0.0  # which, if not all
         self._frictions = _friction_groups([train.frictions for train in trains])
         self._ratio = _ratio_row([train.ratio for train in trains])
         self._efficiency = None
@@ -125,46 +129,44 @@ class DriveTrains:
             deflection: q - theta in rad and its rate in rad/s, shape (n,) each.
             command: what the motors are told to give in N m, shape (n,).
         """
-        state_rate = np.empty(self.num_states)
-        of_motor, of_soft, of_elements = self._places
-        (theta, speed), (x, rate) = motor, deflection
-        slope = 1.0
-        if self._ratio is not None:
-            error, change = self._ratio.position_error(theta)
-            x, rate, slope = x - error, rate - change * speed, 1.0 + change
-        beyond = x
-        if self._has_gap:
-            beyond = x - np.minimum(np.maximum(x, -self._half_gap), self._half_gap)
-        torque = self._spring.torque(beyond) if self._linear is None else self._linear * beyond
-        torque = torque + self._damping * rate
-        if self._has_gap:
-            touching = contact(beyond, torque)
-            torque = touching if self._gaps is None else np.where(self._gaps, touching, torque)
-            torque = torque + self._lubricant * rate
-        if self._soft is not None:
-            stretch = self._soft.soft * (x - state[of_soft])
-            torque = torque + stretch
-            state_rate[of_soft] = (stretch - self._soft.damped * state[of_soft]) / self._soft.damping
-        if self._hysteresis is not None:
-            z = state[of_elements].reshape(self._elements)
-            torque = torque + self._hysteresis.torque(z)
-            state_rate[of_elements] = self._hysteresis.rate(z, rate).ravel()
-        on_motor = slope * torque
-        if self._efficiency is not None:
-            on_motor = on_motor - self._efficiency.loss(-on_motor, speed)
-        drive = command
-        if self._has_lag:
-            late = self.torque_unit * state[of_motor]
-            drive = np.where(self._lags, late, command)
-            state_rate[of_motor] = (command - late) / (self._lag_time * self.torque_unit)
-        on_motor = on_motor + drive
-        for where, friction in self._frictions:
-            if isinstance(friction, StickSlipFriction):
-                held = friction.holding(speed[where], on_motor[where], self.inertia[where])
-            else:
-                held = friction.torque(speed[where])
-            on_motor[where] -= held
-        return TrainTorques(on_motor, -torque, state_rate)
+        n, out = self.size, np.empty(2 * self.size + self.num_states)
+        motion = np.concatenate(motor), np.concatenate(deflection)
+        self.evaluate(state, *motion, command, np.zeros(n), out)
+        return TrainTorques(command - out[:n], out[n : 2 * n], out[2 * n :])
+
+    @cached_property
+    def evaluate(self) -> Callable[..., None]:
+        """What `torques` is made of, for who asks at every stage of every step: writes in place.
+
+        It takes ``state, motor, deflection, command, viscous, out``, see `robots.drivetrain.train_kernels`.
+        Compiled, or read from where it was kept, when it is asked for first.
+        """
+        kernels = importlib.import_module("robots.drivetrain.train_kernels")
+        return partial(kernels.torques, self._table())
+
+    def _table(self) -> TrainTable:
+        n, ratio, soft = self.size, self._ratio, self._soft
+        waves = np.empty((n, 0, 3))
+        if ratio is not None:
+            weights = np.asarray(ratio.amplitudes) / np.asarray(ratio.base)[:, None]
+            waves = np.stack([weights, ratio.frequencies, ratio.phases], axis=-1)
+        branch = SoftBranch() if soft is None else soft
+        lubricant = self._lubricant if self._has_gap else np.zeros(n)
+        columns = self._damping, self._half_gap, lubricant, branch.soft, branch.damped, branch.damping
+        return TrainTable(
+            springs=spring_rows([train.spring for train in self.trains]),
+            gears=np.stack(np.broadcast_arrays(*columns), axis=1),
+            motors=np.stack([self.motor_lag, self.torque_unit, self.inertia], axis=1),
+            waves=waves,
+            newton_steps=0 if ratio is None else ratio.newton_steps,
+            elements=element_table(self._hysteresis, n),
+            efficiencies=efficiency_rows(self._efficiency, n),
+            frictions=friction_rows(self.trains),
+            soft_at=-1 if soft is None else self._places[1].start,
+            elements_at=self._places[2].start,
+            has_lag=self._has_lag,
+            has_efficiency=self._efficiency is not None,
+        )
 
     def at_rest(self, load: np.ndarray, theta: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Deflections q - theta in rad, (n,), under loads of the links in N m, (n,), and the states then.

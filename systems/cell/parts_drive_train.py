@@ -77,8 +77,8 @@ class DriveTrainParts(Diagram):
         out ``reaction``      vector n in N m, what is taken from the torques that the motors are told to give
         out ``gear_torque``   vector n in N m, what the gears give the links
 
-    The equations are those of `DriveTrains`. They are evaluated by one call of Python for each derivative;
-    the states of the parts stand in a system of Drake's.
+    The equations are those of `DriveTrains`, compiled. Each derivative calls Python once; the states of the
+    parts stand in a system of Drake's.
     """
 
     def __init__(self, trains: DriveTrains, viscous: np.ndarray | None = None) -> None:
@@ -125,7 +125,7 @@ class _Parts(LeafSystem):
 
     def __init__(self, trains: DriveTrains, viscous: np.ndarray) -> None:
         super().__init__()
-        self._trains, self._viscous, n = trains, viscous, trains.size
+        self._evaluate, self._viscous, n = trains.evaluate, viscous, trains.size
         self._command = self.DeclareVectorInputPort("motor_torque", n)
         self._motor = self.DeclareVectorInputPort("motor_state", 2 * n)
         self._link = self.DeclareVectorInputPort("link_state", 2 * n)
@@ -138,9 +138,8 @@ class _Parts(LeafSystem):
         self.DeclareVectorOutputPort("torques", size, self._calc, {port.ticket() for port in ports})
 
     def _calc(self, context: Context, output: BasicVector) -> None:
-        n, motor, command = self._trains.size, self._motor.Eval(context), self._command.Eval(context)
+        motor = self._motor.Eval(context)
         memory = motor[:0] if self._memory is None else self._memory.Eval(context)
-        x, speed = self._link.Eval(context) - motor, motor[n:]
-        found = self._trains.torques(memory, (motor[:n], speed), (x[:n], x[n:]), command)
-        reaction = command - self._viscous * speed - found.motor
-        output.SetFromVector(np.concatenate([reaction, found.link, found.state_rate]))
+        deflection = self._link.Eval(context) - motor
+        torques = output.get_mutable_value()
+        self._evaluate(memory, motor, deflection, self._command.Eval(context), self._viscous, torques)
