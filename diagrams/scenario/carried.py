@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from diagrams.scenario.scenario import Scenario, ScenarioError
-from robots.description.model import RobotModel
+from robots.description.model import RobotModel, base_robot
 from robots.kinematics.forward import Kinematics
 from robots.kinematics.numeric_inverse import NumericInverse
 from robots.kinematics.workspace import arm_length, dexterity, front, working_positions
@@ -37,6 +37,18 @@ def is_alike(robot: RobotModel, other: RobotModel) -> bool:
     """Whether two robots are one machine, or one with errors: the tools are at nearly the same places."""
     q = np.random.default_rng(0).uniform(-1.0, 1.0, (8, 6))
     return bool(np.abs(Kinematics(robot).forward(q) - Kinematics(other).forward(q)).max() < _SAME)
+
+
+def with_robot(scenario: Scenario, name: str) -> Scenario:
+    """The scenario with another robot in the station, shipped or a file; the controller knows that one.
+
+    Where the controller of the scenario believes in the robot that the true one is written on top of, as a
+    drawing that knows of no play and no hysteresis, that is so with the other one, too.
+    """
+    model = scenario.servo.model
+    believes_in_drawing = bool(model.robot) and model.robot == base_robot(str(scenario.robot))
+    belief = (base_robot(name) if believes_in_drawing else None) or ""
+    return replace(scenario, robot=name, servo=replace(scenario.servo, model=replace(model, robot=belief)))
 
 
 def carried_over(

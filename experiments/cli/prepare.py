@@ -7,7 +7,7 @@ from pathlib import Path
 from rich.console import Console
 
 from diagrams.runs.simulation import Experiment, nominal_robot
-from diagrams.scenario.carried import HOME, PATH, carried_over
+from diagrams.scenario.carried import HOME, PATH, carried_over, with_robot
 from diagrams.scenario.scenario import Scenario, ScenarioError, load_scenario, scenario_text
 from diagrams.scenario.scenario_file import OptionSetting, read_scenario_nodes, stated_keys
 from experiments.cli.console import print_note
@@ -92,11 +92,11 @@ def prepare(
     differences = list(settings)
     model = load_robot(robot or scenario.robot)
     if robot is not None:
-        if not model.calibration.of:  # a calibrated one is what the controller knows, not another machine
-            scenario = replace(scenario, robot=robot)
-        # It is what the controller knows, whatever the scenario says.
-        belief = replace(scenario.servo.model, robot="")
-        scenario = replace(scenario, servo=replace(scenario.servo, model=belief))
+        if model.calibration.of:  # it is what the controller knows, whatever the scenario says
+            belief = replace(scenario.servo.model, robot="")
+            scenario = replace(scenario, servo=replace(scenario.servo, model=belief))
+        else:
+            scenario = with_robot(scenario, robot)
         differences.append(f"robot={robot}")
     scenario, carried = _fitted(name, settings, scenario, robot, needs_path)
     if is_quick:

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from diagrams.runs.simulation import run
-from diagrams.scenario.carried import carried_over
+from diagrams.scenario.carried import carried_over, with_robot
 from diagrams.scenario.scenario import Scenario, load_scenario
 from experiments.cli.workers import Executor, LocalProcesses, Progress, in_order
 from experiments.comparison.compare import simulating
@@ -59,8 +59,7 @@ class Trial:
         scenario = load_scenario(self.scenario, self.settings)
         if self.robot is None:
             return scenario
-        belief = replace(scenario.servo.model, robot="")
-        named = replace(scenario, robot=self.robot, servo=replace(scenario.servo, model=belief))
+        named = with_robot(scenario, self.robot)
         return carried_over(named, load_robot(scenario.robot), load_robot(self.robot))[0]
 
 

@@ -50,3 +50,18 @@ def read_extended(name: str, kind: FileKind, beside: Path | None = None, depth: 
         return own
     below = read_extended(str(base.value), kind, path.parent, depth + 1)
     return merged(below, own, kind.schema, merges_lists=kind.merges_lists)
+
+
+def extends(name: str, kind: FileKind) -> str | None:
+    """What a file names after ``extends``, as others can name it, too; None if it stands alone.
+
+    Raises:
+        ConfigurationError: if there is no such file, or it cannot be read.
+    """
+    path, label = kind.find(name, Path())
+    value = kind.read(path, label).value
+    base = value.get("extends") if isinstance(value, dict) else None
+    if base is None or not base.value:
+        return None
+    beside = path.parent / str(base.value)
+    return str(beside if beside.is_file() else base.value)

@@ -17,7 +17,7 @@ from pathlib import Path
 
 import numpy as np
 
-from robots.configuration.extended import FileKind, read_extended
+from robots.configuration.extended import FileKind, extends, read_extended
 from robots.configuration.nodes import ConfigurationError, Node, read_nodes
 from robots.configuration.quantity import numbers, positive, quantity
 from robots.configuration.suggestion import did_you_mean
@@ -240,12 +240,16 @@ def load_robot(name: str) -> RobotModel:
         RobotFileError: if there is no such robot, or its file is not a valid robot.
     """
     try:
-        node = read_extended(name, FileKind(RobotModel, _find, merges_lists=True, read=_read))
-        return robot_of(node)
+        return robot_of(read_extended(name, _robot_file()))
     except RobotFileError:
         raise
     except ConfigurationError as error:
         raise RobotFileError(str(error)) from error
+
+
+def base_robot(name: str) -> str | None:
+    """What a robot file is written on top of, None if it stands alone. Raises ConfigurationError."""
+    return extends(name, _robot_file())
 
 
 def robot_of(node: Node) -> RobotModel:
@@ -259,6 +263,10 @@ def robot_of(node: Node) -> RobotModel:
     if problem:
         raise node.at(keys).refuse(problem)
     return robot
+
+
+def _robot_file() -> FileKind:
+    return FileKind(RobotModel, _find, merges_lists=True, read=_read)
 
 
 def _read(path: Path, label: str) -> Node:

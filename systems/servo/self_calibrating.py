@@ -27,7 +27,7 @@ from systems.servo.self_calibrating_ahead import NextCommand, Pace
 from systems.servo.self_calibrating_config import SelfCalibratingConfig
 from systems.servo.self_calibrating_learning import UNREST, Learning
 
-_STARTING = 1.5  # s
+_STARTING, _LED_IN = 1.5, 2.0  # s
 _FOLLOWED = 4.0  # rad of the lead's frequency, after which nine tenths of a step are followed
 
 
@@ -312,8 +312,8 @@ class SelfCalibrating(LeafSystem):
         self._learning.plan.append(memory.plan, float(memory.planned[0]), coming.row.all)
         self._learning.delay.search.command(memory.delay.search, time, coming.row.theta)
         forecast = self._forecast
-        if coming.begins_path[0]:
-            self._drives.open_humps(memory.drives)
+        if coming.begins_path[0] or coming.is_led_in[0]:
+            self._drives.open_humps(memory.drives, is_early=not coming.begins_path[0])
         if coming.begins_path[0] and forecast and forecast.sigma > self._config.probe.vague:
             event = Event(PATH_UNSEEN, forecast.sigma, forecast.sigma)
             self._learning.events.note(memory.events, time, event)
@@ -376,4 +376,5 @@ class SelfCalibrating(LeafSystem):
             coming.commands[i] = part
         memory.planned[0], coming.path_time[0] = instant, reference.path_time(instant)
         coming.begins_path[0] = last < path_start <= instant
+        coming.is_led_in[0] = last < first + _LED_IN <= instant
         self._pace.look(memory, reference, time)

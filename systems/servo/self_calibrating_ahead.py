@@ -57,6 +57,7 @@ class NextCommand:
             time=(1,),  # of its tick, s
             path_time=(1,),  # of the instant that it is for, s
             begins_path=(1,),  # whether the path begins at this instant
+            is_led_in=(1,),  # whether motors are on their plan from this instant on
             commands=(3, 6),  # position, velocity, torque
             row=PLAN,
             before=(int(self._ends[-1]),),

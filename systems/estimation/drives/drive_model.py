@@ -9,6 +9,7 @@ from pydrake.multibody.plant import MultibodyPlant
 from scipy.linalg import expm
 
 from robots.description.error_parameters import NUM_PARAMETERS
+from robots.description.friction_line import friction_line
 from robots.description.model import RobotModel
 from robots.dynamics.plant import add_robot
 from systems.controller_model import ControllerModel
@@ -27,6 +28,7 @@ DEAD_TIME, MASS, MOMENT = 0, 43, slice(44, 47)
 SIZE = MOMENT.stop
 _HUMP = 0.3  # of Coulomb's friction, the spread of what there may be more of it
 _SLOW = 0.05  # rad/s, of Stribeck's effect, exp(-|v| / _SLOW) as Tustin has it; assumed
+_SLACK = 0.3  # of Coulomb's friction, by which it may be off while little is known of it
 _STEEPEST = 0.5  # rad/s, what learning may add to the speed of a joint
 _LED_IN = 40.0  # rad/s, with which commands follow what was learnt, critically damped
 
@@ -78,11 +80,13 @@ class DriveModel:
         payload = min(model.payload, robot.payload.largest_mass)
         kd = config.velocity * _inertia(robot, payload)
         kp, ki = kd * (config.position + config.integral), kd * config.position * config.integral
+        coulomb, viscous = friction_line(robot)
         self._drives = Drives(
             robot.reflected_inertia,
-            robot.joint_viscous_friction,
-            robot.joint_coulomb_friction,
+            viscous,
+            coulomb,
             robot.coulomb_velocity,
+            _SLACK * coulomb / kp,
             _SLOW,
             kp,
             ki,
@@ -157,25 +161,36 @@ class DriveModel:
             planned: position, velocity and acceleration, (6,) each.
             columns, correction: of the command of that instant, (48,) and (6,) in rad.
             actual: where the motors were, rad, (6,).
-            most: nothing is learnt if more than this is not explained yet, rad.
+            most: nothing is learnt if more than this is not explained yet, rad; of a joint with much friction
+                for the stiffness of its drive that much more.
 
         Returns:
-            The most that was not explained before in rad.
+            The most that was not explained before, beyond what friction may do, in rad.
         """
         known = memory.P, memory.beta, self._config.following_sigma**2, most
-        return kernels.drives.look_back(planned, correction, columns, actual, *known)
+        slack = self._drives.slack
+        return kernels.drives.look_back(planned, correction, columns, actual, slack, *known)
 
     def learn(self, memory: SimpleNamespace, Phi: np.ndarray, y: np.ndarray) -> None:
         """One step of recursive least squares: the motors were y behind a plan without correction, (6,)."""
         kernels.drives.learn(memory.P, memory.beta, Phi, y, self._config.following_sigma**2)
 
-    def open_humps(self, memory: SimpleNamespace) -> None:
+    def open_humps(self, memory: SimpleNamespace, is_early: bool = False) -> None:
         """From now on friction may have a hump, which it is supposed not to have before.
 
         Friction goes by the speed of a motor, and in the model by the planned one. As long as motors are far
         off their plan, it turns over at other times, and a hump would be what makes up for that.
+
+        Args:
+            memory: of the layout.
+            is_early: whether only of joints whose friction moves them by more than they are known to be off:
+                without a hump other parameters would have to make up for it there.
         """
-        memory.P[_DIAGONAL[_HUMPS], _DIAGONAL[_HUMPS]] = _HUMP**2
+        humps = _DIAGONAL[_HUMPS]
+        if is_early:
+            humps = humps[self._drives.slack > self._config.following_sigma]
+        closed = humps[memory.P[humps, humps] == 0.0]
+        memory.P[closed, closed] = _HUMP**2
 
     def widen(self, memory: SimpleNamespace) -> None:
         """Load or dead time have changed: constants, payload and dead time are open again."""

@@ -108,6 +108,7 @@ class Drives(NamedTuple):
     viscous: np.ndarray  # (6,) N m s/rad
     coulomb: np.ndarray  # (6,) N m
     width: np.ndarray  # (6,) rad/s, of the speeds in which friction turns over
+    slack: np.ndarray  # (6,) rad, of a following error, that friction makes where it is not as believed
     slow: float  # rad/s, at which what friction has more at low speeds has fallen to a third
     kp: np.ndarray  # (6,) N m/rad, gains of a following error, of its integral and of its rate
     ki: np.ndarray  # (6,)

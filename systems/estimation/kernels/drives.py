@@ -92,7 +92,7 @@ def learn(P, beta, Phi, y, variance):
 
 
 @compiled
-def look_back(planned, correction, filtered, actual, P, beta, variance, most):
+def look_back(planned, correction, filtered, actual, slack, P, beta, variance, most):
     """Learns from one planned instant that has passed; see `DriveModel.look_back`.
 
     Args:
@@ -100,11 +100,12 @@ def look_back(planned, correction, filtered, actual, P, beta, variance, most):
         correction: that was commanded beside the plan, rad, (6,).
         filtered: as of `features`.
         actual: positions of the motors, rad, (6,).
+        slack: of `Drives`.
         P, beta, variance: as of `learn`.
         most: rad, that may be unexplained if there shall be something to learn.
 
     Returns:
-        By how much the positions are off at most at the beta from before, rad.
+        By how much the positions are off at most at the beta from before, beyond the slack, rad.
     """
     theta, v, a = planned
     Phi, y = np.zeros((6, len(beta))), np.empty(6)
@@ -112,7 +113,7 @@ def look_back(planned, correction, filtered, actual, P, beta, variance, most):
     largest = 0.0
     for i in range(6):
         y[i] = theta[i] - actual[i] + correction[i]
-        largest = max(largest, abs(y[i] - _behind(v[i], a[i], filtered, beta, i)))
+        largest = max(largest, abs(y[i] - _behind(v[i], a[i], filtered, beta, i)) - slack[i])
     if largest <= most:
         learn(P, beta, Phi, y, variance)
     return largest

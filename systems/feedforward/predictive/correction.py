@@ -5,6 +5,7 @@ from pydrake.common.value import Value
 from pydrake.multibody.plant import MultibodyPlant
 from pydrake.systems.framework import Context, DiscreteValues, LeafSystem
 
+from robots.description.friction_line import friction_line
 from robots.description.model import NUM_JOINTS
 from robots.dynamics.modes import ModalAnalysis, stretched
 from robots.dynamics.plant import add_robot
@@ -12,7 +13,7 @@ from robots.kinematics.forward import Kinematics, robust_solve
 from systems.controller_model import ControllerModel
 from systems.feedforward.predictive.config import PredictiveConfig
 from systems.feedforward.predictive.forecast import Cascade, Forecast
-from systems.feedforward.predictive.friction_observer import FrictionObserver, believed_friction
+from systems.feedforward.predictive.friction_observer import FrictionObserver
 from systems.feedforward.predictive.program import CorrectionProgram
 from systems.reference.reference import PathAhead
 from systems.samples import JointSample
@@ -70,7 +71,7 @@ class PredictiveCorrection(LeafSystem):
         # Scratch memory only: written before every use.
         self._context = self._plant.CreateDefaultContext()
         self._tuned_for = np.diag(self._plant.CalcMassMatrix(self._context)).copy()
-        coulomb, viscous = (each / self._tuned_for for each in believed_friction(robot))
+        coulomb, viscous = (each / self._tuned_for for each in friction_line(robot))
         self._observer = FrictionObserver(coulomb, viscous, robot.coulomb_velocity)
         self._limit = config.limit * coulomb
         self._kinematics = Kinematics(robot)

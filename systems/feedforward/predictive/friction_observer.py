@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from robots.description.model import NUM_JOINTS, RobotModel
+from robots.description.model import NUM_JOINTS
 
 PARTS = 3  # Coulomb, viscous, constant
 MEMORY = (PARTS + PARTS * PARTS) * NUM_JOINTS
@@ -11,15 +11,6 @@ MEMORY = (PARTS + PARTS * PARTS) * NUM_JOINTS
 _DOUBT = (0.5, 1.0, 0.05)  # at the beginning: friction is known to a half, the load to that acceleration
 _WANDER = (0.01, 0.01, 0.005)  # in a tick; the load's so slow that ringing gears are not taken for it
 _NOISE = 1.0  # rad/s^2, of a balance over one tick: what gears that ring give and take
-
-
-def believed_friction(robot: RobotModel) -> tuple[np.ndarray, np.ndarray]:
-    """Coulomb friction in N m and viscous friction in N m s/rad, from the curve between 0.5 and 1 rad/s."""
-    if robot.drive_trains is None:
-        return robot.joint_coulomb_friction, robot.joint_viscous_friction
-    no_load, one = np.zeros(NUM_JOINTS), np.ones(NUM_JOINTS)
-    half, whole = (robot.drive_trains.losses(no_load, speed * one) for speed in (0.5, 1.0))
-    return 2.0 * half - whole, 2.0 * (whole - half)
 
 
 class FrictionObserver:

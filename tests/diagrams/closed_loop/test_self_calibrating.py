@@ -102,6 +102,18 @@ def test_a_lap_from_a_nominal_robot(name, settings, moving):
 
 
 @pytest.mark.slow
+@pytest.mark.parametrize("belief", ["irb1200", "irb1200-realistic"])
+def test_a_realistic_robot_whether_its_friction_is_a_number_or_a_curve_to_the_controller(belief):
+    settings = [f"servo.model.robot={belief}", "reference.settle=3"]
+    experiment = Experiment(load_scenario("everything-realistic", settings), "self_calibrating")
+    experiment.advance(until=9.0)
+    log = experiment.log()
+    assert tip_errors(log)[0].max() < 0.1e-3
+    assert log.learnt is not None
+    assert not log.learnt["events"]
+
+
+@pytest.mark.slow
 @pytest.mark.parametrize(("seed", "bits"), [(2001, 19), (2002, 17)])
 def test_the_tip_is_where_the_law_says_with_encoders_of_any_steps(seed, bits):
     names = ("seed", "station.errors.random.seed", "station.variation.seed")

@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from diagrams.scenario.carried import carried_over, is_alike
+from diagrams.scenario.carried import carried_over, is_alike, with_robot
 from diagrams.scenario.scenario import Scenario, ScenarioError, load_scenario, scenario_text
 from robots.description.model import RobotModel, load_robot
 from robots.dynamics.newton_inverse import inverse_kinematics
@@ -115,3 +115,23 @@ def test_a_robot_that_can_follow_no_path_is_refused():
         joint.limits.speed_deg_s = 0.01
     with pytest.raises(ScenarioError, match="no place was found where KUKA KR 16-2 can follow the path"):
         carried_over(load_scenario("misaligned"), IRB1200, robot)
+
+
+@pytest.mark.parametrize(
+    ("scenario", "robot", "belief"),
+    [
+        ("everything-realistic", "kr16-realistic", "kr16"),
+        ("everything-realistic", "ur10", ""),  # a drawing itself
+        ("everything", "kr16-realistic", ""),  # where the controller knows the robot as it is
+    ],
+)
+def test_a_controller_that_knows_the_drawing_knows_that_of_another_robot(scenario, robot, belief):
+    changed = with_robot(load_scenario(scenario), robot)
+    assert (changed.robot, changed.servo.model.robot) == (robot, belief)
+
+
+def test_the_drawing_of_a_file_is_found_beside_it(tmp_path: Path):
+    (tmp_path / "drawn.yaml").write_text("extends: kr16\n")
+    (tmp_path / "true.yaml").write_text("extends: drawn.yaml\n")
+    changed = with_robot(load_scenario("everything-realistic"), str(tmp_path / "true.yaml"))
+    assert load_robot(changed.servo.model.robot).name == load_robot("kr16").name

@@ -26,8 +26,8 @@ def motion(time: float | np.ndarray):
     return 0.3 * np.sin(w * time + u), 0.3 * w * np.cos(w * time + u), -0.3 * w**2 * np.sin(w * time + u)
 
 
-def drives(takes_torque=True, **config):
-    belief = ControllerModel(load_robot("irb1200"), 7.0, PERIOD, takes_torque=takes_torque)
+def drives(takes_torque=True, robot="irb1200", **config):
+    belief = ControllerModel(load_robot(robot), 7.0, PERIOD, takes_torque=takes_torque)
     model = DriveModel(belief, DriveModelConfig(**config))
     memory = model.layout.view(np.zeros(model.layout.size))
     model.start(memory)
@@ -175,3 +175,36 @@ def test_friction_that_is_larger_at_low_speeds_is_made_up_for(velocity):
             model.open_humps(memory)
     # Two shapes of a hump differ by up to a fifth of it.
     assert left[-500:].std() < 0.3 * behind[-500:].std()
+
+
+@pytest.mark.parametrize("robot", ["kr16", "kr16-realistic"])
+def test_friction_that_is_off_by_a_third_is_not_taken_for_another_load(robot):
+    """Whether the robot's file has it as two numbers or as a curve; of the wrists it is a milliradian."""
+    model, memory = drives(robot=robot)
+    theta, v, a = motion(1.0)
+    columns = model.command(memory, (theta, v, a), LOADS, 7.0).columns
+    behind = 0.3 * load_robot("kr16").joint_coulomb_friction / model._drives.kp
+    assert behind.max() > 1e-3
+    left = [
+        model.look_back(memory, (theta, v, a), columns, np.zeros(6), theta - each, most=-1.0)
+        for each in (behind, behind + 4e-4)
+    ]
+    assert left[0] <= 1e-12
+    assert 3e-4 < left[1] <= 4e-4 + 1e-12
+
+
+@pytest.mark.parametrize(("robot", "early"), [("kr16", [3, 4, 5]), ("irb1200", [])])
+def test_humps_are_open_early_where_friction_moves_a_joint_most(robot, early):
+    model, memory = drives(robot=robot)
+
+    def spreads():
+        return np.diag(memory.P)[16:37:4].copy()
+
+    model.open_humps(memory, is_early=True)
+    assert np.flatnonzero(spreads()).tolist() == early
+    known = 0.5 * spreads()
+    memory.P[np.arange(16, 37, 4), np.arange(16, 37, 4)] = known
+    model.open_humps(memory)
+    assert spreads().all()
+    # What was learnt in the meantime is not forgotten.
+    np.testing.assert_array_equal(spreads()[early], known[early])

@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 
 from robots.description.drive_parts import Cubic
+from robots.description.friction_line import friction_line
 from robots.description.model import NUM_JOINTS, RobotModel, load_robot
 from systems.controller_model import ControllerModel
 from systems.feedforward import FEEDFORWARDS, FeedforwardConfig, JointReference
 from systems.feedforward.corrected_inverse.corrected import CorrectedFeedforward
 from systems.feedforward.elastic_structure import ElasticStructureFeedforward
-from systems.feedforward.predictive.friction_observer import believed_friction
 from systems.feedforward.prefilter import PrefilterConfig
 from systems.reference.timing import TIMINGS
 
@@ -56,7 +56,7 @@ def test_before_the_motion_and_long_after_it_motors_rest():
     assert told[:begin] == pytest.approx(first[:begin], abs=1e-9), "as the approximate inverse has them"
     assert told[-1, 1] == pytest.approx(0.0, abs=1e-9)
     assert told[-1, 0] == pytest.approx(first[-1, 0], abs=5e-4), "by no more than play and hysteresis"
-    coulomb, _ = believed_friction(robot)
+    coulomb, _ = friction_line(robot)
     assert (np.abs(told[-1, 2] - first[-1, 2]) < 0.05 * coulomb).all(), "what still rings is held by friction"
 
 

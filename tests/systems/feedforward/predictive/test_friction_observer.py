@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from robots.description.model import NUM_JOINTS, load_robot
-from systems.feedforward.predictive.friction_observer import FrictionObserver, believed_friction
+from robots.description.model import NUM_JOINTS
+from systems.feedforward.predictive.friction_observer import FrictionObserver
 
 COULOMB, VISCOUS, WIDTH = np.full(NUM_JOINTS, 0.5), np.full(NUM_JOINTS, 0.3), np.full(NUM_JOINTS, 0.01)
 
@@ -29,13 +29,3 @@ def test_nothing_is_expected_at_first():
     assert np.array_equal(
         observer.ahead(observer.at_first, np.ones((3, NUM_JOINTS))), np.zeros((3, NUM_JOINTS))
     )
-
-
-@pytest.mark.parametrize("name", ["kr16", "kr16-realistic"])
-def test_friction_is_what_the_robot_says_wherever_it_says_so(name: str):
-    """The realistic robot's file has 30 % more of both, and a hump that falls a little there."""
-    plain = load_robot("kr16")
-    coulomb, viscous = believed_friction(load_robot(name))
-    share = 1.3 if name != "kr16" else 1.0
-    assert coulomb == pytest.approx(share * plain.joint_coulomb_friction, rel=0.05)
-    assert viscous == pytest.approx(share * plain.joint_viscous_friction, rel=0.15)
