@@ -13,6 +13,7 @@ import ruckig
 from numpy.polynomial import chebyshev
 from scipy.interpolate import BSpline
 
+from robots.description.friction_line import friction_line
 from robots.description.model import NUM_JOINTS, RobotModel
 from robots.planning.arm_expression import ArmExpression
 from robots.planning.joint_path import Curve, PathError, interpolated, nodes
@@ -180,9 +181,8 @@ def _program(
     of_rates = ca.Function("load", symbols, [load, rate])
     gear, gear_rate = of_rates(*rates)
     q, speed, acceleration, jerk = rates
-    friction = robot.joint_viscous_friction * speed + robot.joint_coulomb_friction * ca.tanh(
-        speed / (_BLUNT * robot.coulomb_velocity)
-    )
+    coulomb, viscous = friction_line(robot)
+    friction = viscous * speed + coulomb * ca.tanh(speed / (_BLUNT * robot.coulomb_velocity))
     motor = robot.reflected_inertia * acceleration + friction + gear
     rows, middle = [], 0.5 * (robot.lower + robot.upper)
     for values, most, which in (

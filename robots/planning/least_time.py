@@ -21,6 +21,7 @@ from pydrake.multibody.plant import MultibodyPlant
 from scipy.optimize import linprog
 from scipy.sparse import csr_array
 
+from robots.description.friction_line import friction_line
 from robots.description.model import NUM_JOINTS, RobotModel
 from robots.dynamics.plant import add_robot
 from robots.planning.limits import MotionLimits
@@ -92,7 +93,8 @@ def _axis_1(robot: RobotModel) -> np.ndarray:
 
 def _most_acceleration(robot: RobotModel, limits: MotionLimits) -> np.ndarray:
     """Of each joint in rad/s^2, (6,): its limit, or what motor, gear and friction together give the rotor."""
-    friction = robot.joint_viscous_friction * limits.speed + robot.joint_coulomb_friction
+    coulomb, viscous = friction_line(robot)
+    friction = viscous * limits.speed + coulomb
     return np.minimum(
         limits.acceleration,
         (limits.motor_torque + limits.gear_torque + friction) / robot.reflected_inertia,
@@ -142,8 +144,9 @@ def _farthest(robot: RobotModel, limits: MotionLimits, reaches: list[_Reach], du
     largest, lent = (np.minimum(*each) for each in zip(of_start[1:], of_goal[1:], strict=True))
     one = np.eye(n + 1)
     step, second, mean = np.diff(one, axis=0) / h, np.diff(one, 2, axis=0) / h**2, 0.5 * (one[1:] + one[:-1])
-    rotor = robot.reflected_inertia[0] * step + robot.joint_viscous_friction[0] * mean
-    motor, coulomb = limits.motor_torque[0], robot.joint_coulomb_friction[0]
+    coulomb, viscous = (each[0] for each in friction_line(robot))
+    rotor = robot.reflected_inertia[0] * step + viscous * mean
+    motor = limits.motor_torque[0]
     # Rows for the variables, and what they may be at most. Coulomb friction brakes but never hinders.
     rows = [
         (np.diag(least), 0.0 * one, -one, lent),

@@ -13,6 +13,7 @@ import numpy as np
 from pydrake.multibody.plant import MultibodyPlant
 from pydrake.multibody.tree import JacobianWrtVariable, MultibodyForces
 
+from robots.description.friction_line import friction_line
 from robots.description.model import NUM_JOINTS, RobotModel
 from robots.dynamics.plant import PlantRobot, add_robot
 from robots.planning.joint_path import Curve, smooth_curve
@@ -108,7 +109,7 @@ class PathDynamics:
         """Torques of the motors in N m with friction as sharp as it is, at (5, n); shape (n, 6)."""
         demand, robot = self.demand(rates), self._robot
         sharp, blunt = (np.tanh(demand.speed / (factor * robot.coulomb_velocity)) for factor in (1.0, _BLUNT))
-        return demand.motor_torque + robot.joint_coulomb_friction * (sharp - blunt)
+        return demand.motor_torque + friction_line(robot)[0] * (sharp - blunt)
 
     def rows(self, rates: np.ndarray) -> np.ndarray:
         """The values of ``near`` at s and its derivatives (5, n); shape (38, n)."""
@@ -142,9 +143,9 @@ class PathDynamics:
         acceleration = rate(velocity)
         theta_rate = velocity + rate(ahead)
         theta_acceleration = acceleration + rate(rate(ahead))
-        friction = robot.joint_viscous_friction * theta_rate + robot.joint_coulomb_friction * ca.tanh(
-            theta_rate / (_BLUNT * robot.coulomb_velocity)
-        )
+        coulomb, viscous = friction_line(robot)
+        sign = ca.tanh(theta_rate / (_BLUNT * robot.coulomb_velocity))
+        friction = viscous * theta_rate + coulomb * sign
         torque = robot.reflected_inertia * theta_acceleration + friction + load
         tool_velocity = rate(tool)
         tool_acceleration = rate(tool_velocity)
