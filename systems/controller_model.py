@@ -8,6 +8,8 @@ from robots.configuration.quantity import choice, numbers, quantity
 from robots.description.model import RobotModel
 from robots.dynamics.plant import ELASTICITIES
 
+_CARRIES = 7.0  # kg, of the robot for which absolute sizes of loads are given
+
 
 @dataclass(frozen=True)
 class ControllerModel:
@@ -31,6 +33,11 @@ class ControllerModel:
     def payload_centre(self) -> np.ndarray:
         """Centre of mass of the payload in the frame of the flange in m, shape (3,)."""
         return self.robot.payload.center_of_mass
+
+    @property
+    def load_scale(self) -> float:
+        """By how much larger loads may be off than those of a robot that carries 7 kg; 1 for smaller ones."""
+        return max(1.0, self.robot.payload.largest_mass / _CARRIES)
 
 
 @dataclass

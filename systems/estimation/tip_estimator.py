@@ -374,7 +374,7 @@ class TipEstimator:
         model = self.model
         P = np.linalg.inv(memory.keyframes.A + memory.A_open) + others
         load = np.zeros(model.size)
-        load[model.M] = share * np.array([4.0, 0.3, 0.3, 0.3]) / model.sigma[model.M]
+        load[model.M] = share * model.changed_load
         A = np.linalg.inv(P + np.diag(load**2))
         A = 0.5 * (A + A.T)
         self._keyframes.reset(memory.keyframes, A, memory.xi)

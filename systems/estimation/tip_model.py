@@ -18,6 +18,7 @@ from systems.estimation.learnt_robot import known_before
 
 HELD = 1e5  # information on the drift of a clock as long as nothing shows that there is one
 NO_SHAPES = np.empty((0, 6))
+_CHANGED_LOAD = np.array([4.0, 0.3, 0.3, 0.3])  # kg and kg m, of a robot that carries 7 kg
 _BASE = 0  # the body whose placement in the world it is
 _STAYS = 0.02  # of the spread, by which what was measured of a robot may have changed since
 
@@ -32,7 +33,7 @@ class Spread:
     calibrated_angle: float = 2e-4  # rad
     gear: float = 0.3  # of the compliance of a gear, as a factor
     bearing: float = 0.5  # the same of a bearing
-    payload: float = 0.5  # kg
+    payload: float = 0.5  # kg, of a robot that carries 7 kg; of a larger one in proportion
     payload_centre: float = 0.015  # m
     clock: float = 2e-3  # s, between the stamps of the camera and those of the joints
     clock_drift: float = 3e-4  # s/s, by which that changes if it does
@@ -109,8 +110,9 @@ class TipModel:
         self.mean[g + 6 : g + 18] = 0.5 if model.elasticity == "structure" else 0.0
         self.sigma[self.K] = np.concatenate([np.full(6, spread.gear), np.full(12, spread.bearing)])
         self.mean[g + 18] = model.payload
-        self.sigma[g + 18] = spread.payload
+        self.sigma[g + 18] = spread.payload * model.load_scale
         self.sigma[g + 19 : g + 22] = spread.payload_centre * max(model.payload, 0.1)
+        self.changed_load = model.load_scale * _CHANGED_LOAD / self.sigma[self.M]  # in units of the spreads
         self.sigma[self.C], self.sigma[self.D] = spread.clock, spread.clock_drift
         if self.has_gear_errors:
             shares = np.ones((NUM_SHAPES, NUM_JOINTS))

@@ -237,7 +237,7 @@ class Learning:
             return
         load.samples[0] = 0.0
         change = self._mass(memory) - float(load.mass[0])
-        if abs(change) > _LEAST_CHANGE:
+        if abs(change) > _LEAST_CHANGE * self._model.load_scale:
             self.events.note(memory.events, float(load.time[0]), Event(LOAD_CHANGED, change, 0.0))
 
     def _mass(self, memory: SimpleNamespace) -> float:

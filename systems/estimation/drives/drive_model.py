@@ -45,6 +45,7 @@ class DriveModelConfig:
     following_sigma: float = 4e-4  # rad
     dead_time_sigma: float = 3e-3  # s, of all joints alike
     lag_sigma: float = 3e-4  # s, of each joint
+    # Of a robot that carries 7 kg; of a larger one in proportion
     payload_sigma: float = 0.5  # kg
     moment_sigma: float = 0.07  # kg m, first moment of the payload: 7 kg whose centre is off by 10 mm
 
@@ -100,7 +101,9 @@ class DriveModel:
         drawn = ArmGeometry(robot, np.array([], dtype=int))
         self._held = drawn.constants(np.zeros(NUM_PARAMETERS)), ArmLoads(robot).masses
         spread = [config.dead_time_sigma, *[config.lag_sigma] * 6, *[1e-4] * 6]
-        spread += [0.3, 0.3, 0.5, 0.0] * 6 + [1e-5] * 6 + [config.payload_sigma] + [config.moment_sigma] * 3
+        self._scale, self._moment = model.load_scale, config.moment_sigma * model.load_scale
+        spread += [0.3, 0.3, 0.5, 0.0] * 6 + [1e-5] * 6
+        spread += [config.payload_sigma * self._scale] + [self._moment] * 3
         self._prior = np.diag(np.array(spread) ** 2)
         self.layout = Layout(
             started=(1,),
@@ -195,8 +198,8 @@ class DriveModel:
     def widen(self, memory: SimpleNamespace) -> None:
         """Load or dead time have changed: constants, payload and dead time are open again."""
         extra = np.zeros(SIZE)
-        extra[_CONSTANTS], extra[MASS], extra[DEAD_TIME] = 3e-5, 5.0, 1e-3
-        extra[MOMENT] = self._config.moment_sigma
+        extra[_CONSTANTS], extra[MASS], extra[DEAD_TIME] = 3e-5, 5.0 * self._scale, 1e-3
+        extra[MOMENT] = self._moment
         memory.P[_DIAGONAL, _DIAGONAL] += extra**2
 
 
