@@ -27,7 +27,7 @@ class Prepared:
     title: str  # the scenario's name and how this one differs from it
     scenario: Scenario
     robot: RobotModel  # as the controller knows it
-    carried: str = ""  # what of the scenario was made to fit this robot
+    carried: str = ""  # what of the scenario was made to fit this robot, and what the controller knows of it
 
     @property
     def nominal_robot(self) -> RobotModel:
@@ -99,6 +99,9 @@ def prepare(
             scenario = with_robot(scenario, robot)
         differences.append(f"robot={robot}")
     scenario, carried = _fitted(name, settings, scenario, robot, needs_path)
+    if robot is not None and scenario.servo.model.robot:
+        known = f"the controller knows {load_robot(scenario.servo.model.robot).name}"
+        carried = "; ".join(filter(None, (carried, known)))
     if is_quick:
         scenario, note = quick(scenario, settings)
         differences.append(f"quick: {note}")

@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 from rich.console import Console
 
-from experiments.cli.prepare import noted_robot
+from experiments.cli.prepare import noted_robot, prepare
 from robots.description.model import load_robot
 from robots.description.robot_file import robot_text
 
@@ -22,3 +22,10 @@ def test_a_copied_robot_file_is_named_and_a_calibrated_robot_is_not(
     assert noted_robot(console, str(file)).name == name
     said = f"sources in the file of {name} are those of another robot" in console.export_text()
     assert said == is_noted
+
+
+def test_it_is_said_what_the_controller_knows_of_another_robot():
+    prepared = prepare("everything-realistic", robot="kr16-realistic")
+    assert prepared.scenario.servo.model.robot == "kr16"
+    assert prepared.note.endswith("the controller knows KUKA KR 16-2")
+    assert "the controller knows" not in prepare("everything", robot="kr16").note

@@ -73,3 +73,13 @@ def test_of_a_calibrated_robot_more_is_known_and_the_same_can_be_seen():
     q = np.random.default_rng(4).uniform(-1.0, 1.0, (3, 6))
     found = model.forward(model.constants(model.mean), model.mean, q)[0]
     np.testing.assert_allclose(found, ErrorKinematics(robot).forward(q, errors), atol=1e-12)
+
+
+def test_a_load_may_be_off_by_more_the_more_a_robot_carries():
+    """Five per cent of 210 kg are ten, which no robot of seven kilograms would believe."""
+    sigmas = {}
+    for name in ("puma560", "irb1200", "kr210"):
+        model = TipModel(ControllerModel(load_robot(name), 2.0), Spread())
+        sigmas[name] = model.sigma[model.M][0]
+    assert sigmas["puma560"] == sigmas["irb1200"] == Spread().payload
+    assert sigmas["kr210"] == pytest.approx(210.0 / 7.0 * Spread().payload)
