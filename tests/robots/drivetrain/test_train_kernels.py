@@ -77,10 +77,10 @@ def joint_torques(
     late = torque_unit * state["motor"]
     rates["motor"] = (command - late) / (train.motor_lag or 1.0) / torque_unit
     motor += late if train.motor_lag else command
-    holds = [part for part in train.frictions if isinstance(part, StickSlipFriction)]
-    motor -= sum(part.torque(speed) for part in train.frictions if part not in holds)
-    for part in holds:
-        motor -= part.holding(speed, motor, train.inertia)
+    motor -= sum(part.torque(speed) for part in train.frictions if not isinstance(part, StickSlipFriction))
+    for part in train.frictions:
+        if isinstance(part, StickSlipFriction):
+            motor -= part.holding(speed, motor, np.asarray(train.inertia))
     return motor, -torque, rates
 
 
@@ -93,10 +93,10 @@ def test_the_compiled_torques_are_those_of_the_parts(trains, seed):
     deflection = rng.normal(size=(2, n)) * [[2e-4], [1e-2]]
     command = rng.normal(size=n) * 50.0
     state = rng.normal(size=row.num_states) * 1e-4
-    found = row.torques(state, tuple(motor), tuple(deflection), command)
-    lags, has_soft, has_play = row.motor_lag.any(), any(t.soft for t in trains), any(t.gap for t in trains)
-    parts = np.split(state, np.cumsum([n * lags, n * has_soft]))
-    rates = np.split(found.state_rate, np.cumsum([n * lags, n * has_soft]))
+    found = row.torques(state, (motor[0], motor[1]), (deflection[0], deflection[1]), command)
+    lags, has_soft = bool(row.motor_lag.any()), any(t.soft for t in trains)
+    has_play, ends = any(t.gap for t in trains), [n * lags, n * (lags + has_soft)]
+    parts, rates = np.split(state, ends), np.split(found.state_rate, ends)
     elements = parts[2].reshape(n, -1)
     for j, train in enumerate(trains):
         own = {
@@ -125,8 +125,12 @@ def test_springs_of_unknown_kinds_are_refused():
         def torque(self, deflection):
             return deflection
 
-        stiffness = scaled = torque
+        def stiffness(self, deflection):
+            return deflection
 
-    row = DriveTrains([JointTrain(Rubber(1.0), 0.0, 1.0)])
+        def scaled(self, factor):
+            return self
+
+    row, still = DriveTrains([JointTrain(Rubber(1.0), 0.0, 1.0)]), (np.zeros(1), np.zeros(1))
     with pytest.raises(TypeError, match="no Rubber"):
-        row.torques(np.zeros(0), (np.zeros(1),) * 2, (np.zeros(1),) * 2, np.zeros(1))
+        row.torques(np.zeros(0), still, still, np.zeros(1))
