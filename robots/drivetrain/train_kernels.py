@@ -76,13 +76,7 @@ def _friction(kind, part, v, applied, inertia):
         else:
             found = part[0] * math.tanh(0.5 * part[1] * speed)
         return found if v > 0.0 else -found
-    viscous, coulomb, breakaway, stribeck_velocity, stopping_time = (
-        part[0],
-        part[1],
-        part[2],
-        part[3],
-        part[4],
-    )
+    viscous, coulomb, breakaway, stribeck_velocity, stopping_time = part[:5]
     driving = applied if applied * v >= 0.0 else 0.0
     needed = driving + inertia / stopping_time * v
     limit = coulomb + (breakaway - coulomb) * math.exp(-((v / stribeck_velocity) ** 2))
