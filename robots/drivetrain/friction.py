@@ -229,3 +229,6 @@ class StickSlipFriction:
     def _sliding(self, velocity: np.ndarray) -> np.ndarray:
         fall = np.exp(-np.square(velocity / self.stribeck_velocity))
         return self.coulomb + (self.breakaway - self.coulomb) * fall
+
+
+Friction = SigmoidFriction | TanhFriction | StribeckFriction | PolynomialFriction | StickSlipFriction

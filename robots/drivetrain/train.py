@@ -14,6 +14,7 @@ import numpy as np
 from robots.drivetrain.dahl import DahlHysteresis
 from robots.drivetrain.efficiency import DirectionalEfficiency
 from robots.drivetrain.friction import (
+    Friction,
     PolynomialFriction,
     SigmoidFriction,
     StickSlipFriction,
@@ -32,8 +33,6 @@ from robots.drivetrain.train_table import (
 )
 
 _ACCELERATION_UNIT = 100.0  # rad/s^2
-
-Friction = SigmoidFriction | TanhFriction | StribeckFriction | PolynomialFriction | StickSlipFriction
 
 
 @dataclass(frozen=True)
@@ -161,7 +160,7 @@ class DriveTrains:
             newton_steps=0 if ratio is None else ratio.newton_steps,
             elements=element_table(self._hysteresis, n),
             efficiencies=efficiency_rows(self._efficiency, n),
-            frictions=friction_rows(self.trains),
+            frictions=friction_rows([train.frictions for train in self.trains]),
             soft_at=-1 if soft is None else self._places[1].start,
             elements_at=self._places[2].start,
             has_lag=self._has_lag,

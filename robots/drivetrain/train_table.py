@@ -1,13 +1,14 @@
 """Drive trains as tables of numbers, which compiled functions take."""
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
 from robots.drivetrain.dahl import DahlHysteresis
 from robots.drivetrain.efficiency import DirectionalEfficiency
 from robots.drivetrain.friction import (
+    Friction,
     PolynomialFriction,
     SigmoidFriction,
     StickSlipFriction,
@@ -15,9 +16,6 @@ from robots.drivetrain.friction import (
     TanhFriction,
 )
 from robots.drivetrain.stiffness import CubicSpring, ExponentialSpring, GearSpring, LimitedSpring
-
-if TYPE_CHECKING:
-    from robots.drivetrain.train import Friction, JointTrain
 
 CUBIC, EXPONENTIAL, LIMITED = range(3)
 # Others come before what holds a joint against the rest.
@@ -62,9 +60,9 @@ def _spring_row(spring: GearSpring) -> tuple[float, ...]:
     raise TypeError(f"a drive train has no {type(spring).__name__}")
 
 
-def friction_rows(trains: "Sequence[JointTrain]") -> np.ndarray:
+def friction_rows(parts: Sequence[tuple[Friction, ...]]) -> np.ndarray:
     """The frictions of all joints as rows of a `TrainTable`, those that hold a joint last."""
-    rows = [(j, *_numbers(part)) for j, train in enumerate(trains) for part in train.frictions]
+    rows = [(j, *_numbers(part)) for j, of_joint in enumerate(parts) for part in of_joint]
     rows.sort(key=lambda row: row[1])
     table = np.zeros((len(rows), 2 + _MOST_NUMBERS))
     for filled, row in zip(table, rows, strict=True):
@@ -72,7 +70,7 @@ def friction_rows(trains: "Sequence[JointTrain]") -> np.ndarray:
     return table
 
 
-def _numbers(part: "Friction") -> tuple[float, ...]:
+def _numbers(part: Friction) -> tuple[float, ...]:
     match part:
         case SigmoidFriction():
             return SIGMOID, part.viscous, part.coulomb, part.steepness
