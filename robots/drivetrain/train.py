@@ -22,7 +22,6 @@ from robots.drivetrain.friction import (
     TanhFriction,
 )
 from robots.drivetrain.ratio import FourierRatio
-from robots.drivetrain.stacked import stacked
 from robots.drivetrain.stiffness import GearSpring, SpringRow
 from robots.drivetrain.train_table import (
     TrainTable,
@@ -30,6 +29,7 @@ from robots.drivetrain.train_table import (
     element_table,
     friction_rows,
     spring_rows,
+    stacked,
 )
 
 _ACCELERATION_UNIT = 100.0  # rad/s^2

@@ -1,7 +1,8 @@
 """Drive trains as tables of numbers, which compiled functions take."""
 
 from collections.abc import Sequence
-from typing import NamedTuple
+from dataclasses import fields, is_dataclass
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -98,3 +99,13 @@ def efficiency_rows(row: DirectionalEfficiency | None, size: int) -> np.ndarray:
 def element_table(row: DahlHysteresis | None, size: int) -> np.ndarray:
     """The elements of hystereses as a `TrainTable` has them."""
     return np.empty((2, size, 0)) if row is None else np.array([row.stiffness, row.width], dtype=float)
+
+
+def stacked(parts: Sequence[Any]) -> Any:
+    """One part with arrays of the parameters of all, along the first axis; parts within parts likewise."""
+    values = {}
+    for entry in fields(parts[0]):
+        if entry.init:
+            each = [getattr(part, entry.name) for part in parts]
+            values[entry.name] = stacked(each) if is_dataclass(each[0]) else np.array(each, dtype=float)
+    return type(parts[0])(**values)

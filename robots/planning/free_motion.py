@@ -13,8 +13,8 @@ import ruckig
 from numpy.polynomial import chebyshev
 from scipy.interpolate import BSpline
 
-from robots.description.friction_line import friction_line
 from robots.description.model import NUM_JOINTS, RobotModel
+from robots.dynamics.friction_line import friction_line
 from robots.planning.arm_expression import ArmExpression
 from robots.planning.joint_path import Curve, PathError, interpolated, nodes
 from robots.planning.limits import MotionLimits

@@ -21,8 +21,8 @@ from pydrake.multibody.plant import MultibodyPlant
 from scipy.optimize import linprog
 from scipy.sparse import csr_array
 
-from robots.description.friction_line import friction_line
 from robots.description.model import NUM_JOINTS, RobotModel
+from robots.dynamics.friction_line import friction_line
 from robots.dynamics.plant import add_robot
 from robots.planning.limits import MotionLimits
 

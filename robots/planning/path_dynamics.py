@@ -13,8 +13,8 @@ import numpy as np
 from pydrake.multibody.plant import MultibodyPlant
 from pydrake.multibody.tree import JacobianWrtVariable, MultibodyForces
 
-from robots.description.friction_line import friction_line
 from robots.description.model import NUM_JOINTS, RobotModel
+from robots.dynamics.friction_line import friction_line
 from robots.dynamics.plant import PlantRobot, add_robot
 from robots.planning.joint_path import Curve, smooth_curve
 

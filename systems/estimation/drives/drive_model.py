@@ -9,8 +9,8 @@ from pydrake.multibody.plant import MultibodyPlant
 from scipy.linalg import expm
 
 from robots.description.error_parameters import NUM_PARAMETERS
-from robots.description.friction_line import friction_line
 from robots.description.model import RobotModel
+from robots.dynamics.friction_line import friction_line
 from robots.dynamics.plant import add_robot
 from systems.controller_model import ControllerModel
 from systems.estimation import kernels

@@ -5,8 +5,8 @@ from pydrake.common.value import Value
 from pydrake.multibody.plant import MultibodyPlant
 from pydrake.systems.framework import Context, DiscreteValues, LeafSystem
 
-from robots.description.friction_line import friction_line
 from robots.description.model import NUM_JOINTS
+from robots.dynamics.friction_line import friction_line
 from robots.dynamics.modes import ModalAnalysis, stretched
 from robots.dynamics.plant import add_robot
 from robots.kinematics.forward import Kinematics, robust_solve

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from robots.description.drive_parts import Cubic
-from robots.description.friction_line import friction_line
 from robots.description.model import NUM_JOINTS, RobotModel, load_robot
+from robots.dynamics.friction_line import friction_line
 from systems.controller_model import ControllerModel
 from systems.feedforward import FEEDFORWARDS, FeedforwardConfig, JointReference
 from systems.feedforward.corrected_inverse.corrected import CorrectedFeedforward

@@ -2,8 +2,8 @@
 
 import pytest
 
-from robots.description.friction_line import friction_line
 from robots.description.model import load_robot
+from robots.dynamics.friction_line import friction_line
 
 
 @pytest.mark.parametrize("name", ["kr16", "kr16-realistic"])
