@@ -231,4 +231,5 @@ class StickSlipFriction:
         return self.coulomb + (self.breakaway - self.coulomb) * fall
 
 
+# What holds a joint against the rest is last.
 Friction = SigmoidFriction | TanhFriction | StribeckFriction | PolynomialFriction | StickSlipFriction

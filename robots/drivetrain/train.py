@@ -7,7 +7,7 @@ import importlib
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property, partial
-from typing import Any
+from typing import Any, get_args
 
 import numpy as np
 
@@ -16,10 +16,7 @@ from robots.drivetrain.efficiency import DirectionalEfficiency
 from robots.drivetrain.friction import (
     Friction,
     PolynomialFriction,
-    SigmoidFriction,
     StickSlipFriction,
-    StribeckFriction,
-    TanhFriction,
 )
 from robots.drivetrain.ratio import FourierRatio
 from robots.drivetrain.stiffness import GearSpring, SpringRow
@@ -286,7 +283,7 @@ class _Beside(GearSpring):
 def _friction_groups(parts: Sequence[tuple[Friction, ...]]) -> list[tuple[Any, Friction]]:
     """Joints with frictions of one kind, and these as one; what holds a joint against the rest is last."""
     groups = []
-    for kind in (SigmoidFriction, TanhFriction, StribeckFriction, PolynomialFriction, StickSlipFriction):
+    for kind in get_args(Friction):
         where = [(i, part) for i, of_joint in enumerate(parts) for part in of_joint if type(part) is kind]
         joints = [i for i, _ in where]
         if len(where) == len(parts) and joints == list(range(len(parts))) and kind is not PolynomialFriction:
