@@ -26,8 +26,8 @@ COLUMNS = 6 * (_FILTERED - 1)
 _HUMPS, _CONSTANTS = slice(16, 37, 4), slice(37, 43)
 DEAD_TIME, MASS, MOMENT = 0, 43, slice(44, 47)
 SIZE = MOMENT.stop
-# Of Coulomb's friction, the spread of what there may be more of it; less where it is learnt early, or the first
-# lap of robots without a hump is twisted more
+# Of Coulomb's friction, the spread of what there may be more of it; less where it is learnt early, or the
+# first lap of robots without a hump is twisted more
 _HUMP, _EARLY_HUMP = 0.3, 0.1
 _SLOW = 0.05  # rad/s, of Stribeck's effect, exp(-|v| / _SLOW) as Tustin has it; assumed
 _SLACK = 0.3  # of Coulomb's friction, by which it may be off while little is known of it
