@@ -35,9 +35,18 @@ TOOL_DISPLACED, LOAD_CHANGED = "tool displaced", "load changed"
 DEAD_TIME_CHANGED, CLOCK_DRIFTS = "dead time changed", "clock drifts"
 FOREIGN_FRAME = "camera frame is another"
 CAMERA_MOVED = "camera moved"
+JOINTS_SHIFTED = "joints shifted"  # against their encoders
 TOOL_OR_CAMERA = "tool or camera displaced"  # until the robot has turned the tool far enough to tell
 PATH_UNSEEN = "path needs more than was shown"
-_UNITS = {LOAD_CHANGED: "kg", DEAD_TIME_CHANGED: "s", CLOCK_DRIFTS: "s/s", FOREIGN_FRAME: "rad"}  # others: m
+IMPLAUSIBLE = "estimate is no robot"  # so many parameters are beyond all bounds: they are kept at them
+_UNITS = {  # others: m
+    LOAD_CHANGED: "kg",
+    DEAD_TIME_CHANGED: "s",
+    CLOCK_DRIFTS: "s/s",
+    FOREIGN_FRAME: "rad",
+    JOINTS_SHIFTED: "rad",
+    IMPLAUSIBLE: "parameters",
+}
 
 
 class Verdict(NamedTuple):
@@ -54,7 +63,7 @@ class Event(NamedTuple):
     """What happened to the robot."""
 
     kind: str  # one of those above
-    size: float  # m, kg, s, s/s or rad
+    size: float  # m, kg, s, s/s or rad, or a number of parameters
     error: float  # m, of the tip where it is known
 
 
@@ -71,6 +80,8 @@ class EventLog:
         PATH_UNSEEN,
         CAMERA_MOVED,
         TOOL_OR_CAMERA,
+        IMPLAUSIBLE,
+        JOINTS_SHIFTED,
     )
 
     def __init__(self) -> None:
@@ -117,6 +128,7 @@ class Innovations:
         powers = np.linspace(-1.0, 1.0, _RECENT)[:, None] ** np.arange(3)
         self._parabolas = np.linalg.qr(powers)[0]
         self.layout = Layout(
+            variances=(6,),  # of the camera, as samples are judged now
             error=(6,),
             spread=(6,),  # what the estimate could be wrong by when these errors were seen, in sigmas
             outliers=(1,),
@@ -132,6 +144,15 @@ class Innovations:
             scatter=(6,),  # variances of the camera, from one sample to the next
             changes=(1,),  # in that mean
         )
+
+    def start(self, memory: SimpleNamespace) -> None:
+        """Writes what is believed before the first sample."""
+        memory.variances[:] = self._variances
+
+    def use(self, memory: SimpleNamespace, variances: np.ndarray) -> None:
+        """Judges by other variances of a sample, (6,), from now on."""
+        memory.variances[:] = variances
+        self.forget(memory)
 
     def is_false_start(
         self, memory: SimpleNamespace, r: np.ndarray, H: np.ndarray, solve: Callable[[], np.ndarray]
@@ -151,7 +172,7 @@ class Innovations:
             return bool((np.abs(r - np.median(memory.first, axis=0)) > _OUTLIER * _MARGIN).any())
         spread = _MARGIN
         if (np.abs(r) > _OUTLIER * _MARGIN).any():
-            spread = np.sqrt(self._variances + _MARGIN**2 + np.einsum("ij,ji->i", H, solve()))
+            spread = np.sqrt(memory.variances + _MARGIN**2 + np.einsum("ij,ji->i", H, solve()))
         if (np.abs(r) < _OUTLIER * spread).all() or memory.outliers[0] >= _LONGEST_OUTLIER:
             memory.outliers[0] = 0.0
             return False
@@ -184,22 +205,22 @@ class Innovations:
         memory.pause[0] = max(0.0, memory.pause[0] - 1.0)
         means = memory.error, memory.spread, memory.recent, memory.by_model
         by_model, number = None, 1  # what the estimate may be wrong by, in variances of the camera
-        size = kernels.innovations.enter_usual(r, self._variances, _SUSPICIOUS, _share(1), *means)
+        size = kernels.innovations.enter_usual(r, memory.variances, _SUSPICIOUS, _share(1), *means)
         if size < 0.0:
-            by_model = np.einsum("ij,ji->i", H, solve()) / self._variances
+            by_model = np.einsum("ij,ji->i", H, solve()) / memory.variances
             number = self._number(memory, r, by_model)
             if not number:
                 return Verdict(is_outlier=True)
-            size = kernels.innovations.enter(r, by_model, number, _share(number), self._variances, *means)
+            size = kernels.innovations.enter(r, by_model, number, _share(number), memory.variances, *means)
         memory.outliers[0] = 0.0
         memory.held[0] += number
         size *= _AVERAGING
         if size > _CALM:
             if by_model is None:
-                by_model = np.einsum("ij,ji->i", H, solve()) / self._variances
+                by_model = np.einsum("ij,ji->i", H, solve()) / memory.variances
             memory.by_model[-1] = by_model
             by_model = np.maximum(by_model, memory.spread**2)
-            mean = np.abs(memory.error) / np.sqrt(self._variances)
+            mean = np.abs(memory.error) / np.sqrt(memory.variances)
             size = (mean / np.sqrt(_AVERAGING**-2 + _MODEL_SHARE**2 * by_model)).max()
         if size > _CALM and memory.pause[0] == 0.0 and self._is_sudden(memory):
             return Verdict(has_jumped=True)
@@ -215,10 +236,10 @@ class Innovations:
 
         Samples that were left out count as soon as they agree, or are too many in a row to be outliers.
         """
-        if kernels.innovations.largest(r, self._variances * (1.0 + by_model)) <= _OUTLIER:
+        if kernels.innovations.largest(r, memory.variances * (1.0 + by_model)) <= _OUTLIER:
             return 1
         # Reflections lie anywhere; a tool that was displaced is seen at the same place again.
-        is_again = kernels.innovations.largest(r - memory.left_out, self._variances) < _OUTLIER
+        is_again = kernels.innovations.largest(r - memory.left_out, memory.variances) < _OUTLIER
         memory.left_out[:] = r
         if memory.outliers[0] < _LONGEST_OUTLIER and not is_again:
             memory.outliers[0] += 1.0
@@ -238,7 +259,7 @@ class Innovations:
             memory.last[:] = r
         share = 1.0 / min(max(float(memory.changes[0]), 1.0), _SCATTER)
         means = memory.last, memory.scatter
-        kernels.innovations.scatter(r, *means, self._variances, _MOST_SCATTER, share)
+        kernels.innovations.scatter(r, *means, memory.variances, _MOST_SCATTER, share)
         memory.changes[0] += 1.0
         return bool(memory.changes[0] >= _LEAST_SCATTER)
 
@@ -249,7 +270,7 @@ class Innovations:
         """
         if memory.changes[0] < _LEAST_SCATTER:
             return 1.0
-        return float((memory.scatter / self._variances).reshape(2, 3).sum(axis=1).max()) / 3.0
+        return float((memory.scatter / memory.variances).reshape(2, 3).sum(axis=1).max()) / 3.0
 
     def _is_sudden(self, memory: SimpleNamespace) -> bool:
         """Whether a step explains the last samples better than a parabola does."""
@@ -262,7 +283,7 @@ class Innovations:
     def _in_sigmas(self, memory: SimpleNamespace) -> np.ndarray:
         """The last samples in units of what both camera and estimate may be wrong by."""
         by_model = np.maximum(memory.by_model, memory.by_model[-1])
-        return memory.recent / np.sqrt(self._variances * (1.0 + by_model))
+        return memory.recent / np.sqrt(memory.variances * (1.0 + by_model))
 
     def forget(self, memory: SimpleNamespace) -> None:
         """Begins the mean anew."""
@@ -278,8 +299,8 @@ class Innovations:
         """Says what the step among the last samples looks like, and begins anew."""
         before = 1 + int(_with_step(self._in_sigmas(memory)).argmin())
         error = memory.recent[before:].mean(axis=0) - memory.recent[:before].mean(axis=0)
-        whitened = error / np.sqrt(self._variances)
-        by_load = H[:, model.M] / np.sqrt(self._variances)[:, None]
+        whitened = error / np.sqrt(memory.variances)
+        by_load = H[:, model.M] / np.sqrt(memory.variances)[:, None]
         change = np.linalg.lstsq(by_load[:, :1], whitened, rcond=None)[0]
         left = whitened - by_load[:, :1] @ change
         self.rest(memory)

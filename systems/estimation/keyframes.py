@@ -27,16 +27,15 @@ class Keyframes:
     grows without bound.
     """
 
-    def __init__(self, model: TipModel, weights: np.ndarray, length: int = 512, batch: int = 5) -> None:
+    def __init__(self, model: TipModel, length: int = 512, batch: int = 5) -> None:
         """Lays out the memory.
 
         Args:
             model: of the tip.
-            weights: of the six entries of a pose error, one over their variances.
             length: how many keyframes there can be.
             batch: how many are worked through in a tick.
         """
-        self._model, self._weights, self._length, self._batch = model, weights, length, batch
+        self._model, self._length, self._batch = model, length, batch
         n = model.size
         self.layout = Layout(
             rows=(length, SHAPES + 6 * NUM_SHAPES * model.has_gear_errors),
@@ -113,6 +112,11 @@ class Keyframes:
         memory.b += opened.b
         return True
 
+    def begin_again(self, memory: SimpleNamespace) -> None:
+        """Has all keyframes read anew, though no parameter has moved: they weigh something else."""
+        memory.position[0] = -1.0
+        memory.xi_pass[:] = np.inf
+
     def is_settled(self, memory: SimpleNamespace, xi: np.ndarray) -> bool:
         """Whether the sum is linear where the parameters are.
 
@@ -125,7 +129,12 @@ class Keyframes:
         return kernels.tip.largest_step(xi, before, self._model.sigma, self._model.K.start)
 
     def work(
-        self, memory: SimpleNamespace, constants: Callable[[], Constants], xi: np.ndarray, tolerance: float
+        self,
+        memory: SimpleNamespace,
+        constants: Callable[[], Constants],
+        xi: np.ndarray,
+        weights: np.ndarray,
+        tolerance: float,
     ) -> bool:
         """Goes on with a pass, or begins one if a parameter has moved by more than the tolerance (m, rad).
 
@@ -133,6 +142,7 @@ class Keyframes:
             memory: of the layout.
             constants: gives the geometry at xi; asked if there is something to read.
             xi: the estimate.
+            weights: of the six entries of a pose error, one over their variances.
             tolerance: of the parameters.
 
         Returns:
@@ -156,7 +166,7 @@ class Keyframes:
         b = memory.b_leaving if is_leaving else memory.b_pass
         model = self._model
         arm = constants(), model.unknowns(model.full(xi)), model.loads.masses
-        kernels.keyframes.read(*arm, xi, memory.rows, position, until, self._weights, A, b)
+        kernels.keyframes.read(*arm, xi, memory.rows, position, until, weights, A, b)
         memory.position[0] = until
         if until < end:
             return False
@@ -180,3 +190,10 @@ def open_keyframe(memory: SimpleNamespace) -> OpenKeyframe:
     """The keyframe that a `TipEstimator` adds samples to, as views of its memory."""
     sums = memory.A_open, memory.b_open, memory.samples, memory.weight
     return OpenKeyframe(*sums, memory.first_theta, memory.sums, memory.sum_y, memory.sum_H)
+
+
+def forget_open(memory: SimpleNamespace) -> None:
+    """Empties it."""
+    opened = memory.A_open, memory.b_open, memory.samples, memory.weight, memory.sums
+    for part in (*opened, memory.sum_y, memory.sum_H):
+        part[:] = 0.0

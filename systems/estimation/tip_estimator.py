@@ -1,18 +1,19 @@
 """From pairs of encoder positions and camera poses of one instant to the parameters of the robot."""
 
 import math
-from dataclasses import dataclass, field
 from types import SimpleNamespace
 
 import numpy as np
 
 from systems.estimation import kernels
 from systems.estimation.arm_geometry import Constants
-from systems.estimation.camera_moves import CameraMoves
-from systems.estimation.camera_or_tool import CameraOrTool
+from systems.estimation.camera.camera_moves import CameraMoves
+from systems.estimation.camera.camera_noise import CameraNoise
+from systems.estimation.camera.displacement import Displacement
 from systems.estimation.events import (
     CAMERA_MOVED,
     CLOCK_DRIFTS,
+    JOINTS_SHIFTED,
     LOAD_CHANGED,
     TOOL_DISPLACED,
     TOOL_OR_CAMERA,
@@ -20,36 +21,22 @@ from systems.estimation.events import (
     Innovations,
 )
 from systems.estimation.gear_errors import NUM_SHAPES
-from systems.estimation.keyframes import Keyframes, open_keyframe
+from systems.estimation.keyframes import Keyframes, forget_open, open_keyframe
 from systems.estimation.memory import Layout
-from systems.estimation.tip_model import NO_SHAPES, Pair, Prediction, Spread, TipModel
+from systems.estimation.tip_estimator_config import TipEstimatorConfig
+from systems.estimation.tip_model import NO_SHAPES, Pair, Prediction, TipModel
 from systems.estimation.unmodelled import Doubts, Unmodelled
 
 _AGAIN = 500  # samples, in which a second event says that the first was explained wrongly
 _OF_THE_LOAD = 0.1  # of its spread, when a tool was displaced
+_A_LITTLE = 0.2  # of its spread, by which something may be displaced that nobody has seen move
 _DOUBT = 3.0  # times wider, what is known of everything, where it does not hold
 _TRUST = 0.02  # m or rad, the largest step from where the past was read
 _KEEP_EVERY = 10  # samples, between two notes of what is known
 _DRIFT_EVERY = 50  # samples, between two looks whether the clock drifts, halfway between two such notes
-# s/s; and how sure it has to be, as what no parameter describes adds up.
-_LEAST_DRIFT, _DRIFT_SIGMAS = 1e-4, 8.0
+_LEAST_DRIFT, _DRIFT_SIGMAS = 1e-4, 8.0  # s/s; and how sure it has to be: what nothing describes adds up
 _CALM_WEIGHT = 0.2  # of a sample, below which it says nothing of events or of the camera
 _CLOSE_AT = (5, 20, 60)  # samples: the first linearisations are poor
-
-
-@dataclass
-class TipEstimatorConfig:
-    """What is known of robot and camera before anything is measured."""
-
-    spread: Spread = field(default_factory=Spread)
-    position_sigma: float = 60e-6  # m, of a camera sample and of what no parameter describes
-    rotation_sigma: float = 2.1e-4  # rad
-    keyframe_step: float = 0.012  # rad, samples nearer than this in every joint are merged
-    keyframe_samples: int = 100  # the most samples in one
-    relinearise: float = 3e-4  # m or rad, a change of a parameter after which the past is read anew
-    geometry_step: float = 1e-4  # m or rad, within which poses are linear in the parameters
-    calm: float = 0.05  # m/s^2, of the tip by parameters that are led in: more makes samples count less
-    test_after: int = 250  # samples before events are looked for
 
 
 class TipEstimator:
@@ -64,10 +51,10 @@ class TipEstimator:
         self.model, self._config = model, config
         variances = np.repeat([config.rotation_sigma, config.position_sigma], 3) ** 2
         self.weights = 1.0 / variances
-        self._keyframes = Keyframes(model, self.weights)
-        self._innovations, self._unmodelled = Innovations(variances), Unmodelled(variances)
-        self._camera_or_tool = CameraOrTool(variances, model.size)
-        self._camera = CameraMoves(model.world_directions())
+        self._keyframes, self._camera = Keyframes(model), CameraMoves(model.world_directions())
+        self._noise, self._innovations = CameraNoise(variances), Innovations(variances)
+        self._unmodelled = Unmodelled(joints=6 if model.has_gear_errors else 0)
+        self._displacement = Displacement(model.size, model.M)
         n = model.size
         self.layout = Layout(
             xi=(n,),
@@ -89,10 +76,11 @@ class TipEstimator:
             sum_y=(6,),
             sum_H=(6, n),
             keyframes=self._keyframes.layout,
+            noise=self._noise.layout,
             innovations=self._innovations.layout,
             unmodelled=self._unmodelled.layout,
             camera=self._camera.layout,
-            after_step=self._camera_or_tool.layout,
+            after_step=self._displacement.layout,
         )
         self._constants: Constants | None = None
 
@@ -103,6 +91,8 @@ class TipEstimator:
         memory.first_time[0] = memory.last_time[0] = np.nan
         memory.keyframes.held[0] = self.model.prior[self.model.D, self.model.D]
         self._keyframes.reset(memory.keyframes, self.model.prior, memory.xi)
+        self._noise.start(memory.noise)
+        self._innovations.start(memory.innovations)
 
     def x(self, memory: SimpleNamespace) -> np.ndarray:
         """The unknowns in their units, shape (n,)."""
@@ -124,16 +114,15 @@ class TipEstimator:
         return 0.0 if math.isnan(first) else time - first
 
     def variance_factor(self, memory: SimpleNamespace) -> float:
-        """The measured variance of the camera in units of the one that is believed."""
+        """The measured variance of the camera in units of the one by which samples are weighted."""
         return self._innovations.noise_factor(memory.innovations)
 
     def covariance(self, memory: SimpleNamespace) -> np.ndarray:
         """Covariance of the unknowns in units of their spreads, shape (n, n).
 
-        The camera's noise is measured: with f times the variance that is believed, weights stay what they
-        are, and P (A_0 + f (A - A_0)) P is the covariance of what they give, P = A^-1. A noisier camera than
-        is believed casts doubt on what was known before, too: then it is f P. Where A_0 has been taken back
-        since, because something happened, f is not counted below 1.
+        With f times the noise by which samples are weighted, as the camera shows it, P (A_0 + f (A - A_0)) P
+        is the covariance of what they give, P = A^-1. An f above 1 casts doubt on what was known before, too:
+        then it is f P. Where A_0 has been taken back since, after an event, it is not counted below 1.
         """
         P = np.linalg.inv(memory.keyframes.A + memory.A_open)
         factor = self.variance_factor(memory)
@@ -180,25 +169,25 @@ class TipEstimator:
     def tip_covariance(self, memory: SimpleNamespace, pair: Pair) -> np.ndarray:
         """Covariance of the predicted tip, rotation (rad^2) first, shape (6, 6).
 
-        To what the unknowns may be wrong by, H P H^T, the steps of the encoders and what gears may be off
-        by add J S J^T, and the camera what it sees beyond all that. As long as nothing tells a displaced
-        tool from a camera that was moved, the tip is where it is seen or, as likely, where it would be
-        without the step: with the way d from there, that adds d d^T / 2.
+        To what the unknowns may be wrong by, H P H^T, the steps of the encoders and what gears are seen to
+        be off by add J S J^T, and the camera what it sees beyond all that. As long as nothing tells a
+        displaced tool from a camera that was moved, the tip is where it is seen or, as likely, where it
+        would be without the step: with the way d from there, that adds d d^T / 2.
         """
         H, x = self.predict(memory, pair).H[0], self.x_robot(memory)
         covariance = H @ self.covariance_of_robot(memory) @ H.T
-        covariance += self._by_angles(memory, x, pair)
-        covariance += np.diag(self._unmodelled.variances(memory.unmodelled))
+        J, by_gears = self._by_gears(memory, x, pair)
+        angles = self._unmodelled.joint_variances(memory.unmodelled, by_gears) + pair.rounding**2
+        covariance += (J * angles) @ J.T + np.diag(self._unmodelled.variances(memory.unmodelled))
         if memory.after_step.is_open[0]:
             d = H @ (memory.xi - memory.after_step.xi_before)
             covariance += 0.5 * np.outer(d, d)
         return covariance
 
-    def _by_angles(self, memory: SimpleNamespace, x: np.ndarray, pair: Pair) -> np.ndarray:
-        """Covariance of the tip, (6, 6), by what gears and readings of the joints may be off by."""
-        angles = self.model.gear_variances(x, pair.loads, pair.states) + pair.rounding**2
+    def _by_gears(self, memory: SimpleNamespace, x: np.ndarray, pair: Pair) -> tuple[np.ndarray, ...]:
+        """The Jacobian of the tip, and what gears are said to be off by, variances of the joints, (6,)."""
         J = self.model.jacobian(self._constants_at(memory, x), x, pair.theta)
-        return (J * angles) @ J.T
+        return J, self.model.gear_variances(x, pair.loads, pair.states)
 
     def add(self, memory: SimpleNamespace, pair: Pair) -> Event | None:
         """Learns from one pair; says if something happened to the robot."""
@@ -231,26 +220,29 @@ class TipEstimator:
                 return None  # a few samples later it is known what they mean
             if verdict.has_jumped and weight > _CALM_WEIGHT:
                 event = self._innovations.explain(innovations, H, self.model)
-                self._camera_or_tool.begin(memory.after_step, may_be_camera=event.kind != LOAD_CHANGED)
-                if event.kind == TOOL_DISPLACED and memory.after_step.is_open[0]:
+                is_open = self._displacement.begin(memory.after_step, is_load=event.kind == LOAD_CHANGED)
+                if event.kind == TOOL_DISPLACED and is_open:
                     event, memory.after_step.is_event[0] = event._replace(kind=TOOL_OR_CAMERA), 1.0
                 self._widen(memory, event)
             elif verdict.has_drifted and weight > _CALM_WEIGHT:
                 self._innovations.forget(innovations)
-                self._camera_or_tool.begin(memory.after_step)
+                self._displacement.begin(memory.after_step)
                 if memory.was_settled[0]:
                     self._doubt(memory)
             elif verdict.is_calm and not memory.after_step.samples[0] and memory.count[0] % _KEEP_EVERY == 0:
                 known = memory.keyframes.A + memory.A_open
-                self._camera_or_tool.keep(memory.after_step, known, memory.xi)
+                self._displacement.keep(memory.after_step, known, memory.xi)
             elif memory.after_step.samples[0]:
                 before = r + H @ (memory.xi - memory.after_step.xi_before)
-                found = self._camera_or_tool.found(memory.after_step, before, pair.X_WE)
-                if found == CAMERA_MOVED:
-                    return self._take_back(memory, pair.X_WE)
+                at = (H, model.jacobian(self._constants_at(memory, x), x, pair.theta)), pair.X_WE
+                found = self._displacement.found(memory.after_step, before, *at, memory.noise.weights)
+                if found in (CAMERA_MOVED, JOINTS_SHIFTED):
+                    return self._take_back(memory, found, pair.X_WE)
                 if found == TOOL_DISPLACED and memory.after_step.is_event[0]:
-                    size = self._camera_or_tool.size(memory.after_step, found, pair.X_WE[:3, 3])
+                    size = self._displacement.size(memory.after_step, found, pair.X_WE[:3, 3])
                     event = Event(found, size, size)
+        if self._noise.hear(memory.noise, r, H, memory.xi, pair):
+            self._weigh_anew(memory)
         self._take(memory, (r, gears, H), pair, shapes, weight)
         if event is None and memory.count[0] % _DRIFT_EVERY == _DRIFT_EVERY // 2:
             event = self._look_for_drift(memory)
@@ -272,16 +264,13 @@ class TipEstimator:
         """
         memory.count[0] += 1.0
         is_long = memory.samples[0] + 1.0 >= self._config.keyframe_samples
-        is_closing = is_long or int(memory.count[0]) in _CLOSE_AT
         since_first = self._since_first(memory, pair.time)
         seen = pair.theta, pair.motion, pair.twist, since_first, NO_SHAPES if shapes is None else shapes
-        keyframe = open_keyframe(memory)
         past, model = memory.keyframes, self.model
         sums = past.A, past.b, past.xi_sum, model.sigma, model.K.start
-        limits = -1.0 if is_closing else self._config.keyframe_step, _TRUST
-        r, gears, H = innovation
-        take = kernels.information.take
-        if take(r, gears, H, memory.xi, seen, self.weights, weight, keyframe, sums, limits):
+        limits = -1.0 if is_long or memory.count[0] in _CLOSE_AT else self._config.keyframe_step, _TRUST
+        sample = *innovation, memory.xi, seen, memory.noise.weights, weight
+        if kernels.information.take(*sample, open_keyframe(memory), sums, limits):
             self._close(memory)
             self._solve(memory)
 
@@ -315,14 +304,23 @@ class TipEstimator:
         if is_put_off:
             return
         keyframes, tolerance = memory.keyframes, self._config.relinearise
-        if self._keyframes.work(keyframes, lambda: self.constants(memory), memory.xi, tolerance):
+        at = memory.xi, memory.noise.weights
+        if self._keyframes.work(keyframes, lambda: self.constants(memory), *at, tolerance):
             self._solve(memory)
+
+    def _weigh_anew(self, memory: SimpleNamespace) -> None:
+        """The camera turns out to be noisier or better: what it has shown so far weighs less or more."""
+        self._innovations.use(memory.innovations, memory.noise.variances)
+        self._unmodelled.rest(memory.unmodelled)
+        if memory.samples[0]:
+            self._close(memory)
+        self._keyframes.begin_again(memory.keyframes)
 
     def _close(self, memory: SimpleNamespace) -> None:
         """Makes the open samples a keyframe."""
         constants = self.constants(memory)
         if self._keyframes.close(memory.keyframes, constants, memory.xi, open_keyframe(memory)):
-            self._forget_open(memory)
+            forget_open(memory)
 
     def _solve(self, memory: SimpleNamespace) -> None:
         # Half of the square of a step is what it leaves of samples that are known far better: small steps
@@ -341,32 +339,36 @@ class TipEstimator:
 
     def _doubts(self, memory: SimpleNamespace, H: np.ndarray, pair: Pair) -> Doubts:
         memory.is_busy[0] = 1.0
-        by_model, by_gears = (H * self._solve_columns(memory, H).T).sum(axis=1), np.zeros(6)
-        if self.model.has_gear_errors:  # nothing is said of encoders here
-            by_gears = np.diag(self._by_angles(memory, self.x(memory), pair))
-        return Doubts(self.variance_factor(memory), by_model, by_gears)
+        factor, by_model = self.variance_factor(memory), H @ self._solve_columns(memory, H)
+        noise, by_model = factor * memory.noise.variances, max(1.0, factor) * by_model
+        if not self.model.has_gear_errors:
+            return Doubts(noise, by_model, np.zeros((6, 6)), np.empty((0, 6)))
+        J, by_gears = self._by_gears(memory, self.x(memory), pair)
+        return Doubts(noise, by_model, (J * by_gears) @ J.T, np.linalg.pinv(J))
 
     def _doubt(self, memory: SimpleNamespace) -> None:
-        """What was learnt does not hold where the robot is now, though nothing happened: it weighs less."""
+        """What was learnt does not hold where the robot is now: it weighs less, but no less than priors."""
         self._innovations.forget(memory.innovations)
-        self._keyframes.reset(memory.keyframes, (memory.keyframes.A + memory.A_open) / _DOUBT**2, memory.xi)
-        self._forget_open(memory)
+        A = (memory.keyframes.A + memory.A_open + (_DOUBT**2 - 1.0) * self.model.prior) / _DOUBT**2
+        P = np.linalg.inv(A) + self.model.displacement(_A_LITTLE, _A_LITTLE)
+        self._begin_from(memory, np.linalg.inv(P), memory.xi)
 
     def _widen(self, memory: SimpleNamespace, event: Event) -> None:
-        """Something happened: what was known stays, but for the tool and the load.
+        """Something happened: what was known stays, but for what may be displaced, and the load.
 
         A displaced tool leaves the load alone, unless that has not explained what came soon after it.
         """
         again = memory.count[0] - memory.event_at[0] < _AGAIN
         memory.event_at[0] = memory.count[0]
-        share = 1.0 if again or event.kind == LOAD_CHANGED else _OF_THE_LOAD
-        tool = self.model.tool_directions()
-        self._open(memory, share, tool @ tool.T)
+        is_load = event.kind == LOAD_CHANGED
+        others = self.model.displacement(1.0, 0.0 if is_load else _A_LITTLE)
+        self._open(memory, 1.0 if again or is_load else _OF_THE_LOAD, others)
 
     def open_load(self, memory: SimpleNamespace) -> None:
         """Takes what is known of the load back, and nothing else: the motors say that it may have changed."""
         self._innovations.forget(memory.innovations)
         self._unmodelled.rest(memory.unmodelled)
+        memory.after_step.samples[0] = 0.0
         self._open(memory, 1.0, 0.0)
 
     def _open(self, memory: SimpleNamespace, share: float, others: np.ndarray | float) -> None:
@@ -375,26 +377,24 @@ class TipEstimator:
         P = np.linalg.inv(memory.keyframes.A + memory.A_open) + others
         load = np.zeros(model.size)
         load[model.M] = share * model.changed_load
-        A = np.linalg.inv(P + np.diag(load**2))
-        A = 0.5 * (A + A.T)
-        self._keyframes.reset(memory.keyframes, A, memory.xi)
-        self._forget_open(memory)
+        self._begin_from(memory, np.linalg.inv(P + np.diag(load**2)), memory.xi)
 
-    def _take_back(self, memory: SimpleNamespace, X_WE: np.ndarray) -> Event:
-        """It was the camera: what was known before it moved holds of the robot, but not of where it is seen.
+    def _take_back(self, memory: SimpleNamespace, found: str, X_WE: np.ndarray) -> Event:
+        """It was not the tool: what was known before the step holds, but for the camera or for joints' zeros.
 
-        So the unknowns follow what is seen, as after a move of the base; see `CameraMoves`.
+        The unknowns follow what a camera sees that was moved, as after a move of the base; see `CameraMoves`.
         """
-        before = memory.after_step
-        A = self._camera.begin(memory.camera, before.A_before, before.xi_before)
+        before, zeros = memory.after_step, self.model.joint_directions()
+        if found == CAMERA_MOVED:
+            A = self._camera.begin(memory.camera, before.A_before, before.xi_before)
+        else:
+            A = np.linalg.inv(np.linalg.inv(before.A_before) + zeros @ zeros.T)
         self._innovations.rest(memory.innovations)
-        memory.xi[:] = before.xi_before
-        self._keyframes.reset(memory.keyframes, A, before.xi_before)
-        self._forget_open(memory)
-        return Event(CAMERA_MOVED, self._camera_or_tool.size(before, CAMERA_MOVED, X_WE[:3, 3]), 0.0)
+        self._begin_from(memory, A, before.xi_before)
+        return Event(found, self._displacement.size(before, found, X_WE[:3, 3]), 0.0)
 
-    @staticmethod
-    def _forget_open(memory: SimpleNamespace) -> None:
-        opened = memory.A_open, memory.b_open, memory.samples, memory.weight, memory.sums
-        for part in (*opened, memory.sum_y, memory.sum_H):
-            part[:] = 0.0
+    def _begin_from(self, memory: SimpleNamespace, A: np.ndarray, xi: np.ndarray) -> None:
+        """Goes on with the information A about xi, and without keyframes."""
+        memory.xi[:] = xi
+        self._keyframes.reset(memory.keyframes, 0.5 * (A + A.T), memory.xi)
+        forget_open(memory)

@@ -20,6 +20,12 @@ HELD = 1e5  # information on the drift of a clock as long as nothing shows that 
 NO_SHAPES = np.empty((0, 6))
 _CHANGED_LOAD = np.array([4.0, 0.3, 0.3, 0.3])  # kg and kg m, of a robot that carries 7 kg
 _BASE = 0  # the body whose placement in the world it is
+# What no robot of any kind is, nor looks like: beyond it nothing may be commanded by an estimate.
+_SHIFT, _ANGLE = 0.15, 0.4  # m and rad, by which a frame may be elsewhere
+_SOFTEST = 8.0  # times the compliance that is believed
+_HEAVIEST = 3.0  # times the largest mass that a robot may carry; at most half a metre from its flange
+_LATEST, _FASTEST = 1.0, 1e-2  # s and s/s, by which the camera's clock may be off
+_LARGEST_ERROR = 5e-3  # rad, of a gear
 _STAYS = 0.02  # of the spread, by which what was measured of a robot may have changed since
 
 
@@ -118,7 +124,8 @@ class TipModel:
             shares = np.ones((NUM_SHAPES, NUM_JOINTS))
             shares[SHAPE_NAMES.index("gap")] = OPEN
             self.sigma[self.E] = spread.gear_error * shares.ravel()
-        self._tool, self._world = self._directions(TOOL), self._directions(_BASE)
+        self._tool, self._world, self._zeros = (self._directions(body) for body in (TOOL, _BASE, None))
+        self._least, self._most = self._plausible_range()
         self.prior = np.eye(self.size)  # information, in units of the spreads
         self.prior[self.D, self.D] = HELD
         known = known_before(robot, drawn, chosen) if robot.is_calibrated else None
@@ -135,6 +142,19 @@ class TipModel:
         P = np.linalg.inv(self.prior)
         P[np.ix_(entries, entries)] = scaled + _STAYS**2 * np.eye(len(entries))
         self.prior = np.linalg.inv(P)
+
+    def _plausible_range(self) -> tuple[np.ndarray, np.ndarray]:
+        """The least and the largest value of each unknown, (n,) each."""
+        most = np.empty(self.size)
+        most[self.G] = [_SHIFT if self.parameters[i].unit == "m" else _ANGLE for i in self.chosen]
+        heaviest = _HEAVIEST * max(self.robot.payload.largest_mass, self.mean[self.M][0], 1.0)
+        most[self.K], most[self.M] = _SOFTEST, heaviest * np.array([1.0, 0.5, 0.5, 0.5])
+        most[self.C], most[self.D], most[self.E] = _LATEST, _FASTEST, _LARGEST_ERROR
+        return -most, most  # springs and loads make up for what no parameter describes, and may be below zero
+
+    def plausible(self, x: np.ndarray) -> np.ndarray:
+        """The unknowns (n,), each within what robots are."""
+        return np.minimum(np.maximum(x, self._least), self._most)
 
     def full(self, xi: np.ndarray) -> np.ndarray:
         """The unknowns in their units from those in units of their spreads, shape (n,) both."""
@@ -320,12 +340,22 @@ class TipModel:
         """A displaced base in units of the spreads: columns as of the tool, about axes of the world."""
         return self._world
 
-    def _directions(self, body: int) -> np.ndarray:
+    def joint_directions(self) -> np.ndarray:
+        """Joints whose links have slipped against their encoders: columns for 5 mrad of each joint."""
+        return self._zeros
+
+    def displacement(self, tool: float, others: float) -> np.ndarray:
+        """Covariance, (n, n), by a displaced tool and by camera and joints, by shares of spreads."""
+        B, C = self._tool, np.hstack((self._world, self._zeros))
+        return tool**2 * B @ B.T + others**2 * C @ C.T
+
+    def _directions(self, body: int | None) -> np.ndarray:
+        """Of a body's placement, or of the zeros of all joints."""
         found = self.identifiable
         independent, dependent = found.independent.tolist(), found.dependent.tolist()
         columns = []
         for i, entry in enumerate(self.parameters):
-            if entry.body != body:
+            if entry.kind != "offset" if body is None else entry.body != body:
                 continue
             column = np.zeros(self.size)
             size = 2e-3 if entry.unit == "m" else 5e-3

@@ -11,13 +11,18 @@ from systems.estimation.memory import Layout
 _BLOCK = 24  # samples of a mean: a tenth of a second at 4 ms, in which a robot hardly changes what it lacks
 _KEPT = 1.0 - 1.0 / 100.0  # of the weight of the blocks before, from one to the next
 
+# Of the variance that gears are said to have, what is left at least, however little of it is seen: it comes
+# where teeth cross their gap, seldom, and then all of it.
+_LEAST_OF_GEARS = 0.4
+
 
 class Doubts(NamedTuple):
-    """What an innovation may contain, as far as that is known."""
+    """What an innovation may contain, as far as that is known; covariances of the tip, rotation first."""
 
-    factor: float  # of the camera's variance, in units of the one that is believed
-    by_model: np.ndarray  # (6,), variances of the tip by the estimate, rotation first
-    by_gears: np.ndarray  # (6,), by what gears may be off by in a whole block
+    noise: np.ndarray  # (6,), variances of the camera as they are measured
+    by_model: np.ndarray  # (6, 6), by the estimate
+    by_gears: np.ndarray  # (6, 6), by what gears may be off by in a whole block
+    to_joints: np.ndarray  # (k, 6), from errors of the tip to those of joints; k is 6, or 0 if none are asked
 
 
 class Unmodelled:
@@ -27,18 +32,24 @@ class Unmodelled:
     and the mean of n of them would have a variance of (R + H P H^T) / n. What a model lacks is nearly the
     same in a whole block and adds its square to that of the mean. Blocks count by how well they show it:
     early ones, when little was known, hardly at all.
+
+    It is looked for along the axes of the tip, turns together and shifts together, and in each joint: gears
+    of a wrist that are off by more than they are said to be turn the tool where the others hardly do.
     """
 
-    def __init__(self, variances: np.ndarray) -> None:
-        """Takes the variances of one sample, (6,), rotation first."""
-        self._variances = variances
+    def __init__(self, joints: int = 0) -> None:
+        """Takes how many joints are looked at."""
+        self._joints = joints
         self.layout = Layout(
             sums=(6,),
             samples=(1,),
-            by_model=(6,),  # what the estimate could be wrong by when the block began; 0 if that is not known
-            by_gears=(6,),  # likewise
-            excess=(2,),  # weighted sums over the blocks, of turns and of shifts
-            weights=(2,),
+            to_joints=(joints, 6),  # when the block began
+            # What the estimate could be wrong by then along axes and in joints; 0 if that is not known
+            by_model=(6 + joints,),
+            by_gears=(6 + joints,),  # likewise
+            excess=(2 + joints,),  # weighted sums over the blocks, of turns, of shifts, of each joint
+            weights=(2 + joints,),
+            by_joints=(joints,),  # weighted sums of what their gears were said to be off by
         )
 
     def add(self, memory: SimpleNamespace, r: np.ndarray, doubts: Callable[[], Doubts]) -> None:
@@ -53,16 +64,19 @@ class Unmodelled:
         memory.samples[0] += 1.0
         if memory.samples[0] < _BLOCK:
             return
-        factor, by_model, by_gears = doubts()
+        noise, by_model, by_gears, to_joints = doubts()
         if memory.by_model[0] > 0.0:
-            expected = (factor * self._variances + max(1.0, factor) * memory.by_model) / _BLOCK
-            expected += memory.by_gears
-            excess = (memory.sums / _BLOCK) ** 2 - expected
+            rows = _rows(memory.to_joints)
+            expected = (rows**2 @ noise + memory.by_model) / _BLOCK + memory.by_gears
+            excess = (rows @ memory.sums / _BLOCK) ** 2 - expected
             weights = 0.5 / expected**2  # one over the variance of a squared normal number
-            memory.excess[:] = _KEPT * memory.excess + (weights * excess).reshape(2, 3).sum(axis=1)
-            memory.weights[:] = _KEPT * memory.weights + weights.reshape(2, 3).sum(axis=1)
-        memory.sums[:], memory.samples[0] = 0.0, 0.0
-        memory.by_model[:], memory.by_gears[:] = by_model, by_gears
+            memory.excess[:] = _KEPT * memory.excess + _together(weights * excess)
+            memory.weights[:] = _KEPT * memory.weights + _together(weights)
+            memory.by_joints[:] = _KEPT * memory.by_joints + (weights * memory.by_gears)[6:]
+        memory.sums[:], memory.samples[0], memory.to_joints[:] = 0.0, 0.0, to_joints
+        rows = _rows(to_joints)
+        memory.by_model[:] = (rows @ by_model * rows).sum(axis=1)
+        memory.by_gears[:] = (rows @ by_gears * rows).sum(axis=1)
 
     def rest(self, memory: SimpleNamespace) -> None:
         """Leaves out the present block and the next one: something happened to the robot."""
@@ -70,4 +84,30 @@ class Unmodelled:
 
     def variances(self, memory: SimpleNamespace) -> np.ndarray:
         """What is to be added to the variances of the tip, rad^2 and m^2, (6,)."""
-        return np.repeat(np.maximum(memory.excess, 0.0) / np.maximum(memory.weights, 1e-300), 3)
+        return np.repeat(_mean(memory)[:2], 3)
+
+    def joint_variances(self, memory: SimpleNamespace, by_gears: np.ndarray) -> np.ndarray:
+        """What gears may be off by, rad^2, (6,): less or more than they are said to, where that is seen.
+
+        Args:
+            memory: of the layout.
+            by_gears: what they are said to be off by, (6,).
+        """
+        if not self._joints:
+            return by_gears
+        share = 1.0 + memory.excess[2:] / np.maximum(memory.by_joints, 1e-300)
+        return by_gears * np.clip(share, _LEAST_OF_GEARS, 1.0) + _mean(memory)[2:]
+
+
+def _rows(to_joints: np.ndarray) -> np.ndarray:
+    """The directions that are looked along: axes of the tip, then joints."""
+    return np.concatenate((np.eye(6), to_joints))
+
+
+def _together(values: np.ndarray) -> np.ndarray:
+    """Sums of turns and of shifts, and the value of each joint."""
+    return np.concatenate((values[:6].reshape(2, 3).sum(axis=1), values[6:]))
+
+
+def _mean(memory: SimpleNamespace) -> np.ndarray:
+    return np.maximum(memory.excess, 0.0) / np.maximum(memory.weights, 1e-300)

@@ -28,6 +28,8 @@ from systems.servo.self_calibrating_config import SelfCalibratingConfig
 from systems.servo.self_calibrating_learning import UNREST, Learning
 
 _STARTING, _LED_IN = 1.5, 2.0  # s
+# 1/s, by which motors are brought back to their plan; with a delay T less, a third of 1 / T
+_LARGEST_GAIN, _SHARE_OF_DELAY = 7.0, 0.3
 _FOLLOWED = 4.0  # rad of the lead's frequency, after which nine tenths of a step are followed
 
 
@@ -290,6 +292,8 @@ class SelfCalibrating(LeafSystem):
             commands = joints.position, np.zeros(NUM_JOINTS), np.zeros(NUM_JOINTS)
         else:
             commands = self._command(memory, reference, time, joints.position)
+            if self._config.drive == "velocity":
+                commands = commands[0], commands[1] + self._to_plan(memory, joints), commands[2]
         for state, command in zip(self._outputs, commands, strict=False):
             discrete_state.set_value(int(state), command)
         ahead = float(memory.planned[0]) - time
@@ -319,6 +323,16 @@ class SelfCalibrating(LeafSystem):
             self._learning.events.note(memory.events, time, event)
         return coming.commands
 
+    def _to_plan(self, memory: SimpleNamespace, joints: JointSample) -> np.ndarray:
+        """What brings motors back to their plan that follow speeds alone, rad/s, (6,): nothing else does."""
+        if not memory.first[0] <= joints.time:
+            return np.zeros(NUM_JOINTS)
+        planned = self._learning.plan.at(memory.plan, joints.time)
+        if planned is None:
+            return np.zeros(NUM_JOINTS)
+        gain = min(_LARGEST_GAIN, _SHARE_OF_DELAY / max(float(memory.delay.delay[0]), self.period))
+        return gain * (planned[:NUM_JOINTS] - joints.position)
+
     def _work_out(
         self, memory: SimpleNamespace, reference: PathAhead, time: float, position: np.ndarray | None = None
     ) -> None:
@@ -345,7 +359,10 @@ class SelfCalibrating(LeafSystem):
             if not memory.amplitude.any():
                 memory.delay.known[0] = 1.0  # nothing will show it
         lead, since_start = memory.lead, time - memory.start_time[0]
-        self._lead.step(lead, self.estimator.x_robot(memory.estimator), memory.columns, self.period)
+        found = self.estimator.x_robot(memory.estimator)
+        x = self.tip_model.plausible(found)
+        self._lead.step(lead, x, memory.columns, self.period)
+        self._learning.note_implausible(memory, time, int(np.count_nonzero(x != found)))
         first, last = memory.first[0], memory.planned[0]
         if not self._learning.delay.is_settled(delay, instant):
             memory.waited[0] = self._probe.waited(instant - first, float(memory.waited[0]))

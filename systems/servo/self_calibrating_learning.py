@@ -10,7 +10,7 @@ from systems.estimation import kernels
 from systems.estimation.drives.dead_time import CommandDelay
 from systems.estimation.drives.drive_model import COLUMNS, DriveModel
 from systems.estimation.drives.encoder_steps import EncoderSteps
-from systems.estimation.events import DEAD_TIME_CHANGED, LOAD_CHANGED, Event, EventLog
+from systems.estimation.events import DEAD_TIME_CHANGED, IMPLAUSIBLE, LOAD_CHANGED, Event, EventLog
 from systems.estimation.gear_errors import NUM_STATES
 from systems.estimation.kernels.arrays import Ring
 from systems.estimation.memory import History, Layout
@@ -93,6 +93,7 @@ class Learning:
             "upset_at": (1,),
             "load": Layout(mass=(1,), time=(1,), samples=(1,)),  # kg and s at an upset, and how many since
             "paused_until": (1,),
+            "implausible": (1,),  # the most parameters that were beyond all bounds so far
         }
 
     def start(self, memory: SimpleNamespace) -> None:
@@ -239,6 +240,12 @@ class Learning:
         change = self._mass(memory) - float(load.mass[0])
         if abs(change) > _LEAST_CHANGE * self._model.load_scale:
             self.events.note(memory.events, float(load.time[0]), Event(LOAD_CHANGED, change, 0.0))
+
+    def note_implausible(self, memory: SimpleNamespace, time: float, number: int) -> None:
+        """Says that so many parameters have come beyond all bounds, if there were never more."""
+        if number > memory.implausible[0]:
+            self.events.note(memory.events, time, Event(IMPLAUSIBLE, float(number), 0.0))
+            memory.implausible[0] = number
 
     def _mass(self, memory: SimpleNamespace) -> float:
         return float(self.estimator.x(memory.estimator)[self.tip_model.M][0])

@@ -5,6 +5,7 @@ import pytest
 
 from diagrams.runs.simulation import Experiment, run
 from diagrams.scenario.scenario import load_scenario
+from experiments.cli.prepare import prepare
 from robots.pose import pose_error
 from systems.estimation.drives.drive_model import DEAD_TIME
 
@@ -13,6 +14,8 @@ WRONG = [  # what the controller believes of springs and load
     "servo.model.stiffness=[1.2]",
     "servo.model.structure=1.2",
 ]
+
+_HUMPS = slice(16, 37, 4)  # of the drive model's parameters
 
 
 def tip_errors(log) -> tuple[np.ndarray, np.ndarray]:
@@ -113,6 +116,29 @@ def test_a_realistic_robot_whether_its_friction_is_a_number_or_a_curve_to_the_co
     assert not log.learnt["events"]
 
 
+def test_friction_of_a_wrist_that_moves_it_much_is_learnt_before_the_path_begins():
+    prepared = prepare("everything-realistic", robot="kr16-realistic")
+    experiment = Experiment(prepared.scenario, "self_calibrating", prepared.robot)
+    law = experiment.servo.law
+    open_humps = {}
+    for until in (1.9, 2.1):
+        experiment.advance(until=until)
+        drives = law.memory(law.GetMyContextFromRoot(experiment.context)).drives
+        open_humps[until] = (np.flatnonzero(np.diag(drives.P)[_HUMPS]) + 1).tolist()
+    assert open_humps == {1.9: [], 2.1: [4, 5, 6]}
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", [3001, 3002])
+def test_the_tip_of_a_realistic_kr_16_is_where_the_law_says(seed):
+    names = ("seed", "station.errors.random.seed", "station.variation.seed")
+    drawn = [f"{name}={seed}" for name in names]
+    prepared = prepare("everything-realistic", drawn, "kr16-realistic")
+    log = run(prepared.scenario, "self_calibrating", prepared.robot)
+    assert log.learnt is not None
+    assert log.learnt["coverage"]["share"] >= 0.86  # 0.95 of eighty samples, which are alike in turns
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize(("seed", "bits"), [(2001, 19), (2002, 17)])
 def test_the_tip_is_where_the_law_says_with_encoders_of_any_steps(seed, bits):
@@ -135,6 +161,32 @@ def test_the_tip_is_predicted_at_no_time_that_the_encoders_have_not_reached():
     prediction = law.predicted_tip(context)
     assert prediction is not None
     assert prediction[0] == law.memory(context).encoders.times.max()
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    "noise", [["position_sigma=3e-4", "orientation_sigma_deg=0.05"], ["orientation_sigma_deg=0.05"]]
+)
+def test_a_camera_five_times_as_noisy_as_the_law_is_told_sets_nothing_off(noise):
+    """What is left goes with the noise: 0.03 mm with 0.05 mm and 0.01 degrees, on paths that go slowly."""
+    settings = ["reference.path=circle", *(f"station.camera.{each}" for each in noise)]
+    log = run(load_scenario("everything", settings), "self_calibrating")
+    on_path, at_rest = tip_errors(log)
+    assert log.learnt is not None
+    assert not log.learnt["events"]
+    assert not any(log.guard_counts.values())
+    assert on_path.max() < 0.2e-3
+    assert at_rest.mean() < 0.03e-3
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("interface", "moving"), [("direct", 0.15e-3), ("egm", 0.08e-3)])
+def test_a_robot_that_follows_speeds_alone_does_not_drift_from_its_plan(interface, moving):
+    """Without encoders in the command it did by 0.16 and 0.03 mm until it rested."""
+    settings = [f"station.interface={interface}", "servo.laws.self_calibrating.drive=velocity"]
+    on_path, at_rest = tip_errors(run(load_scenario("everything", settings), "self_calibrating"))
+    assert on_path.max() < moving
+    assert at_rest.mean() < 0.01e-3
 
 
 @pytest.mark.slow

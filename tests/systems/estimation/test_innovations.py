@@ -16,6 +16,7 @@ def test_reflections_in_every_third_image_are_outliers_and_a_displaced_tool_is_n
     rng = np.random.default_rng(3)
     innovations = Innovations(SIGMA**2)
     memory = innovations.layout.view(np.zeros(innovations.layout.size))
+    innovations.start(memory)
     errors = SIGMA * rng.standard_normal((20_000, 6))
     false = rng.random(len(errors)) < 0.35
     errors[false] += np.repeat([0.03, 0.02], 3) * rng.standard_normal((false.sum(), 6))

@@ -14,7 +14,8 @@ from robots.pose import pose_error
 from systems.controller_model import ControllerModel
 from systems.estimation.findings import calibrated_robot
 from systems.estimation.learnt_robot import known_before
-from systems.estimation.tip_estimator import TipEstimator, TipEstimatorConfig
+from systems.estimation.tip_estimator import TipEstimator
+from systems.estimation.tip_estimator_config import TipEstimatorConfig
 from systems.estimation.tip_model import Spread, TipModel
 from tests.systems.estimation.arms import PERIOD, MovingArm, tip_model, true_unknowns
 

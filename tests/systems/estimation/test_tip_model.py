@@ -83,3 +83,14 @@ def test_a_load_may_be_off_by_more_the_more_a_robot_carries():
         sigmas[name] = model.sigma[model.M][0]
     assert sigmas["puma560"] == sigmas["irb1200"] == Spread().payload
     assert sigmas["kr210"] == pytest.approx(210.0 / 7.0 * Spread().payload)
+
+
+def test_an_estimate_that_is_no_robot_is_kept_within_what_robots_are():
+    model = TipModel(ControllerModel(load_robot("irb1200"), payload=7.0), Spread(gear_error=5e-5))
+    x = model.mean + 6.0 * model.sigma  # of no load that the file knows, and of springs four times too soft
+    np.testing.assert_array_equal(model.plausible(x), x)
+    x[model.M], x[model.K] = -2000.0, 100.0
+    bounded = model.plausible(x)
+    assert bounded[model.M][0] >= -21.0
+    assert bounded[model.K].max() <= 8.0
+    np.testing.assert_array_equal(bounded[model.G], x[model.G])

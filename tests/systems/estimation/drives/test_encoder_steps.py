@@ -5,7 +5,8 @@ import pytest
 
 from robots.pose import pose_error
 from systems.estimation.drives.encoder_steps import EncoderSteps
-from systems.estimation.tip_estimator import TipEstimator, TipEstimatorConfig
+from systems.estimation.tip_estimator import TipEstimator
+from systems.estimation.tip_estimator_config import TipEstimatorConfig
 from tests.systems.estimation.arms import MovingArm, tip_model, true_unknowns
 
 STEP = 2.0 * np.pi / 2**17  # rad

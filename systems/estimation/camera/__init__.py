@@ -1,0 +1,1 @@
+"""What is to be told of the camera: its noise, and whether it was it or the tool that was displaced."""
