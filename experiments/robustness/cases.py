@@ -54,12 +54,21 @@ CASES = {
         Case(
             "camera-moved",
             (_event(f"!CameraShift {{at: {_AT}, shift_mm: [0.3, 0, 0]}}"),),
-            recovered_at=_AT + 1.5,
+            recovered_at=_AT + 5.0,
+        ),
+        Case(
+            "joints-shifted",
+            (_event(f"!JointZeroShift {{at: {_AT}, shift_deg: [0, 0.02, 0, 0, 0.03, 0]}}"),),
+            recovered_at=_AT + 5.0,
         ),
         Case(
             "dead-time-step",
             (_event(f"!DeadTimeChange {{at: {_AT}, dead_time: 0.033}}"),),
             recovered_at=_AT + 1.5,
+        ),
+        Case(
+            "noisy-camera",  # four times what the controller is told
+            ("station.camera.position_sigma=2e-4", "station.camera.orientation_sigma_deg=0.04"),
         ),
         Case("reflections", ("station.camera.outlier_probability=0.2",)),
         Case("clock-drift", ("station.camera.clock_drift_ppm=500",)),
