@@ -38,7 +38,7 @@ CAMERA_MOVED = "camera moved"
 JOINTS_SHIFTED = "joints shifted"  # against their encoders
 TOOL_OR_CAMERA = "tool or camera displaced"  # until the robot has turned the tool far enough to tell
 PATH_UNSEEN = "path needs more than was shown"
-IMPLAUSIBLE = "estimate is no robot"  # so many parameters are beyond all bounds: they are kept at them
+IMPLAUSIBLE = "estimate implausible"  # so many parameters are beyond all bounds: they are kept at them
 _UNITS = {  # others: m
     LOAD_CHANGED: "kg",
     DEAD_TIME_CHANGED: "s",

@@ -23,7 +23,7 @@ _BASE = 0  # the body whose placement in the world it is
 # What no robot of any kind is, nor looks like: beyond it nothing may be commanded by an estimate.
 _SHIFT, _ANGLE = 0.15, 0.4  # m and rad, by which a frame may be elsewhere
 _SOFTEST = 8.0  # times the compliance that is believed
-_HEAVIEST = 3.0  # times the largest mass that a robot may carry; at most half a metre from its flange
+_HEAVIEST = 21.0  # kg, of a robot that carries 7 kg; at most half a metre from its flange
 _LATEST, _FASTEST = 1.0, 1e-2  # s and s/s, by which the camera's clock may be off
 _LARGEST_ERROR = 5e-3  # rad, of a gear
 _STAYS = 0.02  # of the spread, by which what was measured of a robot may have changed since
@@ -125,7 +125,7 @@ class TipModel:
             shares[SHAPE_NAMES.index("gap")] = OPEN
             self.sigma[self.E] = spread.gear_error * shares.ravel()
         self._tool, self._world, self._zeros = (self._directions(body) for body in (TOOL, _BASE, None))
-        self._least, self._most = self._plausible_range()
+        self._least, self._most = self._plausible_range(model.load_scale)
         self.prior = np.eye(self.size)  # information, in units of the spreads
         self.prior[self.D, self.D] = HELD
         known = known_before(robot, drawn, chosen) if robot.is_calibrated else None
@@ -143,11 +143,11 @@ class TipModel:
         P[np.ix_(entries, entries)] = scaled + _STAYS**2 * np.eye(len(entries))
         self.prior = np.linalg.inv(P)
 
-    def _plausible_range(self) -> tuple[np.ndarray, np.ndarray]:
+    def _plausible_range(self, load_scale: float) -> tuple[np.ndarray, np.ndarray]:
         """The least and the largest value of each unknown, (n,) each."""
         most = np.empty(self.size)
         most[self.G] = [_SHIFT if self.parameters[i].unit == "m" else _ANGLE for i in self.chosen]
-        heaviest = _HEAVIEST * max(self.robot.payload.largest_mass, self.mean[self.M][0], 1.0)
+        heaviest = max(_HEAVIEST * load_scale, 3.0 * self.mean[self.M][0])
         most[self.K], most[self.M] = _SOFTEST, heaviest * np.array([1.0, 0.5, 0.5, 0.5])
         most[self.C], most[self.D], most[self.E] = _LATEST, _FASTEST, _LARGEST_ERROR
         return -most, most  # springs and loads make up for what no parameter describes, and may be below zero

@@ -331,7 +331,7 @@ class SelfCalibrating(LeafSystem):
         if planned is None:
             return np.zeros(NUM_JOINTS)
         gain = min(_LARGEST_GAIN, _SHARE_OF_DELAY / max(float(memory.delay.delay[0]), self.period))
-        return gain * (planned[:NUM_JOINTS] - joints.position)
+        return np.nan_to_num(gain * (planned[:NUM_JOINTS] - joints.position))  # none where they are not known
 
     def _work_out(
         self, memory: SimpleNamespace, reference: PathAhead, time: float, position: np.ndarray | None = None

@@ -45,10 +45,8 @@ class Displacement:
             kept=(1,),  # how many of them there are
             A_before=(size, size),
             xi_before=(size,),
-            A=(
-                size + _COLUMNS,
-                size + _COLUMNS,
-            ),  # sums of H, and of G of each in the order of `_ALL`; lower half
+            # Sums of H, and of G of each in the order of `_ALL`; of A the lower half
+            A=(size + _COLUMNS, size + _COLUMNS),
             b=(size + _COLUMNS,),
             square=(1,),
             fits=(_COLUMNS,),  # twists of tool and camera, angles of joints, load in units of its spread
@@ -127,7 +125,8 @@ class Displacement:
         for k, (first, end) in enumerate(pairwise(_PLACES)):
             of = slice(n + first, n + end)
             C = A[of, of] - A[of, :n] @ solved[:, first:end]
-            C += 1e-12 * np.trace(A[of, of]) * np.eye(end - first)  # nothing where nothing shows it
+            # Nothing where nothing shows it, as a load of a robot that is believed not to yield.
+            C += 1e-12 * max(np.trace(A[of, of]), 1.0) * np.eye(end - first)
             d = b[of] - A[of, :n] @ solved[:, -1]
             memory.fits[first:end] = np.linalg.solve(C, d)
             left[k] -= d @ memory.fits[first:end]

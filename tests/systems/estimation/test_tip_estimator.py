@@ -233,6 +233,24 @@ def test_what_was_displaced_is_told_in_the_end(change, name, seed):
     assert np.linalg.norm(pose_error(truth, x)[3:]) < 60e-6
 
 
+def test_a_camera_that_never_agrees_does_not_widen_without_end_what_is_known():
+    """Images that wander by a millimetre: everything may be displaced, and be as little known as at first."""
+    session = Session(3)
+    session.learn(3.0)
+
+    def wandering(pair):
+        step = np.zeros(6)
+        step[3:] = 1e-3 * np.sin(2.0 * np.pi * session.time * np.array([0.7, 1.1, 1.3]))
+        return pair._replace(X_WE=moved(pair.X_WE[None], step[None])[0])
+
+    session.learn(15.0, change=wandering)
+    P = session.estimator.covariance(session.memory) / max(
+        1.0, session.estimator.variance_factor(session.memory)
+    )
+    most = np.diag(np.linalg.inv(session.model.prior) + session.model.displacement(1.0, 1.0))
+    assert (np.diag(P) < 4.0 * most).all()
+
+
 def test_a_load_that_is_picked_up_is_named():
     session = Session(4)
     session.learn(3.0)
