@@ -22,8 +22,12 @@ class TickClock:
 
     @property
     def seconds(self) -> np.ndarray:
-        """Wall time of every update so far in s, in order."""
+        """Wall time of every update so far in s, or since `forget`, in order."""
         return np.array(self._seconds, dtype=float)
+
+    def forget(self) -> None:
+        """Begins anew, so that memory stays flat over hours."""
+        del self._seconds[:]
 
     def stop(self) -> None:
         """Times nothing any more."""

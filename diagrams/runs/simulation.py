@@ -213,6 +213,7 @@ class Experiment:
         """Empties the record, so that memory stays flat over hours; `log` then begins here."""
         self._log.clear(self.context)
         self._predictions.clear()
+        self.servo.tick_clock.forget()
 
     def log(self) -> RunLog:
         """The record of what has happened so far, or since `forget`."""

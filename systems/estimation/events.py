@@ -35,12 +35,14 @@ TOOL_DISPLACED, LOAD_CHANGED = "tool displaced", "load changed"
 DEAD_TIME_CHANGED, CLOCK_DRIFTS = "dead time changed", "clock drifts"
 FOREIGN_FRAME = "camera frame is another"
 CAMERA_MOVED = "camera moved"
+LOAD_UNLIKE_BELIEF = "load unlike belief"  # from the start, by about so much
 JOINTS_SHIFTED = "joints shifted"  # against their encoders
 TOOL_OR_CAMERA = "tool or camera displaced"  # until the robot has turned the tool far enough to tell
 PATH_UNSEEN = "path needs more than was shown"
 IMPLAUSIBLE = "estimate implausible"  # so many parameters are beyond all bounds: they are kept at them
 _UNITS = {  # others: m
     LOAD_CHANGED: "kg",
+    LOAD_UNLIKE_BELIEF: "kg",
     DEAD_TIME_CHANGED: "s",
     CLOCK_DRIFTS: "s/s",
     FOREIGN_FRAME: "rad",
@@ -82,6 +84,7 @@ class EventLog:
         TOOL_OR_CAMERA,
         IMPLAUSIBLE,
         JOINTS_SHIFTED,
+        LOAD_UNLIKE_BELIEF,
     )
 
     def __init__(self) -> None:

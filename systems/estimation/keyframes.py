@@ -1,10 +1,10 @@
 """What samples of the past said, kept so that it can be read again with better parameters."""
 
-import math
 from collections.abc import Callable
 from types import SimpleNamespace
 
 import numpy as np
+from scipy.linalg import get_lapack_funcs
 
 from systems.estimation import kernels
 from systems.estimation.arm_geometry import Constants
@@ -16,6 +16,7 @@ from systems.estimation.tip_model import TipModel
 # m or rad, by which the parameters may be off from where the sum was linearised: half of its square, over an
 # arm of a metre, is a third of what the mean of a dozen samples of a good camera may be wrong by.
 _LINEAR = 3e-3
+(_cholesky,) = get_lapack_funcs(("potrf",), dtype=np.float64)
 
 
 class Keyframes:
@@ -45,7 +46,6 @@ class Keyframes:
             leaving=(1,),  # keyframes before this one leave with this pass
             xi_pass=(n,),
             xi_sum=(n,),  # of the pass that made the sum
-            held=(1,),  # information on the drift of the clock that is only supposed
             A_old=(n, n),
             b_old=(n,),
             A=(n, n),  # old and ring
@@ -65,27 +65,10 @@ class Keyframes:
         memory.A_old[:], memory.b_old[:], memory.A[:], memory.b[:] = A, b, A, b
         memory.xi_pass[:] = np.inf
 
-    def drift_if_free(
-        self, memory: SimpleNamespace, A_open: np.ndarray, b_open: np.ndarray
-    ) -> tuple[float, float]:
-        """What the drift of the clock would be if nothing held it, and its standard deviation.
-
-        Both in units of its spread; A_open (n, n), b_open (n,) are of samples that are in no keyframe yet.
-        """
-        D, A = self._model.D, memory.A.copy()
-        A[D, D] -= memory.held[0] - 1.0
-        unit, row = np.zeros((len(A), 1)), np.empty((len(A), 1))
-        unit[D] = 1.0
-        if not kernels.information.solve(A, A_open, unit, row):
-            return 0.0, np.inf
-        return float(row[:, 0] @ (memory.b + b_open)), math.sqrt(row[D, 0])
-
-    def free_drift(self, memory: SimpleNamespace) -> None:
-        """Takes back that the clock is supposed not to drift."""
-        D = self._model.D
-        memory.A_old[D, D] -= memory.held[0] - 1.0
-        memory.A[D, D] -= memory.held[0] - 1.0
-        memory.held[0] = 1.0
+    def add(self, memory: SimpleNamespace, A: np.ndarray) -> None:
+        """Adds information about zero, (n, n), to what was known before any keyframe."""
+        memory.A_old += A
+        memory.A += A
 
     def close(
         self, memory: SimpleNamespace, constants: Constants, xi: np.ndarray, opened: OpenKeyframe
@@ -112,6 +95,17 @@ class Keyframes:
         memory.b += opened.b
         return True
 
+    @staticmethod
+    def invert(memory: SimpleNamespace, A_open: np.ndarray, P: np.ndarray) -> bool:
+        """Writes the covariance P that belongs to the sum and to A_open, (n, n); False if there is none.
+
+        Of A_open the lower half is enough.
+        """
+        factor, failed = _cholesky((memory.A + A_open).T, lower=0)
+        if not failed:
+            kernels.information.invert(factor.T, P)
+        return not failed
+
     def begin_again(self, memory: SimpleNamespace) -> None:
         """Has all keyframes read anew, though no parameter has moved: they weigh something else."""
         memory.position[0] = -1.0
@@ -135,6 +129,7 @@ class Keyframes:
         xi: np.ndarray,
         weights: np.ndarray,
         tolerance: float,
+        prior: Callable[[], np.ndarray],
     ) -> bool:
         """Goes on with a pass, or begins one if a parameter has moved by more than the tolerance (m, rad).
 
@@ -144,6 +139,7 @@ class Keyframes:
             xi: the estimate.
             weights: of the six entries of a pose error, one over their variances.
             tolerance: of the parameters.
+            prior: gives what is known before any keyframe, (n, n); asked if old ones fade.
 
         Returns:
             Whether the sum has been replaced.
@@ -160,22 +156,21 @@ class Keyframes:
                 part[:] = 0.0
         position = int(memory.position[0])
         leaving = int(memory.leaving[0])
-        until = min(position + self._batch, end, max(leaving, position) if position < leaving else end)
-        is_leaving = position < leaving
-        A = memory.A_leaving if is_leaving else memory.A_pass
-        b = memory.b_leaving if is_leaving else memory.b_pass
-        model = self._model
-        arm = constants(), model.unknowns(model.full(xi)), model.loads.masses
-        kernels.keyframes.read(*arm, xi, memory.rows, position, until, weights, A, b)
-        memory.position[0] = until
-        if until < end:
+        if position < end:
+            until = min(position + self._batch, end, max(leaving, position) if position < leaving else end)
+            is_leaving = position < leaving
+            A = memory.A_leaving if is_leaving else memory.A_pass
+            b = memory.b_leaving if is_leaving else memory.b_pass
+            model = self._model
+            arm = constants(), model.unknowns(model.full(xi)), model.loads.masses
+            kernels.keyframes.read(*arm, xi, memory.rows, position, until, weights, A, b)
+            memory.position[0] = until
             return False
+        # What follows has a tick of its own.
         if leaving > first:
             # Old knowledge fades as new knowledge joins it.
             fading = 1.0 - (leaving - first) / 3000.0
-            memory.A_old[:] = fading * memory.A_old + (1.0 - fading) * self._model.prior
-            supposed = memory.held[0] - self._model.prior[self._model.D, self._model.D]
-            memory.A_old[self._model.D, self._model.D] += (1.0 - fading) * supposed
+            memory.A_old[:] = fading * memory.A_old + (1.0 - fading) * prior()
             memory.A_old += memory.A_leaving
             memory.b_old[:] = fading * memory.b_old + memory.b_leaving
             memory.first[0] = leaving

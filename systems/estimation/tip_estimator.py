@@ -12,7 +12,6 @@ from systems.estimation.camera.camera_noise import CameraNoise
 from systems.estimation.camera.displacement import Displacement
 from systems.estimation.events import (
     CAMERA_MOVED,
-    CLOCK_DRIFTS,
     JOINTS_SHIFTED,
     LOAD_CHANGED,
     TOOL_DISPLACED,
@@ -23,18 +22,19 @@ from systems.estimation.events import (
 from systems.estimation.gear_errors import NUM_SHAPES
 from systems.estimation.keyframes import Keyframes, forget_open, open_keyframe
 from systems.estimation.memory import Layout
+from systems.estimation.suppositions import Suppositions
 from systems.estimation.tip_estimator_config import TipEstimatorConfig
 from systems.estimation.tip_model import NO_SHAPES, Pair, Prediction, TipModel
 from systems.estimation.unmodelled import Doubts, Unmodelled
 
 _AGAIN = 500  # samples, in which a second event says that the first was explained wrongly
 _OF_THE_LOAD = 0.1  # of its spread, when a tool was displaced
-_A_LITTLE = 0.2  # of its spread, by which something may be displaced that nobody has seen move
+_A_LITTLE = 0.2  # of its spread, by which something may be displaced unseen
 _DOUBT = 3.0  # times wider, what is known of everything, where it does not hold
 _TRUST = 0.02  # m or rad, the largest step from where the past was read
 _KEEP_EVERY = 10  # samples, between two notes of what is known
-_DRIFT_EVERY = 50  # samples, between two looks whether the clock drifts, halfway between two such notes
-_LEAST_DRIFT, _DRIFT_SIGMAS = 1e-4, 8.0  # s/s; and how sure it has to be: what nothing describes adds up
+_INVERT_AFTER = 500  # samples, if no pass through the keyframes gives reason to
+_LOOK_EVERY = 50  # samples, between two looks at what is supposed, halfway between two such notes
 _CALM_WEIGHT = 0.2  # of a sample, below which it says nothing of events or of the camera
 _CLOSE_AT = (5, 20, 60)  # samples: the first linearisations are poor
 
@@ -42,8 +42,8 @@ _CLOSE_AT = (5, 20, 60)  # samples: the first linearisations are poor
 class TipEstimator:
     """Recursive least squares in information form, on keyframes that are linearised again.
 
-    With A = A_0 + sum w H^T W H and b = sum w H^T W (r + H xi) the estimate is A^-1 b, in units of the
-    spreads; A_0 is what is known before.
+    With A = A_0 + sum w H^T W H and b = sum w H^T W (r + H xi) the estimate is P b, in units of the spreads;
+    A_0 is what is known before, and the covariance P = A^-1 is kept up to date, sample by sample.
     """
 
     def __init__(self, model: TipModel, config: TipEstimatorConfig) -> None:
@@ -52,6 +52,7 @@ class TipEstimator:
         variances = np.repeat([config.rotation_sigma, config.position_sigma], 3) ** 2
         self.weights = 1.0 / variances
         self._keyframes, self._camera = Keyframes(model), CameraMoves(model.world_directions())
+        self._suppositions = Suppositions(model)
         self._noise, self._innovations = CameraNoise(variances), Innovations(variances)
         self._unmodelled = Unmodelled(joints=6 if model.has_gear_errors else 0)
         self._displacement = Displacement(model.size, model.M)
@@ -65,7 +66,9 @@ class TipEstimator:
             is_busy=(1,),  # whether the sample of this tick took longer than others
             is_behind=(1,),  # whether `work` was put off for that
             was_settled=(1,),  # whether the sum was linear enough when samples agreed with it last
-            A_open=(n, n),
+            P=(n, n),
+            taken=(1,),  # samples into P since it was inverted
+            A_open=(n, n),  # its lower half
             b_open=(n,),
             samples=(1,),
             weight=(1,),
@@ -75,6 +78,7 @@ class TipEstimator:
             last_time=(1,),
             sum_y=(6,),
             sum_H=(6, n),
+            supposed=self._suppositions.layout,
             keyframes=self._keyframes.layout,
             noise=self._noise.layout,
             innovations=self._innovations.layout,
@@ -89,8 +93,8 @@ class TipEstimator:
         memory.x_geometry[:] = self.model.mean
         memory.event_at[0] = -np.inf
         memory.first_time[0] = memory.last_time[0] = np.nan
-        memory.keyframes.held[0] = self.model.prior[self.model.D, self.model.D]
-        self._keyframes.reset(memory.keyframes, self.model.prior, memory.xi)
+        self._begin_from(memory, self.model.prior, memory.xi)
+        self._suppositions.start(memory.supposed)
         self._noise.start(memory.noise)
         self._innovations.start(memory.innovations)
 
@@ -124,18 +128,17 @@ class TipEstimator:
         is the covariance of what they give, P = A^-1. An f above 1 casts doubt on what was known before, too:
         then it is f P. Where A_0 has been taken back since, after an event, it is not counted below 1.
         """
-        P = np.linalg.inv(memory.keyframes.A + memory.A_open)
-        factor = self.variance_factor(memory)
+        P, factor = memory.P, self.variance_factor(memory)
         if factor >= 1.0:
             return factor * P
         by_prior = P @ self.model.prior @ P
         is_taken_back = (np.diag(by_prior) > np.diag(P)).any()
-        return P if is_taken_back else factor * P + (1.0 - factor) * by_prior
+        return P.copy() if is_taken_back else factor * P + (1.0 - factor) * by_prior
 
     def sigma(self, memory: SimpleNamespace, rows: np.ndarray) -> float:
         """The largest standard deviation of n vectors that are linear in the unknowns, rows (n, k, size)."""
         H = rows.reshape(-1, self.model.size)
-        variances = (H * self._solve_columns(memory, H).T).sum(axis=1).reshape(rows.shape[:2]).sum(axis=1)
+        variances = (H @ memory.P * H).sum(axis=1).reshape(rows.shape[:2]).sum(axis=1)
         return math.sqrt(max(1.0, self.variance_factor(memory)) * float(variances.max()))
 
     def covariance_of_robot(self, memory: SimpleNamespace) -> np.ndarray:
@@ -204,10 +207,10 @@ class TipEstimator:
         weight = 1.0 / (1.0 + (pair.unrest / config.calm) ** 2)
         event, innovations = None, memory.innovations
         if memory.count[0] <= config.test_after:
-            if self._innovations.is_false_start(innovations, r, H, lambda: self._solve_columns(memory, H)):
+            if self._innovations.is_false_start(innovations, r, H, lambda: memory.P @ H.T):
                 return self._look_for_foreign(memory, H)
         else:
-            verdict = self._innovations.judge(innovations, r, H, lambda: self._solve_columns(memory, H))
+            verdict = self._innovations.judge(innovations, r, H, lambda: memory.P @ H.T)
             if verdict.is_outlier:
                 return None
             if weight > _CALM_WEIGHT and self._innovations.measure_noise(innovations, r):
@@ -230,8 +233,7 @@ class TipEstimator:
                 if memory.was_settled[0]:
                     self._doubt(memory)
             elif verdict.is_calm and not memory.after_step.samples[0] and memory.count[0] % _KEEP_EVERY == 0:
-                known = memory.keyframes.A + memory.A_open
-                self._displacement.keep(memory.after_step, known, memory.xi)
+                self._displacement.keep(memory.after_step, memory.P, memory.xi)
             elif memory.after_step.samples[0]:
                 before = r + H @ (memory.xi - memory.after_step.xi_before)
                 at = (H, model.jacobian(self._constants_at(memory, x), x, pair.theta)), pair.X_WE
@@ -244,10 +246,8 @@ class TipEstimator:
         if self._noise.hear(memory.noise, r, H, memory.xi, pair):
             self._weigh_anew(memory)
         self._take(memory, (r, gears, H), pair, shapes, weight)
-        if event is None and memory.count[0] % _DRIFT_EVERY == _DRIFT_EVERY // 2:
-            event = self._look_for_drift(memory)
-            if event is not None:
-                self._solve(memory)
+        if event is None and memory.count[0] % _LOOK_EVERY == _LOOK_EVERY // 2:
+            event = self._look_at_suppositions(memory)
         return event
 
     def _take(
@@ -267,12 +267,11 @@ class TipEstimator:
         since_first = self._since_first(memory, pair.time)
         seen = pair.theta, pair.motion, pair.twist, since_first, NO_SHAPES if shapes is None else shapes
         past, model = memory.keyframes, self.model
-        sums = past.A, past.b, past.xi_sum, model.sigma, model.K.start
+        known = memory.P, memory.taken, past.b, past.xi_sum, model.sigma, model.K.start
         limits = -1.0 if is_long or memory.count[0] in _CLOSE_AT else self._config.keyframe_step, _TRUST
         sample = *innovation, memory.xi, seen, memory.noise.weights, weight
-        if kernels.information.take(*sample, open_keyframe(memory), sums, limits):
+        if kernels.information.take(*sample, open_keyframe(memory), known, limits):
             self._close(memory)
-            self._solve(memory)
 
     def _look_for_foreign(self, memory: SimpleNamespace, H: np.ndarray) -> Event | None:
         """Finds out early that a camera of another frame teaches nothing."""
@@ -282,17 +281,16 @@ class TipEstimator:
         memory.is_foreign[0] = event is not None
         return event
 
-    def _look_for_drift(self, memory: SimpleNamespace) -> Event | None:
-        """Tells a clock that drifts from one that does not by what the drift would be if it were free."""
-        if memory.keyframes.held[0] <= 1.0:
-            return None
+    def _look_at_suppositions(self, memory: SimpleNamespace) -> Event | None:
+        """Gives up what samples speak against."""
         memory.is_busy[0] = 1.0
-        drift, deviation = self._keyframes.drift_if_free(memory.keyframes, memory.A_open, memory.b_open)
-        size = drift * float(self.model.sigma[self.model.D])
-        if abs(size) < _LEAST_DRIFT or abs(drift) < _DRIFT_SIGMAS * deviation:
+        b = memory.keyframes.b + memory.b_open
+        found = self._suppositions.look(memory.supposed, memory.P, b)
+        if found is None:
             return None
-        self._keyframes.free_drift(memory.keyframes)
-        return Event(CLOCK_DRIFTS, size, 0.0)
+        self._keyframes.add(memory.keyframes, found[1])
+        self._solve(memory)
+        return found[0]
 
     def work(self, memory: SimpleNamespace) -> None:
         """What can be done in a tick without a sample, or after its command is out: relinearise.
@@ -304,9 +302,11 @@ class TipEstimator:
         if is_put_off:
             return
         keyframes, tolerance = memory.keyframes, self._config.relinearise
-        at = memory.xi, memory.noise.weights
-        if self._keyframes.work(keyframes, lambda: self.constants(memory), *at, tolerance):
+        at = lambda: self.constants(memory), memory.xi, memory.noise.weights
+        if self._keyframes.work(keyframes, *at, tolerance, lambda: self._suppositions.prior(memory.supposed)):
             self._solve(memory)
+        elif memory.taken[0] > _INVERT_AFTER and keyframes.position[0] < 0.0:
+            self._invert(memory)
 
     def _weigh_anew(self, memory: SimpleNamespace) -> None:
         """The camera turns out to be noisier or better: what it has shown so far weighs less or more."""
@@ -323,23 +323,21 @@ class TipEstimator:
             forget_open(memory)
 
     def _solve(self, memory: SimpleNamespace) -> None:
+        """Finds the estimate that belongs to sums that are other ones than before."""
         # Half of the square of a step is what it leaves of samples that are known far better: small steps
         # from where the past was read keep to the curved set of parameters that explain it.
-        past, model = memory.keyframes, self.model
-        sums = past.A, memory.A_open, past.b, memory.b_open
-        kernels.information.estimate(*sums, past.xi_sum, model.sigma, model.K.start, _TRUST, memory.xi)
+        self._invert(memory)
+        sums, model = (memory.keyframes.b, memory.b_open, memory.keyframes.xi_sum), self.model
+        kernels.information.estimate(memory.P, *sums, model.sigma, model.K.start, _TRUST, memory.xi)
 
-    def _solve_columns(self, memory: SimpleNamespace, H: np.ndarray) -> np.ndarray:
-        """P H^T with the covariance P of the estimate, (n, 6)."""
-        out = np.empty((self.model.size, len(H)))
-        columns = np.ascontiguousarray(H.T)
-        if not kernels.information.solve(memory.keyframes.A, memory.A_open, columns, out):
-            return np.linalg.solve(memory.keyframes.A + memory.A_open, columns)
-        return out
+    def _invert(self, memory: SimpleNamespace) -> None:
+        """Works P out anew: each sample leaves a rounding error in it."""
+        if self._keyframes.invert(memory.keyframes, memory.A_open, memory.P):
+            memory.taken[0] = 0.0
 
     def _doubts(self, memory: SimpleNamespace, H: np.ndarray, pair: Pair) -> Doubts:
         memory.is_busy[0] = 1.0
-        factor, by_model = self.variance_factor(memory), H @ self._solve_columns(memory, H)
+        factor, by_model = self.variance_factor(memory), H @ memory.P @ H.T
         noise, by_model = factor * memory.noise.variances, max(1.0, factor) * by_model
         if not self.model.has_gear_errors:
             return Doubts(noise, by_model, np.zeros((6, 6)), np.empty((0, 6)))
@@ -349,7 +347,7 @@ class TipEstimator:
     def _doubt(self, memory: SimpleNamespace) -> None:
         """What was learnt does not hold where the robot is now: it weighs less, but no less than priors."""
         self._innovations.forget(memory.innovations)
-        A = (memory.keyframes.A + memory.A_open + (_DOUBT**2 - 1.0) * self.model.prior) / _DOUBT**2
+        A = (np.linalg.inv(memory.P) + (_DOUBT**2 - 1.0) * self.model.prior) / _DOUBT**2
         P = np.linalg.inv(A) + self.model.displacement(_A_LITTLE, _A_LITTLE)
         self._begin_from(memory, np.linalg.inv(P), memory.xi)
 
@@ -374,7 +372,7 @@ class TipEstimator:
     def _open(self, memory: SimpleNamespace, share: float, others: np.ndarray | float) -> None:
         """Adds to the covariance of the unknowns: a share of the load's spread, and others, (n, n)."""
         model = self.model
-        P = np.linalg.inv(memory.keyframes.A + memory.A_open) + others
+        P = memory.P + others
         load = np.zeros(model.size)
         load[model.M] = share * model.changed_load
         self._begin_from(memory, np.linalg.inv(P + np.diag(load**2)), memory.xi)
@@ -397,4 +395,6 @@ class TipEstimator:
         """Goes on with the information A about xi, and without keyframes."""
         memory.xi[:] = xi
         self._keyframes.reset(memory.keyframes, 0.5 * (A + A.T), memory.xi)
+        memory.supposed.load[0] = 0.0
         forget_open(memory)
+        self._invert(memory)

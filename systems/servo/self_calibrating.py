@@ -169,7 +169,7 @@ class SelfCalibrating(LeafSystem):
         self._lead.step(memory.lead, model.mean, memory.columns, self.period)
         for _ in range(40):  # the first ones are only looked at
             self.estimator.add(memory.estimator, pair)
-        for _ in range(2):  # it is put off once
+        for _ in range(3):  # it is put off once, and what was read is taken over in a tick of its own
             self.estimator.work(memory.estimator)
         memory.estimator.count[0] = 1e6  # from now on samples are judged
         for size in (0.0, 0.1):

@@ -10,7 +10,14 @@ from systems.estimation import kernels
 from systems.estimation.drives.dead_time import CommandDelay
 from systems.estimation.drives.drive_model import COLUMNS, DriveModel
 from systems.estimation.drives.encoder_steps import EncoderSteps
-from systems.estimation.events import DEAD_TIME_CHANGED, IMPLAUSIBLE, LOAD_CHANGED, Event, EventLog
+from systems.estimation.events import (
+    DEAD_TIME_CHANGED,
+    IMPLAUSIBLE,
+    LOAD_CHANGED,
+    LOAD_UNLIKE_BELIEF,
+    Event,
+    EventLog,
+)
 from systems.estimation.gear_errors import NUM_STATES
 from systems.estimation.kernels.arrays import Ring
 from systems.estimation.memory import History, Layout
@@ -60,7 +67,7 @@ class Learning:
         self._model, self._period = model, model.period
         self.tip_model = TipModel(model, config.estimator.spread)
         self.estimator = TipEstimator(self.tip_model, config.estimator)
-        self.drives = DriveModel(model, config.drives)
+        self.drives = DriveModel(model, config.drives, config.drive)
         self.delay = CommandDelay(model.period, config.dead_time)
         self.events, self.steps = EventLog(), EncoderSteps()
         reach = _REACH + max(model.command_delay, config.dead_time.longest) + model.camera_delay
@@ -147,6 +154,8 @@ class Learning:
                 event = self.estimator.add(memory.estimator, pair)
                 if event is not None:
                     self.events.note(memory.events, time, event)
+                    if event.kind == LOAD_UNLIKE_BELIEF:
+                        self.drives.widen(memory.drives, is_told_otherwise=True)
                 self._note_load(memory)
                 heard.accepted[0] = time
         self.estimator.work(memory.estimator)

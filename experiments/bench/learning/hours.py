@@ -9,7 +9,7 @@ takes about half an hour on one core; a row is printed when its part is over.
 
 import math
 import sys
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -94,19 +94,17 @@ def hours_scenario(hours: float, seed: int) -> Scenario:
 def parts(scenario: Scenario, seconds: float) -> Iterator[Part]:
     """Runs the law; a part of so many seconds after the other."""
     experiment, process = Experiment(scenario, LAW), psutil.Process()
-    end, ticks = experiment.path.duration, 0
+    end = experiment.path.duration
     until = experiment.path.path_start
     while until < end:
         until = min(until + seconds, end)
         experiment.advance(until)
         log = experiment.log()
         experiment.forget()
-        spent = log.tick_seconds[ticks:]
-        ticks = len(log.tick_seconds)
-        yield seen(log, spent, process.memory_info().rss)
+        yield seen(log, process.memory_info().rss)
 
 
-def seen(log: RunLog, ticks: Sequence[float] | np.ndarray, memory: int) -> Part:
+def seen(log: RunLog, memory: int) -> Part:
     """What a part of the record says."""
     on_path = log.time >= log.path_start
     errors = pose_errors(log, "true")[on_path]
@@ -119,7 +117,7 @@ def seen(log: RunLog, ticks: Sequence[float] | np.ndarray, memory: int) -> Part:
         rms=float(np.sqrt(np.mean(distance**2))),
         at_rest=float(distance[rests].max()) if rests.any() else np.nan,
         coverage=log.learnt["coverage"]["share"] if log.learnt else np.nan,
-        ticks=np.asarray(ticks),
+        ticks=np.asarray(log.tick_seconds),
         memory=memory,
     )
 

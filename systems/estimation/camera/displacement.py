@@ -40,7 +40,7 @@ class Displacement:
             samples=(1,),  # still to be looked at; zero when nothing is open
             is_open=(1,),  # whether it may be any, also after nobody looks any more
             is_event=(1,),  # whether a step was seen; otherwise samples only cease to agree
-            A_calm=(2, size, size),  # what was known while samples agreed, the newer first
+            P_calm=(2, size, size),  # covariance while samples agreed, the newer first
             xi_calm=(2, size),
             kept=(1,),  # how many of them there are
             A_before=(size, size),
@@ -52,10 +52,10 @@ class Displacement:
             fits=(_COLUMNS,),  # twists of tool and camera, angles of joints, load in units of its spread
         )
 
-    def keep(self, memory: SimpleNamespace, A: np.ndarray, xi: np.ndarray) -> None:
+    def keep(self, memory: SimpleNamespace, P: np.ndarray, xi: np.ndarray) -> None:
         """Takes note of what is known, now and then, while samples agree with it."""
-        memory.A_calm[1], memory.xi_calm[1] = memory.A_calm[0], memory.xi_calm[0]
-        memory.A_calm[0], memory.xi_calm[0] = A, xi
+        memory.P_calm[1], memory.xi_calm[1] = memory.P_calm[0], memory.xi_calm[0]
+        memory.P_calm[0], memory.xi_calm[0] = P, xi
         memory.kept[0] += 1.0
 
     def begin(self, memory: SimpleNamespace, is_load: bool = False) -> bool:
@@ -70,9 +70,9 @@ class Displacement:
         Returns:
             Whether the tip may be elsewhere than it is seen.
         """
-        if memory.samples[0] == 0.0 and memory.kept[0] >= len(memory.A_calm):
+        if memory.samples[0] == 0.0 and memory.kept[0] >= len(memory.P_calm):
             memory.samples[0], memory.kept[0] = _LONGEST, 0.0
-            memory.A_before[:], memory.xi_before[:] = memory.A_calm[1], memory.xi_calm[1]
+            memory.A_before[:], memory.xi_before[:] = np.linalg.inv(memory.P_calm[1]), memory.xi_calm[1]
             memory.A[:], memory.b[:], memory.square[0] = 0.0, 0.0, 0.0
             memory.is_open[0], memory.is_event[0] = not is_load, 0.0
         elif is_load:

@@ -20,18 +20,20 @@ from systems.estimation.kernels.arrays import DriveMemory, Drives
 from systems.estimation.memory import Layout
 
 # Torque that is needed beside the feedforward; rotor, viscous, Coulomb, and what that has more at low speeds;
-# the load of a kilogram, and of a kg m of its first moment along x, y, z.
-_FILTERED = 9
+# the load of a kilogram, and of a kg m of its first moment along x, y, z; a kilogram that is not held.
+_FILTERED = 10
 COLUMNS = 6 * (_FILTERED - 1)
 _HUMPS, _CONSTANTS = slice(16, 37, 4), slice(37, 43)
-DEAD_TIME, MASS, MOMENT = 0, 43, slice(44, 47)
-SIZE = MOMENT.stop
+DEAD_TIME, MASS, MOMENT, HELD = 0, 43, slice(44, 47), 47
+SIZE = HELD + 1
 # Of Coulomb's friction, the spread of what there may be more of it; less where it is learnt early, or the
 # first lap of robots without a hump is twisted more
 _HUMP, _EARLY_HUMP = 0.3, 0.1
 _SLOW = 0.05  # rad/s, of Stribeck's effect, exp(-|v| / _SLOW) as Tustin has it; assumed
 _SLACK = 0.3  # of Coulomb's friction, by which it may be off while little is known of it
 _STEEPEST = 0.5  # rad/s, what learning may add to the speed of a joint
+_RESTS = {"cascade": 1e-5, "velocity": 1e-5, "position": 3e-5}  # rad, where a motor rests beside its command
+_AT_ONCE = 0.1  # of a period, in which a drive without a loop of speed gives way
 _LED_IN = 40.0  # rad/s, with which commands follow what was learnt, critically damped
 
 
@@ -42,6 +44,12 @@ class DriveModelConfig:
     position: float = 25.0  # 1/s, gain of the position loop of the cascade
     velocity: float = 100.0  # 1/s, of the speed loop, joint torque per speed and inertia
     integral: float = 10.0  # 1/s
+    # Of drives that follow positions alone: N m of the motor for a rad, and for that over a second
+    stiffness: float = 80.0
+    restoring: float = 1.0
+    # Of drives that follow speeds alone: N m of the motor for a rad/s; and how they are held to the plan, 1/s
+    braking: float = 100.0
+    held_to_plan: float = 7.0
     # Standard deviations. That of one following error is larger than its noise by far, because what the
     # model leaves of it stays the same for many samples.
     following_sigma: float = 4e-4  # rad
@@ -58,7 +66,7 @@ class DriveCommand(NamedTuple):
     position: np.ndarray  # (6,) rad
     velocity: np.ndarray  # (6,) rad/s
     torque: np.ndarray  # (6,) N m, joint side, on top of what the drives do for gravity
-    columns: np.ndarray  # (48,), what `DriveModel.features` needs of this instant
+    columns: np.ndarray  # (54,), what `DriveModel.features` needs of this instant
 
 
 class DriveModel:
@@ -71,18 +79,27 @@ class DriveModel:
     learnt by recursive least squares.
     Without the moment friction is taken for what a payload whose centre is elsewhere weighs at the wrist:
     both turn over with the motion. Mass and moment in it make up for all that loads are wrong by. They are
-    not those of the payload, and nobody else may take them for that.
+    not those of the payload, and nobody else may take them for that. What load the robot's controller was
+    told, and holds against gravity, may be another one than the robot carries and than anybody believes: a
+    kilogram that is not held is a column of its own, from when the load turns out not to be as believed.
 
     Where drives take torques, these are sent ahead by the dead time that was learnt, as positions are.
     """
 
-    def __init__(self, model: ControllerModel, config: DriveModelConfig) -> None:
-        """Works out the gains of the cascade and the filter G for one period."""
+    def __init__(self, model: ControllerModel, config: DriveModelConfig, kind: str = "cascade") -> None:
+        """Works out the gains of the drives and the filter G for one period.
+
+        Args:
+            model: what is believed.
+            config: gains and spreads.
+            kind: of the drives, ``"cascade"``, ``"position"`` or ``"velocity"``. Where they take no torques,
+                a robot's own controller is between, and has a cascade.
+        """
         robot, period = model.robot, model.period
+        kind = kind if model.takes_torque else "cascade"
         self._config = config
         payload = min(model.payload, robot.payload.largest_mass)
-        kd = config.velocity * _inertia(robot, payload)
-        kp, ki = kd * (config.position + config.integral), kd * config.position * config.integral
+        kp, ki, kd = _gains(robot, payload, config, kind, period)
         coulomb, viscous = friction_line(robot)
         self._drives = Drives(
             robot.reflected_inertia,
@@ -104,8 +121,8 @@ class DriveModel:
         self._held = drawn.constants(np.zeros(NUM_PARAMETERS)), ArmLoads(robot).masses
         spread = [config.dead_time_sigma, *[config.lag_sigma] * 6, *[1e-4] * 6]
         self._scale, self._moment = model.load_scale, config.moment_sigma * model.load_scale
-        spread += [0.3, 0.3, 0.5, 0.0] * 6 + [1e-5] * 6
-        spread += [config.payload_sigma * self._scale] + [self._moment] * 3
+        spread += [0.3, 0.3, 0.5, 0.0] * 6 + [_RESTS[kind]] * 6
+        spread += [config.payload_sigma * self._scale] + [self._moment] * 3 + [0.0]
         self._prior = np.diag(np.array(spread) ** 2)
         self.layout = Layout(
             started=(1,),
@@ -145,7 +162,7 @@ class DriveModel:
         return DriveCommand(position, velocity, torque, columns)
 
     def features(self, v: np.ndarray, a: np.ndarray, columns: np.ndarray) -> np.ndarray:
-        """Rows of the regression, shape (6, 47), from motion and the filtered torques (48,)."""
+        """Rows of the regression, shape (6, 48), from motion and the filtered torques (54,)."""
         Phi = np.zeros((6, SIZE))
         kernels.drives.features(v, a, columns, Phi)
         return Phi
@@ -164,7 +181,7 @@ class DriveModel:
         Args:
             memory: of the layout.
             planned: position, velocity and acceleration, (6,) each.
-            columns, correction: of the command of that instant, (48,) and (6,) in rad.
+            columns, correction: of the command of that instant, (54,) and (6,) in rad.
             actual: where the motors were, rad, (6,).
             most: nothing is learnt if more than this is not explained yet, rad; of a joint with much friction
                 for the stiffness of its drive that much more.
@@ -197,15 +214,36 @@ class DriveModel:
         closed = humps[memory.P[humps, humps] == 0.0]
         memory.P[closed, closed] = spread**2
 
-    def widen(self, memory: SimpleNamespace) -> None:
-        """Load or dead time have changed: constants, payload and dead time are open again."""
+    def widen(self, memory: SimpleNamespace, is_told_otherwise: bool = False) -> None:
+        """Load or dead time have changed: constants, payload and dead time are open again.
+
+        Args:
+            memory: of the layout.
+            is_told_otherwise: whether the load that the drives hold may not be as believed either.
+        """
         extra = np.zeros(SIZE)
         extra[_CONSTANTS], extra[MASS], extra[DEAD_TIME] = 3e-5, 5.0 * self._scale, 1e-3
-        extra[MOMENT] = self._moment
+        extra[MOMENT] = 5.0 * self._moment
+        extra[HELD] = 5.0 * self._scale * is_told_otherwise
         memory.P[_DIAGONAL, _DIAGONAL] += extra**2
 
 
 _DIAGONAL = np.arange(SIZE)
+
+
+def _gains(
+    robot: RobotModel, payload: float, config: DriveModelConfig, kind: str, period: float
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Of a following error, its integral and its rate, joint side, (6,) each."""
+    ratio = np.abs(robot.gear_ratio)
+    if kind == "position":
+        kp, ki = config.stiffness * ratio, config.restoring * ratio
+        return kp, ki, _AT_ONCE * period * kp
+    if kind == "velocity":
+        kd = config.braking * ratio
+        return config.held_to_plan * kd, 1e-3 * config.held_to_plan * kd, kd
+    kd = config.velocity * _inertia(robot, payload)
+    return kd * (config.position + config.integral), kd * config.position * config.integral, kd
 
 
 def _inertia(robot: RobotModel, payload: float) -> np.ndarray:

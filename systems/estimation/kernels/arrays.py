@@ -125,10 +125,10 @@ class DriveMemory(NamedTuple):
     """What one command hands on to the next."""
 
     started: np.ndarray  # (1,)
-    z: np.ndarray  # (9, 6, 2), integral of a following error, and the error, of each of nine torques
-    w: np.ndarray  # (9, 6), those torques
-    beta: np.ndarray  # (47,), parameters of the regression
-    led: np.ndarray  # (2, 47), the same as they are used, which follow those, and their rates
+    z: np.ndarray  # (10, 6, 2), integral of a following error, and the error, of each of ten torques
+    w: np.ndarray  # (10, 6), those torques
+    beta: np.ndarray  # (48,), parameters of the regression
+    led: np.ndarray  # (2, 48), the same as they are used, which follow those, and their rates
     correction: np.ndarray  # (6,) rad
 
 
@@ -173,7 +173,7 @@ class Ring(NamedTuple):
 class OpenKeyframe(NamedTuple):
     """Samples that are being merged: sums of what they say, each times its weight."""
 
-    A: np.ndarray  # (n, n), of H^T W H
+    A: np.ndarray  # (n, n), of H^T W H, its lower half until it is merged
     b: np.ndarray  # (n,), of H^T W y with y = r + H xi
     samples: np.ndarray  # (1,)
     weight: np.ndarray  # (1,)

@@ -14,14 +14,14 @@ _MOST_PERIODS = 1.5  # by which torques are sent ahead or held back
 
 @compiled
 def features(v, a, filtered, Phi):
-    """Rows of the regression, (6, 47), which are zero before; see `DriveModel.features`."""
+    """Rows of the regression, (6, 48), which are zero before; see `DriveModel.features`."""
     for i in range(6):
         Phi[i, 0] = Phi[i, 1 + i] = v[i]
         Phi[i, 7 + i] = 1e-2 * a[i]
         for k in range(4):
             Phi[i, 13 + 4 * i + k] = filtered[6 * k + i]
         Phi[i, 37 + i] = 1.0
-        for k in range(4):
+        for k in range(5):
             Phi[i, 43 + k] = filtered[6 * (4 + k) + i]
 
 
@@ -31,6 +31,7 @@ def _behind(v, a, filtered, beta, i):
     total = v * beta[0] + v * beta[1 + i] + 1e-2 * a * beta[7 + i]
     for k in range(4):
         total += filtered[6 * k + i] * beta[13 + 4 * i + k]
+    for k in range(5):
         total += filtered[6 * (4 + k) + i] * beta[43 + k]
     return total + beta[37 + i]
 
@@ -142,13 +143,16 @@ def command(drives, arm, masses, memory, motion, loads, mass, limits, out, filte
         mass: of the payload, kg.
         limits: the frequency in rad/s with which commands follow what was learnt, and what the correction
             may add to the speed of a joint in rad/s.
-        out: (3, 6), position, velocity and torque; filtered: (48,), what `features` takes, of rotor, viscous
-            and Coulomb friction and its hump, of a kilogram and of a kg m along each axis; are written.
+        out: (3, 6), position, velocity and torque; filtered: (54,), what `features` takes, of rotor, viscous
+            and Coulomb friction and its hump, of a kilogram and of a kg m along each axis, and of a kilogram
+            that is not held; are written.
     """
     theta, v, a = motion
-    X_WE, frames, held, w = np.empty((4, 4)), np.empty((7, 4, 4)), np.empty(6), np.empty(9)
+    X_WE, frames, w = np.empty((4, 4)), np.empty((7, 4, 4)), np.empty(10)
+    held, with_more = np.empty(6), np.empty(6)
     place_links(arm, theta, X_WE, frames)
     hold(masses, drives.payload, frames, theta, held)
+    hold(masses, drives.payload + 1.0, frames, theta, with_more)
     is_first, most = memory.started[0] == 0.0, drives.period * limits[1]
     led, rate = memory.led
     if is_first:
@@ -163,6 +167,7 @@ def command(drives, arm, masses, memory, motion, loads, mass, limits, out, filte
         w[4] = w[3] * math.exp(-abs(v[i]) / drives.slow)
         for k in range(4):
             w[5 + k] = loads[1 + k, i]
+        w[9] = with_more[i] - held[i]
         w[0] = needed = w[1] + w[2] + w[3] + loads[0, i] + mass * loads[1, i] - held[i]
         z, last = memory.z[:, i], memory.w[:, i]
         out[0, i], out[1, i], out[2, i] = theta[i], v[i], 0.0
@@ -170,7 +175,7 @@ def command(drives, arm, masses, memory, motion, loads, mass, limits, out, filte
             out[2, i] = needed if is_first else needed + ahead * (needed - last[0])
             last[0] = w[0] = 0.0  # nothing is missing
         if is_first:
-            for k in range(9):
+            for k in range(10):
                 z[k, 0] = w[k] / drives.ki[i]
         else:
             _filter(drives.step[i], z, last, w)
@@ -179,7 +184,7 @@ def command(drives, arm, masses, memory, motion, loads, mass, limits, out, filte
             out[0, i] += e
             out[1, i] += (needed - drives.kp[i] * e - drives.ki[i] * integral) / drives.kd[i]
         last[0] = needed
-        for k in range(1, 9):
+        for k in range(1, 10):
             last[k], filtered[6 * (k - 1) + i] = w[k], z[k, 1]
         correction = _behind(v[i], a[i], filtered, led, i)
         before = correction if is_first else memory.correction[i]

@@ -8,36 +8,40 @@ from robots.compiled import compiled, inner
 
 
 @compiled
-def take(r, gears, H, xi, seen, weights, weight, keyframe, past, limits):
+def take(r, gears, H, xi, seen, weights, weight, keyframe, known, limits):
     """Adds six equations r = H (x - xi) to an open keyframe, and finds the estimate that follows.
 
     Args:
         r: (6,), gears: deflections in rad, (6,), H: (6, n), xi: (n,), renewed by `estimate`.
         seen: theta, motion, twist, s since the first stamp and shapes of the gears' errors of this instant.
         weights: of the equations, (6,), all times ``weight``.
-        keyframe: `OpenKeyframe`; is renewed.
-        past: A, b, xi_sum, sigma and g as of `estimate`.
+        keyframe: `OpenKeyframe`; is renewed, of its A the lower half.
+        known: P, (n, n), the covariance without this sample, and how many have been taken into it, (1,), both
+            renewed, infinitely many if it is no covariance; b, xi_sum, sigma and g as of `estimate`.
         limits: rad, how far the robot may go from its first sample before the keyframe is to be closed; and
             the trust of `estimate`.
 
     Returns:
-        Whether the robot is further away than that; then xi is as it was.
+        Whether the robot is further away than that.
     """
     theta, motion, twist, time, shapes = seen
-    A, b, xi_sum, sigma, g = past
+    P, taken, b, xi_sum, sigma, g = known
     step, trust = limits
     n = len(xi)
     shares, errors, means = np.empty(6), np.empty(6), keyframe.means
+    scaled = np.empty((6, n))
     for i in range(6):
         y = r[i]
         for k in range(n):
             y += H[i, k] * xi[k]
         keyframe.y[i] += weight * y
         shares[i], errors[i] = weight * weights[i], y
+        scale = math.sqrt(shares[i])
         for j in range(n):
             keyframe.H[i, j] += weight * H[i, j]
+            scaled[i, j] = scale * H[i, j]
     add_squares(H, shares, errors, keyframe.A, keyframe.b)
-    complete(keyframe.A)
+    taken[0] = taken[0] + 1.0 if narrow(P, scaled) else np.inf
     if keyframe.samples[0] == 0.0:
         for i in range(6):
             keyframe.first_theta[i] = theta[i]
@@ -55,9 +59,46 @@ def take(r, gears, H, xi, seen, weights, weight, keyframe, past, limits):
     for k in range(len(shapes)):
         for i in range(6):
             means[31 + 6 * k + i] += weight * shapes[k, i]
-    if not is_far:
-        estimate(A, keyframe.A, b, keyframe.b, xi_sum, sigma, g, trust, xi)
+    estimate(P, b, keyframe.b, xi_sum, sigma, g, trust, xi)
     return is_far
+
+
+@inner
+def narrow(P, G):
+    """P = A^-1 becomes (A + G^T G)^-1; says whether it can, else it stays as it is.
+
+    That is P - V^T (1 + V G^T)^-1 V with V = G P, of six rows.
+
+    Args:
+        P: symmetric, (n, n), is renewed.
+        G: (6, n).
+    """
+    V = np.dot(G, P)
+    S = np.dot(V, G.T)
+    for i in range(6):  # 1 + S = L L^T
+        for h in range(i + 1):
+            left = S[i, h] + (1.0 if h == i else 0.0)
+            for m in range(h):
+                left -= S[i, m] * S[h, m]
+            if h < i:
+                S[i, h] = left / S[h, h]
+            elif left > 0.0:
+                S[i, i] = math.sqrt(left)
+            else:
+                return False
+    n = len(P)
+    for i in range(6):  # L^-1 V in the place of V
+        row = V[i]
+        for h in range(i):
+            factor, above = S[i, h], V[h]
+            for k in range(n):
+                row[k] -= factor * above[k]
+        scale = 1.0 / S[i, i]
+        for k in range(n):
+            row[k] *= scale
+    add_squares(V, np.full(6, -1.0), np.zeros(6), P, np.zeros(n))
+    complete(P)
+    return True
 
 
 @inner
@@ -89,72 +130,44 @@ def complete(A):
 
 
 @compiled
-def solve(A, A_open, B, X):
-    """Solves (A + A_open) X = B, by Cholesky's method; says whether the sum is positive definite.
-
-    Args:
-        A, A_open: symmetric, (n, n).
-        B: (n, m).
-        X: (n, m), is written.
-    """
-    n, m = B.shape
-    U = np.empty((n, n))  # U^T U, of which each row is finished by those above
+def invert(L, P):
+    """P = (L L^T)^-1, both (n, n), of the lower half of L; P is written."""
+    n = len(L)
+    inverse = np.zeros((n, n))  # of L
     for i in range(n):
-        for k in range(i, n):
-            U[i, k] = A[i, k] + A_open[i, k]
-        for k in range(m):
-            X[i, k] = B[i, k]
-    for first in range(0, n, 4):  # four at once, as the rows below are read and written only once then
-        end = min(first + 4, n)
+        row, scale = inverse[i], 1.0 / L[i, i]
+        for k in range(i):
+            factor, above = scale * L[i, k], inverse[k]
+            for j in range(k + 1):
+                row[j] -= factor * above[j]
+        row[i] = scale
+    P[:] = 0.0
+    ones, zeros, unused = np.ones(6), np.zeros(6), np.zeros(n)
+    rows = np.zeros((6, n))
+    for first in range(0, n, 6):
+        end = min(first + 6, n)
+        rows[:] = 0.0
         for i in range(first, end):
-            for h in range(first, i):
-                factor, above, row = U[h, i], U[h, i:], U[i, i:]
-                for k in range(len(row)):
-                    row[k] -= factor * above[k]
-                for k in range(m):
-                    X[i, k] -= factor * X[h, k]
-            if not U[i, i] > 0.0:
-                return False
-            scale, row = 1.0 / math.sqrt(U[i, i]), U[i, i:]
-            for k in range(len(row)):
-                row[k] *= scale
-            for k in range(m):
-                X[i, k] *= scale
-        for j in range(end, n):
-            p, q, r, s = U[first, j], U[first + 1, j], U[first + 2, j], U[first + 3, j]
-            one, two, three, four = U[first, j:], U[first + 1, j:], U[first + 2, j:], U[first + 3, j:]
-            row = U[j, j:]
-            for k in range(len(row)):
-                row[k] -= p * one[k] + q * two[k] + r * three[k] + s * four[k]
-            for k in range(m):
-                X[j, k] -= p * X[first, k] + q * X[first + 1, k] + r * X[first + 2, k] + s * X[first + 3, k]
-    for i in range(n - 1, -1, -1):
-        for k in range(m):
-            for j in range(i + 1, n):
-                X[i, k] -= U[i, j] * X[j, k]
-            X[i, k] /= U[i, i]
-    return True
+            rows[i - first] = inverse[i]
+        add_squares(rows[:, :end], ones, zeros, P[:end, :end], unused[:end])
+    complete(P)
 
 
 @compiled
-def estimate(A, A_open, b, b_open, xi_sum, sigma, g, trust, xi):
-    """xi = (A + A_open)^-1 (b + b_open), but near where the sums are linear; no change if there is none.
+def estimate(P, b, b_open, xi_sum, sigma, g, trust, xi):
+    """xi = P (b + b_open), but near where the sums are linear.
 
     Args:
-        A, A_open, b, b_open: (n, n) and (n,).
+        P, b, b_open: (n, n) and (n,).
         xi_sum: (n,), from which no step is larger than the trust in the first g unknowns.
         sigma: units of the unknowns, (n,); trust: m or rad.
         xi: (n,), is renewed.
     """
     n = len(b)
-    B, X = np.empty((n, 1)), np.empty((n, 1))
-    for k in range(n):
-        B[k, 0] = b[k] + b_open[k]
-    if not solve(A, A_open, B, X):
-        return
+    found = np.dot(P, b + b_open)
     largest = 1e-12
     for k in range(g):
-        largest = max(largest, abs((X[k, 0] - xi_sum[k]) * sigma[k]))
+        largest = max(largest, abs((found[k] - xi_sum[k]) * sigma[k]))
     share = min(1.0, trust / largest)
     for k in range(n):
-        xi[k] = xi_sum[k] + share * (X[k, 0] - xi_sum[k])
+        xi[k] = xi_sum[k] + share * (found[k] - xi_sum[k])

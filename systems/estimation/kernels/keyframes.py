@@ -53,9 +53,10 @@ def merge(c, unknowns, masses, xi, opened, row):
 
     Args:
         c, unknowns, masses: the arm at xi, (n,).
-        opened: `OpenKeyframe`.
+        opened: `OpenKeyframe`; its A is completed.
         row: is written.
     """
+    complete(opened.A)
     total, means, number = opened.weight[0], opened.means, len(xi)
     for k in range(POSE):
         row[k] = means[k] / total

@@ -136,7 +136,8 @@ def test_the_tip_of_a_realistic_kr_16_is_where_the_law_says(seed):
     prepared = prepare("everything-realistic", drawn, "kr16-realistic")
     log = run(prepared.scenario, "self_calibrating", prepared.robot)
     assert log.learnt is not None
-    assert log.learnt["coverage"]["share"] >= 0.86  # 0.95 of eighty samples, which are alike in turns
+    # 0.95 of eighty samples, which are alike in turns: they count as half of that, or less
+    assert log.learnt["coverage"]["share"] >= 0.81
 
 
 @pytest.mark.slow
@@ -180,13 +181,24 @@ def test_a_camera_five_times_as_noisy_as_the_law_is_told_sets_nothing_off(noise)
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("interface", "moving"), [("direct", 0.15e-3), ("egm", 0.08e-3)])
+@pytest.mark.parametrize(("interface", "moving"), [("direct", 0.06e-3), ("egm", 0.08e-3)])
 def test_a_robot_that_follows_speeds_alone_does_not_drift_from_its_plan(interface, moving):
     """Without encoders in the command it did by 0.16 and 0.03 mm until it rested."""
     settings = [f"station.interface={interface}", "servo.laws.self_calibrating.drive=velocity"]
     on_path, at_rest = tip_errors(run(load_scenario("everything", settings), "self_calibrating"))
     assert on_path.max() < moving
     assert at_rest.mean() < 0.01e-3
+
+
+@pytest.mark.slow
+def test_drives_without_a_loop_of_speed_are_known_for_what_they_are():
+    """Taken for a cascade they left 0.07 mm on the second lap and 0.03 mm at rest; they ring at its start."""
+    settings = ["servo.laws.self_calibrating.drive=position", "reference.laps=2"]
+    log = run(load_scenario("everything", settings), "self_calibrating")
+    on_path, at_rest = tip_errors(log)
+    assert on_path.max() < 0.2e-3
+    assert on_path[len(on_path) // 2 :].max() < 0.05e-3
+    assert at_rest.mean() < 0.015e-3
 
 
 @pytest.mark.slow
@@ -237,6 +249,21 @@ def test_a_load_that_is_picked_up_is_made_up_for_and_named(seed):
     assert changes
     assert changes[0]["time_s"] == pytest.approx(6.0, abs=0.1)
     assert sum(event["size"] for event in changes) == pytest.approx(7.0, abs=2.0)  # beside what springs are
+    assert not any(log.guard_counts.values())
+
+
+@pytest.mark.slow
+def test_a_load_that_neither_robot_nor_law_was_told_is_made_up_for_and_named():
+    drawn = [f"{name}=4001" for name in ("seed", "station.errors.random.seed", "station.variation.seed")]
+    untold = ["station.drive.payload=0", "servo.model.payload=0"]
+    log = run(load_scenario("everything", [*untold, *drawn]), "self_calibrating")
+    on_path, at_rest = tip_errors(log)
+    assert on_path.max() < 0.08e-3
+    assert at_rest.max() < 0.01e-3
+    assert log.learnt is not None
+    (event,) = log.learnt["events"]
+    assert event["kind"] == "load unlike belief"
+    assert event["time_s"] < log.path_start
     assert not any(log.guard_counts.values())
 
 

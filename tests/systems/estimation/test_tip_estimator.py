@@ -262,11 +262,25 @@ def test_a_load_that_is_picked_up_is_named():
     assert session.error(seen=True) < 60e-6
 
 
+@pytest.mark.parametrize("change", [-6.0, 6.0])
+def test_a_load_that_was_never_as_believed_is_found_out_and_named(change):
+    session = Session(4)
+    model, memory = session.model, session.memory
+    session.arm.x = session.arm.x.copy()
+    session.arm.x[model.M.start] += change
+    session.learn(6.0)
+    assert [event.kind for event in session.events] == ["load unlike belief"]
+    assert session.error(seen=True) < 40e-6
+    found, true = session.estimator.x(memory)[model.M.start], session.arm.x[model.M.start]
+    variance = session.estimator.covariance(memory)[model.M.start, model.M.start]
+    assert abs(found - true) < 3.0 * model.sigma[model.M.start] * np.sqrt(variance)
+
+
 def test_a_load_that_may_have_changed_is_as_unknown_as_one_may_be_and_nothing_else_is():
     session = Session(2)
     session.learn(5.0)
     model, memory = session.model, session.memory
-    before = np.linalg.inv(memory.keyframes.A + memory.A_open)
+    before = memory.P.copy()
     session.estimator.open_load(session.memory)
     opened = session.estimator.covariance(session.memory)
     assert np.linalg.eigvalsh(opened).min() > 0.0

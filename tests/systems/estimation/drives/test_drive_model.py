@@ -9,6 +9,7 @@ from robots.description.model import load_robot
 from systems.controller_model import ControllerModel
 from systems.estimation.drives.drive_model import (
     DEAD_TIME,
+    HELD,
     MASS,
     MOMENT,
     SIZE,
@@ -77,6 +78,39 @@ def test_a_load_that_turns_over_with_the_motion_is_not_taken_for_friction():
 
     with_moment, without = friction(MOMENT.stop), friction(MASS)
     assert with_moment.max() < 0.3 * without.max()
+
+
+def test_a_load_that_drives_hold_unlike_belief_is_learnt_once_nothing_is_certain_of_loads_any_more():
+    def learnt(is_open: bool) -> tuple[float, float]:
+        """The kilograms that are not held as the model has them in the end, and how far motors are behind."""
+        model, memory = drives()
+        if is_open:
+            model.widen(memory, is_told_otherwise=True)
+        beta = np.zeros(SIZE)
+        beta[HELD] = -3.0  # drives hold three kilograms more than is believed
+        behind = run(model, memory, 3.0, beta)[-250:].max()
+        return memory.beta[HELD], behind
+
+    (found, behind), (closed, behind_closed) = learnt(is_open=True), learnt(is_open=False)
+    assert found == pytest.approx(-3.0, abs=0.2)
+    assert closed == 0.0
+    assert behind < 0.1 * behind_closed
+
+
+@pytest.mark.parametrize(
+    ("kind", "behind"), [("position", 100.0 / 80.0), ("velocity", 100.0 / (7.0 * 100.0))]
+)
+def test_a_drive_that_follows_one_thing_alone_is_behind_by_its_own_gain(kind, behind):
+    robot = load_robot("irb1200")
+    belief = ControllerModel(robot, 7.0, PERIOD)
+    model = DriveModel(belief, DriveModelConfig(), kind)
+    drives = model._drives
+    # 100 N m of the motor that nobody gives, after a second
+    step, torque = drives.step[1], 100.0 * abs(robot.gear_ratio[1])
+    z = np.zeros(2)
+    for _ in range(round(1.0 / PERIOD)):
+        z = step @ [*z, torque, 0.0]
+    assert z[1] == pytest.approx(behind, rel=0.03)
 
 
 def test_torques_are_sent_ahead_by_the_dead_time_that_was_learnt():

@@ -58,7 +58,7 @@ def test_the_predicted_tip_is_as_wrong_as_its_covariance_says_when_all_else_is_k
     memory = estimator.layout.view(np.zeros(estimator.layout.size))
     estimator.start(memory)
     memory.xi[:] = (arm.x - model.mean) / model.sigma
-    memory.keyframes.A[:] = 1e14 * np.eye(model.size)
+    memory.P[:] = 1e-14 * np.eye(model.size)
     sigma = np.full(6, STEP / np.sqrt(12.0))
     squares = []
     for time in np.linspace(0.0, 30.0, 200):

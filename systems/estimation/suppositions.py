@@ -1,0 +1,82 @@
+"""What is taken for granted until samples speak against it: a clock that does not drift, and the load."""
+
+import math
+from types import SimpleNamespace
+
+import numpy as np
+
+from systems.estimation.events import CLOCK_DRIFTS, LOAD_UNLIKE_BELIEF, Event
+from systems.estimation.memory import Layout
+from systems.estimation.tip_model import TipModel
+
+_LEAST_DRIFT, _DRIFT_SIGMAS = 1e-4, 8.0  # s/s; and how sure it has to be: what nothing describes adds up
+_LOAD_CHI_SQUARED = 30.0  # of four: what nothing describes, as errors of gears, makes up to 13
+
+
+class Suppositions:
+    """Two beliefs that hold an estimate firmly, and are given up by what it would be without them.
+
+    With information I on some unknowns x_o about zero the estimate is P b. Without it the covariance is
+
+        P' = P + P_o (I^-1 - P_oo)^-1 P_o^T
+
+    whose rows of these unknowns are (1 - P_oo I)^-1 P_o^T, and the estimate P' b. Where that is far from
+    zero, for what it may be wrong by, the belief is wrong.
+    """
+
+    def __init__(self, model: TipModel) -> None:
+        """Takes the model whose unknowns these are."""
+        self._model = model
+        # Information on a load that may be any; who believes in a larger spread already is left with that
+        self._any_load = np.diag(np.minimum(model.changed_load**-2, np.diag(model.prior)[model.M]))
+        self.layout = Layout(
+            drift=(1,),  # information on it
+            load=(1,),  # whether what is believed of it has been held all along
+        )
+
+    def start(self, memory: SimpleNamespace) -> None:
+        """Writes what is supposed before the first sample."""
+        memory.drift[0], memory.load[0] = self._model.prior[self._model.D, self._model.D], 1.0
+
+    def prior(self, memory: SimpleNamespace) -> np.ndarray:
+        """What is known before any sample as far as it still holds, (n, n)."""
+        model, prior = self._model, self._model.prior.copy()
+        prior[model.D, model.D] = memory.drift[0]
+        if not memory.load[0]:
+            prior[model.M, model.M] = self._any_load
+        return prior
+
+    def look(self, memory: SimpleNamespace, P: np.ndarray, b: np.ndarray) -> tuple[Event, np.ndarray] | None:
+        """Gives up what samples speak against; says so, and by how much `prior` changes, (n, n).
+
+        Args:
+            memory: of the layout; is renewed, and with it `prior`.
+            P: covariance of the estimate, (n, n).
+            b: of all samples, (n,): P b is the estimate.
+        """
+        before = self.prior(memory)
+        event = self._given_up(memory, P, b)
+        return event and (event, self.prior(memory) - before)
+
+    def _given_up(self, memory: SimpleNamespace, P: np.ndarray, b: np.ndarray) -> Event | None:
+        model = self._model
+        if memory.drift[0] > 1.0:
+            drift = slice(model.D, model.D + 1)
+            x, covariance = _if_free(P, b, drift, np.array([[memory.drift[0] - 1.0]]))
+            size = float(x[0] * model.sigma[model.D])
+            if abs(size) > _LEAST_DRIFT and abs(x[0]) > _DRIFT_SIGMAS * math.sqrt(covariance[0, 0]):
+                memory.drift[0] = 1.0
+                return Event(CLOCK_DRIFTS, size, 0.0)
+        if memory.load[0]:
+            held = model.prior[model.M, model.M]
+            x, covariance = _if_free(P, b, model.M, held - self._any_load)
+            if x @ np.linalg.solve(covariance + np.linalg.inv(held), x) > _LOAD_CHI_SQUARED:
+                memory.load[0] = 0.0
+                return Event(LOAD_UNLIKE_BELIEF, float(x[0] * model.sigma[model.M][0]), 0.0)
+        return None
+
+
+def _if_free(P: np.ndarray, b: np.ndarray, of: slice, held: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """What k unknowns would be if so much information, (k, k), did not hold them, (k,), and covariance."""
+    rows = np.linalg.solve(np.eye(len(held)) - P[of, of] @ held, P[of])
+    return rows @ b, rows[:, of]

@@ -1,0 +1,65 @@
+"""What is supposed until samples speak against it, against estimates that never supposed it."""
+
+import copy
+
+import numpy as np
+import pytest
+
+from systems.estimation.suppositions import Suppositions
+from tests.systems.estimation.arms import tip_model
+
+MODEL = tip_model()
+
+
+def supposed(model=MODEL):
+    suppositions = Suppositions(model)
+    memory = suppositions.layout.view(np.zeros(suppositions.layout.size))
+    suppositions.start(memory)
+    return suppositions, memory
+
+
+def samples_of(x: np.ndarray, rows: int, seed: int = 0) -> tuple[np.ndarray, np.ndarray]:
+    """Information H^T H of some rows, and H^T y where y is what x gives, without noise."""
+    H = np.random.default_rng(seed).normal(size=(rows, MODEL.size))
+    return H.T @ H, H.T @ (H @ x)
+
+
+@pytest.mark.parametrize(("drift", "load"), [(0.0, 0.0), (500e-6, 0.0), (0.0, 6.0)])
+def test_what_is_given_up_is_what_is_wrong_and_the_estimate_is_as_if_it_had_never_been_supposed(drift, load):
+    suppositions, memory = supposed()
+    x = np.zeros(MODEL.size)
+    x[MODEL.D], x[MODEL.M.start] = drift / MODEL.sigma[MODEL.D], load / MODEL.sigma[MODEL.M][0]
+    A, b = samples_of(x, 3 * MODEL.size)
+    before = suppositions.prior(memory)
+    found = suppositions.look(memory, np.linalg.inv(A + before), b)
+    if not drift and not load:
+        assert found is None
+        return
+    assert found is not None
+    event, change = found
+    assert event.kind == ("clock drifts" if drift else "load unlike belief")
+    assert event.size == pytest.approx(drift or load, rel=0.05)
+    np.testing.assert_allclose(before + change, suppositions.prior(memory))
+    assert not np.linalg.eigvalsh(suppositions.prior(memory)).min() <= 0.0
+    assert suppositions.look(memory, np.linalg.inv(A + before + change), b) is None
+
+
+def test_a_load_within_its_spread_is_what_was_believed():
+    suppositions, memory = supposed()
+    x = np.zeros(MODEL.size)
+    x[MODEL.M.start] = 2.0
+    A, b = samples_of(x, 3 * MODEL.size)
+    assert suppositions.look(memory, np.linalg.inv(A + suppositions.prior(memory)), b) is None
+
+
+def test_who_believes_that_a_load_may_be_any_has_nothing_to_give_up():
+    model = copy.copy(MODEL)
+    model.changed_load = np.full(4, 0.5)  # of the spreads that are believed
+    suppositions, memory = supposed(model)
+    x = np.zeros(MODEL.size)
+    x[MODEL.M] = 2.0
+    A, b = samples_of(x, 3 * MODEL.size)
+    before = suppositions.prior(memory)
+    assert suppositions.look(memory, np.linalg.inv(A + before), b) is None
+    memory.load[0] = 0.0
+    np.testing.assert_array_equal(suppositions.prior(memory), before)
