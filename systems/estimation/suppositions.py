@@ -31,7 +31,7 @@ class Suppositions:
         self._any_load = np.diag(np.minimum(model.changed_load**-2, np.diag(model.prior)[model.M]))
         self.layout = Layout(
             drift=(1,),  # information on it
-            load=(1,),  # whether what is believed of it has been held all along
+            load=(1,),  # whether it has been held all along; else it was given up, or something has happened
         )
 
     def start(self, memory: SimpleNamespace) -> None:

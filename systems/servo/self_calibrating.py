@@ -28,8 +28,7 @@ from systems.servo.self_calibrating_config import SelfCalibratingConfig
 from systems.servo.self_calibrating_learning import UNREST, Learning
 
 _STARTING, _LED_IN = 1.5, 2.0  # s
-# 1/s, by which motors are brought back to their plan; with a delay T less, a third of 1 / T
-_LARGEST_GAIN, _SHARE_OF_DELAY = 7.0, 0.3
+_SHARE_OF_DELAY = 0.3  # of 1 / T with a delay T, by which motors are brought back to their plan at most
 _FOLLOWED = 4.0  # rad of the lead's frequency, after which nine tenths of a step are followed
 
 
@@ -330,7 +329,9 @@ class SelfCalibrating(LeafSystem):
         planned = self._learning.plan.at(memory.plan, joints.time)
         if planned is None:
             return np.zeros(NUM_JOINTS)
-        gain = min(_LARGEST_GAIN, _SHARE_OF_DELAY / max(float(memory.delay.delay[0]), self.period))
+        gain = min(
+            self._config.drives.held_to_plan, _SHARE_OF_DELAY / max(float(memory.delay.delay[0]), self.period)
+        )
         return np.nan_to_num(gain * (planned[:NUM_JOINTS] - joints.position))  # none where they are not known
 
     def _work_out(

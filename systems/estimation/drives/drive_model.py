@@ -47,7 +47,8 @@ class DriveModelConfig:
     # Of drives that follow positions alone: N m of the motor for a rad, and for that over a second
     stiffness: float = 80.0
     restoring: float = 1.0
-    # Of drives that follow speeds alone: N m of the motor for a rad/s; and how they are held to the plan, 1/s
+    # Of drives that follow speeds alone: N m of the motor for a rad/s; and how their motors are brought back
+    # to the plan, 1/s, less where commands are late
     braking: float = 100.0
     held_to_plan: float = 7.0
     # Standard deviations. That of one following error is larger than its noise by far, because what the
@@ -223,7 +224,7 @@ class DriveModel:
         """
         extra = np.zeros(SIZE)
         extra[_CONSTANTS], extra[MASS], extra[DEAD_TIME] = 3e-5, 5.0 * self._scale, 1e-3
-        extra[MOMENT] = 5.0 * self._moment
+        extra[MOMENT] = 5.0 * self._moment  # of 7 kg that are gripped 50 mm away
         extra[HELD] = 5.0 * self._scale * is_told_otherwise
         memory.P[_DIAGONAL, _DIAGONAL] += extra**2
 

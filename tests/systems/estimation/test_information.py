@@ -35,6 +35,16 @@ def test_the_estimate_after_a_sample_is_that_of_least_squares(n):
     np.testing.assert_allclose(np.tril(keyframe.A), np.tril(A_then - A), atol=1e-12)
 
 
+@pytest.mark.parametrize("n", [1, 5, 12, 54])
+def test_a_covariance_is_worked_out_from_the_factor_of_its_inverse(n):
+    A, P = information(n), np.empty((n, n))
+    L = np.linalg.cholesky(A)
+    L[np.triu_indices(n, 1)] = np.nan  # which nobody reads
+    kernels.information.invert(L, P)
+    np.testing.assert_allclose(P @ A, np.eye(n), atol=1e-9)
+    np.testing.assert_array_equal(P, P.T)
+
+
 def test_what_is_no_covariance_any_more_stays_as_it_is_and_is_said():
     P, taken, H = -np.eye(7), np.zeros(1), 2.0 * np.eye(6, 7)
     before, zeros = P.copy(), np.zeros(7)

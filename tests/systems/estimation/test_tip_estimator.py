@@ -262,6 +262,16 @@ def test_a_load_that_is_picked_up_is_named():
     assert session.error(seen=True) < 60e-6
 
 
+def test_the_covariance_that_is_kept_is_that_of_all_that_samples_said():
+    session = Session(3)
+    memory = session.memory
+    session.learn(3.0)
+    lower = np.tril(memory.keyframes.A + memory.A_open)
+    P = np.linalg.inv(lower + np.tril(lower, -1).T)
+    np.testing.assert_allclose(memory.P, P, atol=1e-8 * np.abs(P).max())
+    np.testing.assert_array_equal(memory.P, memory.P.T)
+
+
 @pytest.mark.parametrize("change", [-6.0, 6.0])
 def test_a_load_that_was_never_as_believed_is_found_out_and_named(change):
     session = Session(4)
