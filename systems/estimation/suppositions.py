@@ -11,6 +11,7 @@ from systems.estimation.tip_model import TipModel
 
 _LEAST_DRIFT, _DRIFT_SIGMAS = 1e-4, 8.0  # s/s; and how sure it has to be: what nothing describes adds up
 _LOAD_CHI_SQUARED = 30.0  # of four: what nothing describes, as errors of gears, makes up to 13
+_SETTLED = 2  # looks
 
 
 class Suppositions:
@@ -32,6 +33,7 @@ class Suppositions:
         self.layout = Layout(
             drift=(1,),  # information on it
             load=(1,),  # whether it has been held all along; else it was given up, or something has happened
+            settled=(1,),  # looks in a row at samples that were linearised near the estimate
         )
 
     def start(self, memory: SimpleNamespace) -> None:
@@ -46,15 +48,21 @@ class Suppositions:
             prior[model.M, model.M] = self._any_load
         return prior
 
-    def look(self, memory: SimpleNamespace, P: np.ndarray, b: np.ndarray) -> tuple[Event, np.ndarray] | None:
+    def look(
+        self, memory: SimpleNamespace, P: np.ndarray, b: np.ndarray, is_settled: bool
+    ) -> tuple[Event, np.ndarray] | None:
         """Gives up what samples speak against; says so, and by how much `prior` changes, (n, n).
+
+        What samples say of the load that were linearised far off may be anything: they must have settled.
 
         Args:
             memory: of the layout; is renewed, and with it `prior`.
             P: covariance of the estimate, (n, n).
             b: of all samples, (n,): P b is the estimate.
+            is_settled: whether the samples were linearised near the estimate.
         """
         before = self.prior(memory)
+        memory.settled[0] = memory.settled[0] + 1.0 if is_settled else 0.0
         event = self._given_up(memory, P, b)
         return event and (event, self.prior(memory) - before)
 
@@ -67,7 +75,7 @@ class Suppositions:
             if abs(size) > _LEAST_DRIFT and abs(x[0]) > _DRIFT_SIGMAS * math.sqrt(covariance[0, 0]):
                 memory.drift[0] = 1.0
                 return Event(CLOCK_DRIFTS, size, 0.0)
-        if memory.load[0]:
+        if memory.load[0] and memory.settled[0] >= _SETTLED:
             held = model.prior[model.M, model.M]
             x, covariance = _if_free(P, b, model.M, held - self._any_load)
             if x @ np.linalg.solve(covariance + np.linalg.inv(held), x) > _LOAD_CHI_SQUARED:

@@ -284,11 +284,11 @@ class TipEstimator:
     def _look_at_suppositions(self, memory: SimpleNamespace) -> Event | None:
         """Gives up what samples speak against."""
         memory.is_busy[0] = 1.0
-        b = memory.keyframes.b + memory.b_open
-        found = self._suppositions.look(memory.supposed, memory.P, b)
+        keyframes, is_settled = memory.keyframes, self._keyframes.is_settled(memory.keyframes, memory.xi)
+        found = self._suppositions.look(memory.supposed, memory.P, keyframes.b + memory.b_open, is_settled)
         if found is None:
             return None
-        self._keyframes.add(memory.keyframes, found[1])
+        self._keyframes.add(keyframes, found[1])
         self._solve(memory)
         return found[0]
 

@@ -18,6 +18,10 @@ def supposed(model=MODEL):
     return suppositions, memory
 
 
+def look_twice(suppositions, memory, P, b):
+    return suppositions.look(memory, P, b, True) or suppositions.look(memory, P, b, True)
+
+
 def samples_of(x: np.ndarray, rows: int, seed: int = 0) -> tuple[np.ndarray, np.ndarray]:
     """Information H^T H of some rows, and H^T y where y is what x gives, without noise."""
     H = np.random.default_rng(seed).normal(size=(rows, MODEL.size))
@@ -31,7 +35,7 @@ def test_what_is_given_up_is_what_is_wrong_and_the_estimate_is_as_if_it_had_neve
     x[MODEL.D], x[MODEL.M.start] = drift / MODEL.sigma[MODEL.D], load / MODEL.sigma[MODEL.M][0]
     A, b = samples_of(x, 3 * MODEL.size)
     before = suppositions.prior(memory)
-    found = suppositions.look(memory, np.linalg.inv(A + before), b)
+    found = look_twice(suppositions, memory, np.linalg.inv(A + before), b)
     if not drift and not load:
         assert found is None
         return
@@ -42,7 +46,17 @@ def test_what_is_given_up_is_what_is_wrong_and_the_estimate_is_as_if_it_had_neve
     P = np.linalg.inv(A + before + change)
     wrong = MODEL.D if drift else MODEL.M.start
     assert event.size == pytest.approx(MODEL.sigma[wrong] * (P @ b)[wrong], rel=1e-6)
-    assert suppositions.look(memory, P, b) is None
+    assert look_twice(suppositions, memory, P, b) is None
+
+
+@pytest.mark.parametrize("settled", [(False, False), (True, False), (False, True), (True, False, True)])
+def test_the_load_is_not_given_up_by_samples_that_were_linearised_far_off(settled):
+    suppositions, memory = supposed()
+    x = np.zeros(MODEL.size)
+    x[MODEL.M.start] = 6.0 / MODEL.sigma[MODEL.M][0]
+    A, b = samples_of(x, 3 * MODEL.size)
+    P = np.linalg.inv(A + suppositions.prior(memory))
+    assert not any(suppositions.look(memory, P, b, is_settled) for is_settled in settled)
 
 
 def test_a_load_within_its_spread_is_what_was_believed():
@@ -50,7 +64,7 @@ def test_a_load_within_its_spread_is_what_was_believed():
     x = np.zeros(MODEL.size)
     x[MODEL.M.start] = 2.0
     A, b = samples_of(x, 3 * MODEL.size)
-    assert suppositions.look(memory, np.linalg.inv(A + suppositions.prior(memory)), b) is None
+    assert look_twice(suppositions, memory, np.linalg.inv(A + suppositions.prior(memory)), b) is None
 
 
 def test_who_believes_that_a_load_may_be_any_has_nothing_to_give_up():
@@ -61,6 +75,6 @@ def test_who_believes_that_a_load_may_be_any_has_nothing_to_give_up():
     x[MODEL.M] = 2.0
     A, b = samples_of(x, 3 * MODEL.size)
     before = suppositions.prior(memory)
-    assert suppositions.look(memory, np.linalg.inv(A + before), b) is None
+    assert look_twice(suppositions, memory, np.linalg.inv(A + before), b) is None
     memory.load[0] = 0.0
     np.testing.assert_array_equal(suppositions.prior(memory), before)
