@@ -4,13 +4,15 @@ In the scenario `everything` the tool goes from rest to rest along lines between
 up to 15 degrees, and never the same way twice. For each part of the time a row says how far the true tip was
 from the path in motion and at rest, how well the law knows it, what its ticks cost and how much memory the
 process has. Errors that grow, an estimate that freezes or memory that is not given back would show. An hour
-takes about half an hour on one core; a row is printed when its part is over.
+takes about half an hour on one core; a row is printed when its part is over. With ``--state`` what there is
+then is written to a file, and a run that was ended goes on from there, with other noise of the camera.
 """
 
+import argparse
 import math
-import sys
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
+from pathlib import Path
 
 import numpy as np
 import psutil
@@ -80,28 +82,78 @@ def random_waypoints(robot: RobotModel, scenario: Scenario, count: int, seed: in
     return found
 
 
-def hours_scenario(hours: float, seed: int) -> Scenario:
-    """The scenario `everything` with a path of so many hours, and a robot of that seed."""
+def hours_scenario(hours: float, seed: int, max_step: float | None = None) -> Scenario:
+    """The scenario `everything` with a path of so many hours, and a robot of that seed.
+
+    Args:
+        hours: of the path, or a little more.
+        seed: of the robot and of the path.
+        max_step: of the integrator in s; None for the one that makes it right to less than a micrometre.
+    """
     drawn = [f"{name}={seed}" for name in ("seed", "station.errors.random.seed", "station.variation.seed")]
     scenario = load_scenario("everything", drawn)
     reference = replace(scenario.reference, dwell=REST, laps=1)
     pair = make_path(replace(reference, path=Points([Waypoint(), Waypoint()]), settle=0.0))
     count = math.ceil(3600.0 * hours / pair.duration) + 1
     points = random_waypoints(load_robot(scenario.robot), scenario, count, seed)
-    return replace(scenario, reference=replace(reference, path=Points(points)))
+    return replace(
+        scenario,
+        reference=replace(reference, path=Points(points)),
+        integrator=replace(scenario.integrator, max_step=max_step),
+    )
 
 
-def parts(scenario: Scenario, seconds: float) -> Iterator[Part]:
-    """Runs the law; a part of so many seconds after the other."""
-    experiment, process = Experiment(scenario, LAW), psutil.Process()
+def parts(scenario: Scenario, seconds: float, state: Path | None = None) -> Iterator[Part]:
+    """Runs the law; a part of so many seconds after the other.
+
+    Args:
+        scenario: what to run.
+        seconds: of each part.
+        state: a file that keeps the end of the last part; if it is there, the run goes on from it.
+    """
+    process = psutil.Process()
+    if state and state.exists():
+        experiment = resumed(scenario, state)
+        until = experiment.context.get_time()
+    else:
+        experiment = Experiment(scenario, LAW)
+        until = experiment.path.path_start
     end = experiment.path.duration
-    until = experiment.path.path_start
     while until < end:
         until = min(until + seconds, end)
         experiment.advance(until)
         log = experiment.log()
         experiment.forget()
+        if state:
+            keep(experiment, state)
         yield seen(log, process.memory_info().rss)
+
+
+def keep(experiment: Experiment, state: Path) -> None:
+    """Writes to a file where an experiment stands: time, continuous and discrete state."""
+    context = experiment.context
+    groups = [context.get_discrete_state(i).value() for i in range(context.num_discrete_state_groups())]
+    sizes, x = [len(group) for group in groups], context.get_continuous_state_vector().CopyToVector()
+    written = state.with_suffix(".part")
+    with written.open("wb") as file:  # as a whole or not at all
+        np.savez(file, time=context.get_time(), continuous=x, discrete=np.concatenate(groups), sizes=sizes)
+    written.replace(state)
+
+
+def resumed(scenario: Scenario, state: Path) -> Experiment:
+    """An experiment that goes on where `keep` left it; only the camera's noise is drawn from another seed."""
+    with np.load(state) as kept:
+        time = float(kept["time"])
+        experiment = Experiment(scenario, LAW, seed=scenario.seed + 1 + round(time))
+        context = experiment.context
+        context.SetTime(time)
+        context.SetContinuousState(kept["continuous"])
+        groups = np.split(kept["discrete"], np.cumsum(kept["sizes"])[:-1])
+    for i, group in enumerate(groups):
+        context.SetDiscreteState(i, group)
+    experiment.simulator.Initialize()
+    experiment.forget()  # what the record shows of the start
+    return experiment
 
 
 def seen(log: RunLog, memory: int) -> Part:
@@ -130,12 +182,18 @@ def resting(X_WE_desired: np.ndarray, times: np.ndarray) -> np.ndarray:
     return times - last > _SETTLED
 
 
-def main(hours: float, seed: int) -> None:
+def main() -> None:
     """Prints a row for each part of the time."""
-    scenario = hours_scenario(hours, seed)
+    parser = argparse.ArgumentParser(description="The self-calibrating law for hours.")
+    parser.add_argument("hours", type=float, nargs="?", default=HOURS)
+    parser.add_argument("seed", type=int, nargs="?", default=1)
+    parser.add_argument("--state", type=Path, help="keeps where the run stands; goes on from there")
+    parser.add_argument("--max-step", type=float, help="of the integrator in s")
+    args = parser.parse_args()
+    scenario = hours_scenario(args.hours, args.seed, args.max_step)
     head = "   until   mm in motion   degrees      rms   mm at rest   coverage   tick us, 99.9 %, max    MB"
     print(head, flush=True)
-    for part in parts(scenario, 3600.0 / PARTS_AN_HOUR):
+    for part in parts(scenario, 3600.0 / PARTS_AN_HOUR, args.state):
         ticks = 1e6 * np.quantile(part.ticks, [0.5, 0.999, 1.0])
         print(
             f"{part.until:7.0f} s {1e3 * part.in_motion:12.4f} {np.rad2deg(part.angle):9.4f} "
@@ -146,4 +204,4 @@ def main(hours: float, seed: int) -> None:
 
 
 if __name__ == "__main__":
-    main(float(sys.argv[1]) if len(sys.argv) > 1 else HOURS, int(sys.argv[2]) if len(sys.argv) > 2 else 1)
+    main()

@@ -1,10 +1,12 @@
 """Hours of work: random paths that the robot can follow, and a record that is emptied on the way."""
 
+from dataclasses import replace
+
 import numpy as np
 
 from diagrams.runs.simulation import Experiment
 from diagrams.scenario.scenario import load_scenario
-from experiments.bench.learning.hours import hours_scenario, resting
+from experiments.bench.learning.hours import LAW, hours_scenario, keep, resting, resumed
 from robots.description.model import load_robot
 from robots.dynamics.newton_inverse import inverse_kinematics
 from systems.reference.paths import make_path
@@ -47,3 +49,20 @@ def test_what_is_kept_after_the_record_was_emptied_is_the_rest_of_the_record():
     rest, full = parted.log(), whole.log()
     assert 0.2 <= rest.time[0] < 0.21
     assert np.array_equal(rest.X_WE_true, full.X_WE_true[-len(rest.time) :])
+
+
+def test_a_run_that_was_ended_goes_on_as_if_it_had_not_been(tmp_path):
+    scenario = load_scenario("misaligned", ["reference.settle=0"])
+    camera = replace(scenario.station.camera, orientation_sigma_deg=0.0, position_sigma=0.0)
+    scenario = replace(scenario, station=replace(scenario.station, camera=camera))
+    whole = Experiment(scenario, LAW)
+    whole.advance(0.6)
+    keep(whole, tmp_path / "state.npz")
+    ended = resumed(scenario, tmp_path / "state.npz")
+    for experiment in (whole, ended):
+        experiment.forget()
+        experiment.advance(0.8)
+    rest, full = ended.log(), whole.log()
+    np.testing.assert_array_equal(rest.time, full.time)
+    np.testing.assert_allclose(rest.X_WE_true, full.X_WE_true, atol=1e-8)
+    assert np.ptp(full.X_WE_true[:, :3, 3], axis=0).max() > 1e-3  # it moves
