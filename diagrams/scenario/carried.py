@@ -93,21 +93,37 @@ def _metres(p: np.ndarray) -> str:
 
 
 def _with_load(scenario: Scenario, before: RobotModel, robot: RobotModel) -> Scenario:
-    """The same share of the largest payload, also in what the controller believes and in what happens."""
+    """The same share of the largest payload, as far from where the robot's file has its centre.
+
+    Also in what the controllers believe and in what happens.
+    """
     largest = before.payload.largest_mass
     share = robot.payload.largest_mass / largest if largest > 0.0 else 0.0
+    further = 1e3 * (robot.payload.center_of_mass - before.payload.center_of_mass)
     station, model = scenario.station, scenario.servo.model
 
-    def carried(mass: float) -> float:
-        return round(share * mass, 4)
+    def carried(mass: float | None) -> float | None:
+        return None if mass is None else round(share * mass, 4)
+
+    def beside(centre_mm: list[float]) -> list[float]:
+        return (
+            [round(c + d, 3) for c, d in zip(centre_mm, further.tolist(), strict=True)] if centre_mm else []
+        )
 
     events = [
-        replace(event, payload=carried(event.payload)) if isinstance(event, PayloadChange) else event
+        replace(event, payload=carried(event.payload), centre_mm=beside(event.centre_mm))
+        if isinstance(event, PayloadChange)
+        else event
         for event in station.events
     ]
-    station = replace(station, payload=carried(station.payload), events=events)
-    if model.payload is not None:
-        model = replace(model, payload=carried(model.payload))
+    station = replace(
+        station,
+        payload=carried(station.payload),
+        payload_centre_mm=beside(station.payload_centre_mm),
+        drive=replace(station.drive, payload=carried(station.drive.payload)),
+        events=events,
+    )
+    model = replace(model, payload=carried(model.payload), payload_centre_mm=beside(model.payload_centre_mm))
     return replace(scenario, station=station, servo=replace(scenario.servo, model=model))
 
 

@@ -36,6 +36,7 @@ _KEEP_EVERY = 10  # samples, between two notes of what is known
 _INVERT_AFTER = 500  # samples, if no pass through the keyframes gives reason to
 _LOOK_EVERY = 50  # samples, between two looks at what is supposed, halfway between two such notes
 _CALM_WEIGHT = 0.2  # of a sample, below which it says nothing of events or of the camera
+_STEP_WEIGHT = 0.01  # likewise of a step, which may have begun to be led in before it is called one
 _CLOSE_AT = (5, 20, 60)  # samples: the first linearisations are poor
 
 
@@ -221,7 +222,7 @@ class TipEstimator:
                 memory.was_settled[0] = self._keyframes.is_settled(memory.keyframes, memory.xi)
             if verdict.is_doubtful and memory.was_settled[0]:
                 return None  # a few samples later it is known what they mean
-            if verdict.has_jumped and weight > _CALM_WEIGHT:
+            if verdict.has_jumped and weight > (_STEP_WEIGHT if memory.was_settled[0] else _CALM_WEIGHT):
                 event = self._innovations.explain(innovations, H, self.model)
                 is_open = self._displacement.begin(memory.after_step, is_load=event.kind == LOAD_CHANGED)
                 if event.kind == TOOL_DISPLACED and is_open:
@@ -371,9 +372,8 @@ class TipEstimator:
 
     def _open(self, memory: SimpleNamespace, share: float, others: np.ndarray | float) -> None:
         """Adds to the covariance of the unknowns: a share of the load's spread, and others, (n, n)."""
-        model = self.model
+        model, load = self.model, np.zeros(self.model.size)
         P = memory.P + others
-        load = np.zeros(model.size)
         load[model.M] = share * model.changed_load
         self._begin_from(memory, np.linalg.inv(P + np.diag(load**2)), memory.xi)
 

@@ -22,10 +22,10 @@ from systems.estimation.memory import Layout
 # Torque that is needed beside the feedforward; rotor, viscous, Coulomb, and what that has more at low speeds;
 # the load of a kilogram, and of a kg m of its first moment along x, y, z; a kilogram that is not held.
 _FILTERED = 10
-COLUMNS = 6 * (_FILTERED - 1)
+COLUMNS = 6 * (_FILTERED + 1)  # of all but the first, of a planner, and of what is late beside the plan
 _HUMPS, _CONSTANTS = slice(16, 37, 4), slice(37, 43)
-DEAD_TIME, MASS, MOMENT, HELD = 0, 43, slice(44, 47), 47
-SIZE = HELD + 1
+DEAD_TIME, MASS, MOMENT, HELD, SMOOTHED = 0, 43, slice(44, 47), 47, 48
+SIZE = SMOOTHED + 1
 # Of Coulomb's friction, the spread of what there may be more of it; less where it is learnt early, or the
 # first lap of robots without a hump is twisted more
 _HUMP, _EARLY_HUMP = 0.3, 0.1
@@ -51,11 +51,15 @@ class DriveModelConfig:
     # to the plan, 1/s, less where commands are late
     braking: float = 100.0
     held_to_plan: float = 7.0
+    following: float = (
+        20.0  # 1/s, with which the planner of a robot's controller follows references, as of EGM
+    )
     # Standard deviations. That of one following error is larger than its noise by far, because what the
     # model leaves of it stays the same for many samples.
     following_sigma: float = 4e-4  # rad
     dead_time_sigma: float = 3e-3  # s, of all joints alike
     lag_sigma: float = 3e-4  # s, of each joint
+    smoothing_sigma: float = 5e-4  # s, by which a controller's planner smooths speeds
     # Of a robot that carries 7 kg; of a larger one in proportion
     payload_sigma: float = 0.5  # kg
     moment_sigma: float = 0.07  # kg m, first moment of the payload: 7 kg whose centre is off by 10 mm
@@ -67,7 +71,7 @@ class DriveCommand(NamedTuple):
     position: np.ndarray  # (6,) rad
     velocity: np.ndarray  # (6,) rad/s
     torque: np.ndarray  # (6,) N m, joint side, on top of what the drives do for gravity
-    columns: np.ndarray  # (54,), what `DriveModel.features` needs of this instant
+    columns: np.ndarray  # (66,), what `DriveModel.features` needs of this instant
 
 
 class DriveModel:
@@ -84,7 +88,11 @@ class DriveModel:
     told, and holds against gravity, may be another one than the robot carries and than anybody believes: a
     kilogram that is not held is a column of its own, from when the load turns out not to be as believed.
 
-    Where drives take torques, these are sent ahead by the dead time that was learnt, as positions are.
+    Where drives take torques, these are sent ahead by the dead time that was learnt, as positions are; of
+    Coulomb friction, which turns over in an instant, its mean over the period that they will last. Where they
+    are not taken, commands run ahead of the plan by G w, which is late, too: to the speed of the plan belongs
+    the rate of G w. And the planner of the robot's controller is between, which follows references with a
+    gain and may smooth their speeds, by a time T, as that of EGM does: it is behind by T a / (s + gain).
     """
 
     def __init__(self, model: ControllerModel, config: DriveModelConfig, kind: str = "cascade") -> None:
@@ -116,6 +124,7 @@ class DriveModel:
             period,
             payload,
             model.takes_torque,
+            config.following,
         )
         # The arm as the drives know it, which hold it against gravity.
         drawn = ArmGeometry(robot, np.array([], dtype=int))
@@ -123,7 +132,7 @@ class DriveModel:
         spread = [config.dead_time_sigma, *[config.lag_sigma] * 6, *[1e-4] * 6]
         self._scale, self._moment = model.load_scale, config.moment_sigma * model.load_scale
         spread += [0.3, 0.3, 0.5, 0.0] * 6 + [_RESTS[kind]] * 6
-        spread += [config.payload_sigma * self._scale] + [self._moment] * 3 + [0.0]
+        spread += [config.payload_sigma * self._scale] + [self._moment] * 3 + [0.0, config.smoothing_sigma]
         self._prior = np.diag(np.array(spread) ** 2)
         self.layout = Layout(
             started=(1,),
@@ -133,6 +142,7 @@ class DriveModel:
             led=(2, SIZE),  # beta as commands use it, and its rate
             P=(SIZE, SIZE),
             correction=(6,),
+            smooth=(6,),
         )
 
     def start(self, memory: SimpleNamespace) -> None:
@@ -155,7 +165,7 @@ class DriveModel:
             mass: of the payload as the drives' own gravity compensation has it in kg.
 
         """
-        known = DriveMemory(memory.started, memory.z, memory.w, memory.beta, memory.led, memory.correction)
+        known = DriveMemory(*(memory.__dict__[name] for name in DriveMemory._fields))
         out, columns = np.empty((3, 6)), np.empty(COLUMNS)
         limits = _LED_IN, _STEEPEST
         kernels.drives.command(self._drives, *self._held, known, motion, loads, mass, limits, out, columns)
@@ -163,7 +173,7 @@ class DriveModel:
         return DriveCommand(position, velocity, torque, columns)
 
     def features(self, v: np.ndarray, a: np.ndarray, columns: np.ndarray) -> np.ndarray:
-        """Rows of the regression, shape (6, 48), from motion and the filtered torques (54,)."""
+        """Rows of the regression, shape (6, 49), from motion and the filtered torques (66,)."""
         Phi = np.zeros((6, SIZE))
         kernels.drives.features(v, a, columns, Phi)
         return Phi
@@ -182,7 +192,7 @@ class DriveModel:
         Args:
             memory: of the layout.
             planned: position, velocity and acceleration, (6,) each.
-            columns, correction: of the command of that instant, (54,) and (6,) in rad.
+            columns, correction: of the command of that instant, (66,) and (6,) in rad.
             actual: where the motors were, rad, (6,).
             most: nothing is learnt if more than this is not explained yet, rad; of a joint with much friction
                 for the stiffness of its drive that much more.

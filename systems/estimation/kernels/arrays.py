@@ -119,6 +119,7 @@ class Drives(NamedTuple):
     period: float  # s
     payload: float  # kg, with which the drives hold the arm
     takes_torque: bool
+    following: float  # 1/s, gain with which a controller's planner follows references
 
 
 class DriveMemory(NamedTuple):
@@ -127,9 +128,10 @@ class DriveMemory(NamedTuple):
     started: np.ndarray  # (1,)
     z: np.ndarray  # (10, 6, 2), integral of a following error, and the error, of each of ten torques
     w: np.ndarray  # (10, 6), those torques
-    beta: np.ndarray  # (48,), parameters of the regression
-    led: np.ndarray  # (2, 48), the same as they are used, which follow those, and their rates
+    beta: np.ndarray  # (49,), parameters of the regression
+    led: np.ndarray  # (2, 49), the same as they are used, which follow those, and their rates
     correction: np.ndarray  # (6,) rad
+    smooth: np.ndarray  # (6,) rad/s, accelerations through 1 / (s + following)
 
 
 class Gap(NamedTuple):

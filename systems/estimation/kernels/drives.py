@@ -14,24 +14,25 @@ _MOST_PERIODS = 1.5  # by which torques are sent ahead or held back
 
 @compiled
 def features(v, a, filtered, Phi):
-    """Rows of the regression, (6, 48), which are zero before; see `DriveModel.features`."""
+    """Rows of the regression, (6, 49), which are zero before; see `DriveModel.features`."""
     for i in range(6):
-        Phi[i, 0] = Phi[i, 1 + i] = v[i]
+        Phi[i, 0] = Phi[i, 1 + i] = v[i] + filtered[60 + i]
         Phi[i, 7 + i] = 1e-2 * a[i]
         for k in range(4):
             Phi[i, 13 + 4 * i + k] = filtered[6 * k + i]
         Phi[i, 37 + i] = 1.0
-        for k in range(5):
+        for k in range(6):
             Phi[i, 43 + k] = filtered[6 * (4 + k) + i]
 
 
 @inner
 def _behind(v, a, filtered, beta, i):
     """The row of a joint times the parameters."""
-    total = v * beta[0] + v * beta[1 + i] + 1e-2 * a * beta[7 + i]
+    rate = v + filtered[60 + i]
+    total = rate * beta[0] + rate * beta[1 + i] + 1e-2 * a * beta[7 + i]
     for k in range(4):
         total += filtered[6 * k + i] * beta[13 + 4 * i + k]
-    for k in range(5):
+    for k in range(6):
         total += filtered[6 * (4 + k) + i] * beta[43 + k]
     return total + beta[37 + i]
 
@@ -130,6 +131,20 @@ def _filter(step, z, last, w):
             z[k, i] = row[0] * integral + row[1] * e + row[2] * before + row[3] * change
 
 
+@inner
+def _mean_sign(v, change, width):
+    """The mean of tanh(v / width) while the speed changes evenly by so much."""
+    begin, end = v / width, (v + change) / width
+    if abs(end - begin) < 1e-3:
+        return math.tanh(0.5 * (begin + end))
+    return (_log_cosh(end) - _log_cosh(begin)) / (end - begin)
+
+
+@inner
+def _log_cosh(x):
+    return abs(x) + math.log1p(math.exp(-2.0 * abs(x)))  # less log 2
+
+
 @compiled
 def command(drives, arm, masses, memory, motion, loads, mass, limits, out, filtered):
     """What to command so that motors move as planned, see `DriveModel.command`.
@@ -143,9 +158,10 @@ def command(drives, arm, masses, memory, motion, loads, mass, limits, out, filte
         mass: of the payload, kg.
         limits: the frequency in rad/s with which commands follow what was learnt, and what the correction
             may add to the speed of a joint in rad/s.
-        out: (3, 6), position, velocity and torque; filtered: (54,), what `features` takes, of rotor, viscous
-            and Coulomb friction and its hump, of a kilogram and of a kg m along each axis, and of a kilogram
-            that is not held; are written.
+        out: (3, 6), position, velocity and torque; filtered: (66,), what `features` takes, of rotor, viscous
+            and Coulomb friction and its hump, of a kilogram and of a kg m along each axis, of a kilogram
+            that is not held; the accelerations that a planner smooths, and how fast the command runs away
+            from the plan in rad/s; are written.
     """
     theta, v, a = motion
     X_WE, frames, w = np.empty((4, 4)), np.empty((7, 4, 4)), np.empty(10)
@@ -153,6 +169,7 @@ def command(drives, arm, masses, memory, motion, loads, mass, limits, out, filte
     place_links(arm, theta, X_WE, frames)
     hold(masses, drives.payload, frames, theta, held)
     hold(masses, drives.payload + 1.0, frames, theta, with_more)
+    fading = math.exp(-drives.following * drives.period)
     is_first, most = memory.started[0] == 0.0, drives.period * limits[1]
     led, rate = memory.led
     if is_first:
@@ -160,7 +177,8 @@ def command(drives, arm, masses, memory, motion, loads, mass, limits, out, filte
     follow(memory.beta, limits[0], drives.period, led, rate)
     # Periods that a torque has to be sent ahead: it arrives late by what was learnt, and is held for a period
     # in whose middle it should be right. A dead time that is wrong by more is corrected by the plan.
-    ahead = 0.5 + min(max(led[0] / drives.period, -_MOST_PERIODS), _MOST_PERIODS)
+    late = drives.period * min(max(led[0] / drives.period, -_MOST_PERIODS), _MOST_PERIODS)
+    ahead = 0.5 + late / drives.period
     for i in range(6):
         w[1], w[2] = drives.rotor[i] * a[i], drives.viscous[i] * v[i]
         w[3] = drives.coulomb[i] * math.tanh(v[i] / drives.width[i])
@@ -170,9 +188,12 @@ def command(drives, arm, masses, memory, motion, loads, mass, limits, out, filte
         w[9] = with_more[i] - held[i]
         w[0] = needed = w[1] + w[2] + w[3] + loads[0, i] + mass * loads[1, i] - held[i]
         z, last = memory.z[:, i], memory.w[:, i]
+        filtered[60 + i] = 0.0
         out[0, i], out[1, i], out[2, i] = theta[i], v[i], 0.0
+        smooth = needed - w[3]
         if drives.takes_torque:
-            out[2, i] = needed if is_first else needed + ahead * (needed - last[0])
+            turned = drives.coulomb[i] * _mean_sign(v[i] + late * a[i], drives.period * a[i], drives.width[i])
+            out[2, i] = needed if is_first else smooth + ahead * (smooth - last[0]) + turned
             last[0] = w[0] = 0.0  # nothing is missing
         if is_first:
             for k in range(10):
@@ -181,11 +202,16 @@ def command(drives, arm, masses, memory, motion, loads, mass, limits, out, filte
             _filter(drives.step[i], z, last, w)
         if not drives.takes_torque:
             integral, e = z[0, 0], z[0, 1]
+            filtered[60 + i] = (needed - drives.kp[i] * e - drives.ki[i] * integral) / drives.kd[i]
             out[0, i] += e
-            out[1, i] += (needed - drives.kp[i] * e - drives.ki[i] * integral) / drives.kd[i]
-        last[0] = needed
+            out[1, i] += filtered[60 + i]
+        last[0] = smooth if drives.takes_torque else needed
         for k in range(1, 10):
             last[k], filtered[6 * (k - 1) + i] = w[k], z[k, 1]
+        if not drives.takes_torque:
+            settled = a[i] / drives.following
+            memory.smooth[i] = settled + fading * (memory.smooth[i] - settled)
+        filtered[54 + i] = memory.smooth[i]
         correction = _behind(v[i], a[i], filtered, led, i)
         before = correction if is_first else memory.correction[i]
         correction = before + min(max(correction - before, -most), most)
