@@ -89,14 +89,23 @@ def test_the_same_machine_with_errors_keeps_the_scenario():
     assert carried_over(scenario, IRB1200, wrong) == (scenario, "")
 
 
-def test_a_load_is_the_same_share_wherever_it_is_named():
-    events = "station.events=[!PayloadChange {at: 8, payload: 3.5}]"
-    scenario, _ = carried_over(load_scenario("everything", [events]), IRB1200, load_robot("kr16"))
-    assert scenario.station.payload == pytest.approx(16.0)
-    assert scenario.servo.model.payload == pytest.approx(6.65 / 7.0 * 16.0)
-    (event,) = scenario.station.events
+def test_a_load_is_the_same_share_as_far_from_its_place_wherever_it_is_named():
+    settings = [
+        "station.events=[!PayloadChange {at: 8, payload: 3.5, centre_mm: [0, 0, 60]}]",
+        "station.drive.payload=3.5",
+    ]
+    before, robot = load_scenario("everything", settings), load_robot("kr16")
+    scenario, _ = carried_over(before, IRB1200, robot)
+    station, model = scenario.station, scenario.servo.model
+    assert (station.payload, station.drive.payload) == (16.0, 8.0)
+    assert model.payload == pytest.approx(6.65 / 7.0 * 16.0)
+    (event,) = station.events
     assert isinstance(event, PayloadChange)
     assert event.payload == pytest.approx(8.0)
+    further = 1e3 * (robot.payload.center_of_mass - IRB1200.payload.center_of_mass)
+    np.testing.assert_allclose(event.centre_mm, further + np.array([0.0, 0.0, 60.0]))
+    was = before.station.payload_centre_mm, before.servo.model.payload_centre_mm
+    np.testing.assert_allclose((station.payload_centre_mm, model.payload_centre_mm), further + was)
 
 
 def test_the_home_position_of_a_robot_file_counts():

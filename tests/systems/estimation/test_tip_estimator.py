@@ -143,6 +143,20 @@ def test_a_displaced_tool_is_seen_and_learnt(shift):
     assert np.linalg.norm(left[3:]) < 40e-6
 
 
+def test_a_step_is_seen_though_what_its_first_samples_said_is_being_led_in():
+    session = Session(3)
+    session.learn(3.0)
+
+    def displaced(pair):
+        X_WE = pair.X_WE.copy()
+        X_WE[:3, 3] += X_WE[:3, :3] @ np.array([0.5e-3, 0.0, 0.0])
+        return pair._replace(X_WE=X_WE, unrest=0.3)
+
+    session.learn(3 * PERIOD, change=lambda pair: displaced(pair)._replace(unrest=0.0))
+    session.learn(12 * PERIOD, change=displaced)
+    assert [event.kind for event in session.events] == ["tool or camera displaced"]
+
+
 @pytest.mark.parametrize(
     ("turn", "shift"), [((0.0, 0.0, 0.0), (0.5e-3, 0.0, 0.0)), ((1e-3, 0.0, -1e-3), (0.0, 0.4e-3, 0.3e-3))]
 )

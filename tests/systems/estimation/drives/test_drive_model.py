@@ -13,9 +13,11 @@ from systems.estimation.drives.drive_model import (
     MASS,
     MOMENT,
     SIZE,
+    SMOOTHED,
     DriveModel,
     DriveModelConfig,
 )
+from systems.link.abb.motion import EgmMotion, EgmMotionConfig
 
 PERIOD = 4e-3
 LOADS = np.zeros((5, 18))
@@ -134,6 +136,53 @@ def test_a_dead_time_beyond_what_is_left_to_the_drives_does_not_make_torques_jum
         )
 
     np.testing.assert_array_equal(largest(30e-3), largest(1.5 * PERIOD))
+
+
+@pytest.mark.parametrize("dead_time", [0.0, 3e-3])
+def test_where_a_motor_turns_over_its_friction_is_sent_as_the_mean_of_a_period_and_never_more(dead_time):
+    model, memory = drives()
+    memory.beta[DEAD_TIME] = dead_time
+    believed, acceleration = model._drives, 4.0  # rad/s^2: through all of the width within a period
+    assert (acceleration * PERIOD > believed.width).all()
+    weightless = [0, 5]  # of the joints: what holds the others changes on the way
+
+    def friction(time: np.ndarray) -> np.ndarray:
+        return believed.coulomb * np.tanh(acceleration * time[:, None] / believed.width)
+
+    for k in range(-25, 25):
+        time = (k + 0.3) * PERIOD
+        v = np.full(6, acceleration * time)
+        moved = 0.5 * acceleration * time**2 * np.ones(6)
+        sent = model.command(memory, (moved, v, np.full(6, acceleration)), LOADS, 0.0).torque
+        if k == -25:
+            continue
+        # Rotor and viscous friction change evenly.
+        even = believed.rotor * acceleration + believed.viscous * acceleration * (
+            time + dead_time + 0.5 * PERIOD
+        )
+        lasts = friction(time + dead_time + np.linspace(0.0, PERIOD, 2001)).mean(axis=0)
+        held = memory.w[0] - believed.rotor * acceleration - believed.viscous * v
+        left = sent - even - held - lasts
+        np.testing.assert_allclose(left[weightless], 0.0, atol=1e-3 * believed.coulomb.min())
+
+
+@pytest.mark.parametrize("bandwidth", [30.0, 100.0, 0.0])
+def test_what_the_planner_of_egm_is_behind_is_a_multiple_of_its_column_at_any_frequency(bandwidth):
+    model, memory = drives(takes_torque=False)
+    egm = EgmMotion(EgmMotionConfig(bandwidth=bandwidth), PERIOD)
+    context, behind, column = egm.CreateDefaultContext(), [], []
+    egm.set_at_rest(context, motion(0.0)[0])
+    for k in range(1000):
+        theta, v, a = motion(k * PERIOD)
+        columns = model.command(memory, (theta, v, a), LOADS, 7.0).columns
+        egm.GetInputPort("position_command").FixValue(context, theta)
+        egm.GetInputPort("velocity_command").FixValue(context, v)
+        behind.append(theta - egm.GetOutputPort("position_command").Eval(context))
+        column.append(model.features(v, a, columns)[:, SMOOTHED])
+        context.SetDiscreteState(egm.EvalUniquePeriodicDiscreteUpdate(context))
+    y, x = np.ravel(behind[200:]), np.ravel(column[200:])  # from when the start is forgotten
+    smoothed = (x @ y) / (x @ x)  # s
+    assert np.std(y - smoothed * x) < 0.05 * np.std(y)
 
 
 def test_the_position_command_makes_up_for_a_torque_that_nobody_gives():
