@@ -181,7 +181,9 @@ def command(drives, arm, masses, memory, motion, loads, mass, limits, out, filte
     ahead = 0.5 + late / drives.period
     for i in range(6):
         w[1], w[2] = drives.rotor[i] * a[i], drives.viscous[i] * v[i]
-        w[3] = drives.coulomb[i] * math.tanh(v[i] / drives.width[i])
+        # Torques change evenly from one instant to the next: so does the mean of the period about each.
+        turn = drives.period * a[i]
+        w[3] = drives.coulomb[i] * _mean_sign(v[i] - 0.5 * turn, turn, drives.width[i])
         w[4] = w[3] * math.exp(-abs(v[i]) / drives.slow)
         for k in range(4):
             w[5 + k] = loads[1 + k, i]
@@ -192,7 +194,7 @@ def command(drives, arm, masses, memory, motion, loads, mass, limits, out, filte
         out[0, i], out[1, i], out[2, i] = theta[i], v[i], 0.0
         smooth = needed - w[3]
         if drives.takes_torque:
-            turned = drives.coulomb[i] * _mean_sign(v[i] + late * a[i], drives.period * a[i], drives.width[i])
+            turned = drives.coulomb[i] * _mean_sign(v[i] + late * a[i], turn, drives.width[i])
             out[2, i] = needed if is_first else smooth + ahead * (smooth - last[0]) + turned
             last[0] = w[0] = 0.0  # nothing is missing
         if is_first:
