@@ -34,7 +34,7 @@ def _renewed(memory: SimpleNamespace) -> list[np.ndarray]:
         drives.w.ravel(),
         drives.correction,
         drives.led.ravel(),
-        drives.smooth,
+        drives.smoothed,
         delay.delay,
         delay.rate,
         delay.settled,

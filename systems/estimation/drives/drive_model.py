@@ -142,7 +142,7 @@ class DriveModel:
             led=(2, SIZE),  # beta as commands use it, and its rate
             P=(SIZE, SIZE),
             correction=(6,),
-            smooth=(6,),
+            smoothed=(6,),
         )
 
     def start(self, memory: SimpleNamespace) -> None:

@@ -192,10 +192,10 @@ def command(drives, arm, masses, memory, motion, loads, mass, limits, out, filte
         z, last = memory.z[:, i], memory.w[:, i]
         filtered[60 + i] = 0.0
         out[0, i], out[1, i], out[2, i] = theta[i], v[i], 0.0
-        smooth = needed - w[3]
+        even = needed - w[3]  # what changes evenly
         if drives.takes_torque:
             turned = drives.coulomb[i] * _mean_sign(v[i] + late * a[i], turn, drives.width[i])
-            out[2, i] = needed if is_first else smooth + ahead * (smooth - last[0]) + turned
+            out[2, i] = needed if is_first else even + ahead * (even - last[0]) + turned
             last[0] = w[0] = 0.0  # nothing is missing
         if is_first:
             for k in range(10):
@@ -207,13 +207,13 @@ def command(drives, arm, masses, memory, motion, loads, mass, limits, out, filte
             filtered[60 + i] = (needed - drives.kp[i] * e - drives.ki[i] * integral) / drives.kd[i]
             out[0, i] += e
             out[1, i] += filtered[60 + i]
-        last[0] = smooth if drives.takes_torque else needed
+        last[0] = even if drives.takes_torque else needed
         for k in range(1, 10):
             last[k], filtered[6 * (k - 1) + i] = w[k], z[k, 1]
         if not drives.takes_torque:
             settled = a[i] / drives.following
-            memory.smooth[i] = settled + fading * (memory.smooth[i] - settled)
-        filtered[54 + i] = memory.smooth[i]
+            memory.smoothed[i] = settled + fading * (memory.smoothed[i] - settled)
+        filtered[54 + i] = memory.smoothed[i]
         correction = _behind(v[i], a[i], filtered, led, i)
         before = correction if is_first else memory.correction[i]
         correction = before + min(max(correction - before, -most), most)
