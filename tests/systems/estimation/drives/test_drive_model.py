@@ -166,6 +166,20 @@ def test_where_a_motor_turns_over_its_friction_is_sent_as_the_mean_of_a_period_a
         np.testing.assert_allclose(left[weightless], 0.0, atol=1e-3 * believed.coulomb.min())
 
 
+def test_of_a_dead_time_all_that_is_commanded_is_late_and_not_the_plan_alone():
+    model, memory = drives(takes_torque=False)
+    sent, columns = [], []
+    for k in range(300):
+        theta, v, a = motion(k * PERIOD)
+        command = model.command(memory, (theta, v, a), LOADS, 7.0)
+        sent.append(command.position)
+        columns.append(model.features(v, a, command.columns)[:, DEAD_TIME])
+    rates = np.gradient(np.array(sent), PERIOD, axis=0)[100:-1]
+    planned = np.array([motion(k * PERIOD)[1] for k in range(100, 299)])
+    off = np.std(np.array(columns)[100:-1] - rates, axis=0)
+    assert (off < 0.2 * np.std(planned - rates, axis=0)).all()
+
+
 @pytest.mark.parametrize("bandwidth", [30.0, 100.0, 0.0])
 def test_what_the_planner_of_egm_is_behind_is_a_multiple_of_its_column_at_any_frequency(bandwidth):
     model, memory = drives(takes_torque=False)
