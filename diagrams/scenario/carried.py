@@ -106,9 +106,7 @@ def _with_load(scenario: Scenario, before: RobotModel, robot: RobotModel) -> Sce
         return None if mass is None else round(share * mass, 4)
 
     def beside(centre_mm: list[float]) -> list[float]:
-        return (
-            [round(c + d, 3) for c, d in zip(centre_mm, further.tolist(), strict=True)] if centre_mm else []
-        )
+        return np.round(further + centre_mm, 3).tolist() if centre_mm else []
 
     events = [
         replace(event, payload=carried(event.payload), centre_mm=beside(event.centre_mm))

@@ -11,7 +11,7 @@ from systems.estimation.tip_model import TipModel
 
 _LEAST_DRIFT, _DRIFT_SIGMAS = 1e-4, 8.0  # s/s; and how sure it has to be: what nothing describes adds up
 _LOAD_CHI_SQUARED = 30.0  # of four: what nothing describes, as errors of gears, makes up to 13
-_SETTLED = 2  # looks
+_SETTLED = 2  # looks: a sum that was read anew just now has been right once by chance, never twice
 
 
 class Suppositions:

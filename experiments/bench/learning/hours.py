@@ -133,22 +133,35 @@ def keep(experiment: Experiment, state: Path) -> None:
     """Writes to a file where an experiment stands: time, continuous and discrete state."""
     context = experiment.context
     groups = [context.get_discrete_state(i).value() for i in range(context.num_discrete_state_groups())]
-    sizes, x = [len(group) for group in groups], context.get_continuous_state_vector().CopyToVector()
+    x, discrete = context.get_continuous_state_vector().CopyToVector(), np.concatenate(groups)
     written = state.with_suffix(".part")
     with written.open("wb") as file:  # as a whole or not at all
-        np.savez(file, time=context.get_time(), continuous=x, discrete=np.concatenate(groups), sizes=sizes)
+        np.savez(file, of=_identity(experiment), time=context.get_time(), continuous=x, discrete=discrete)
     written.replace(state)
 
 
+def _identity(experiment: Experiment) -> list[float]:
+    """What has to be alike for a state to fit: seed and length of the path, and the sizes of the state."""
+    context = experiment.context
+    sizes = [context.get_discrete_state(i).size() for i in range(context.num_discrete_state_groups())]
+    return [experiment.scenario.seed, experiment.path.duration, context.num_continuous_states(), *sizes]
+
+
 def resumed(scenario: Scenario, state: Path) -> Experiment:
-    """An experiment that goes on where `keep` left it; only the camera's noise is drawn from another seed."""
+    """An experiment that goes on where `keep` left it; only the camera's noise is drawn from another seed.
+
+    Raises:
+        ValueError: if the state is that of another robot, of another path, or of another version.
+    """
     with np.load(state) as kept:
         time = float(kept["time"])
         experiment = Experiment(scenario, LAW, seed=scenario.seed + 1 + round(time))
-        context = experiment.context
+        identity, context = _identity(experiment), experiment.context
+        if not np.array_equal(kept["of"], identity):
+            raise ValueError(f"{state} was kept with other hours, another seed or another version of truetip")
         context.SetTime(time)
         context.SetContinuousState(kept["continuous"])
-        groups = np.split(kept["discrete"], np.cumsum(kept["sizes"])[:-1])
+        groups = np.split(kept["discrete"], np.cumsum(identity[3:]).astype(int)[:-1])
     for i, group in enumerate(groups):
         context.SetDiscreteState(i, group)
     experiment.simulator.Initialize()

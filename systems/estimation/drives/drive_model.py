@@ -165,7 +165,8 @@ class DriveModel:
             mass: of the payload as the drives' own gravity compensation has it in kg.
 
         """
-        known = DriveMemory(*(memory.__dict__[name] for name in DriveMemory._fields))
+        filters = memory.started, memory.z, memory.w
+        known = DriveMemory(*filters, memory.beta, memory.led, memory.correction, memory.smoothed)
         out, columns = np.empty((3, 6)), np.empty(COLUMNS)
         limits = _LED_IN, _STEEPEST
         kernels.drives.command(self._drives, *self._held, known, motion, loads, mass, limits, out, columns)

@@ -135,7 +135,7 @@ def _filter(step, z, last, w):
 def _mean_sign(v, change, width):
     """The mean of tanh(v / width) while the speed changes evenly by so much."""
     begin, end = v / width, (v + change) / width
-    if abs(end - begin) < 1e-3:
+    if abs(end - begin) < 1e-3:  # right to a ten-millionth, and no difference of nearly equal numbers
         return math.tanh(0.5 * (begin + end))
     return (_log_cosh(end) - _log_cosh(begin)) / (end - begin)
 

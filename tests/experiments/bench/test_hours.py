@@ -3,6 +3,7 @@
 from dataclasses import replace
 
 import numpy as np
+import pytest
 
 from diagrams.runs.simulation import Experiment
 from diagrams.scenario.scenario import load_scenario
@@ -66,3 +67,6 @@ def test_a_run_that_was_ended_goes_on_as_if_it_had_not_been(tmp_path):
     np.testing.assert_array_equal(rest.time, full.time)
     np.testing.assert_allclose(rest.X_WE_true, full.X_WE_true, atol=1e-8)
     assert np.ptp(full.X_WE_true[:, :3, 3], axis=0).max() > 1e-3  # it moves
+    other = replace(scenario, seed=scenario.seed + 1)
+    with pytest.raises(ValueError, match="was kept with other hours, another seed"):
+        resumed(other, tmp_path / "state.npz")
