@@ -8,6 +8,7 @@ carry. What is said explicitly, as by ``--set``, stays.
 
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass, replace
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -25,6 +26,7 @@ from systems.reference.shapes import Circle, Planned, Points, Rectangle, Shape, 
 
 PATH, HOME, PAYLOAD = "reference.path", "home_deg", "station.payload"  # what is carried over
 _SAME = 0.05  # m, and of direction cosines: robots that are one machine with errors differ by less
+_PLACES = (12, 96)  # for its middle, the best first; the others where none of the first will do
 _SIZES = (1.0, 0.8, 0.6, 0.45, 0.3, 0.2, 0.12)  # of the path, over what the lengths of the arms say
 _SAMPLES = 120  # of a path, at which it is tried
 _JUMP = 0.6  # rad between two of them: another branch
@@ -182,19 +184,22 @@ def _degrees(rotation: np.ndarray) -> np.ndarray:
 def _place(scenario: Scenario, before: RobotModel, robot: RobotModel) -> _Placed:
     old = _middle(scenario.reference)
     _, old_front = front(before, old[:3, 3])
-    candidates = np.deg2rad([robot.home_deg]) if robot.home_deg else working_positions(robot)
+    candidates = np.deg2rad([robot.home_deg]) if robot.home_deg else working_positions(robot, _PLACES[-1])
     admissible = AdmissibleConfigurations(robot)
-    candidates = candidates[admissible(candidates)] if admissible(candidates).any() else candidates
-    X_WE, best = Kinematics(robot).forward(candidates), dexterity(robot, candidates).max()
+    best = float(dexterity(robot, candidates[: _PLACES[0]]).max())
     larger = arm_length(robot) / arm_length(before)
-    trial = _Trial(scenario.reference, robot, admissible, _DEXTERITY * float(best))
-    for size in _SIZES:
-        for q, X in zip(candidates, X_WE, strict=True):
-            motion = _Motion([old_front, front(robot, X[:3, 3])[1]], [old, X], size * larger)
-            path = motion.of(scenario.reference.path)
-            start = trial.start(path, q)
-            if start is not None:
-                return _Placed(path, start, X[:3, 3], size * larger)
+    trial = _Trial(scenario.reference, robot, admissible, _DEXTERITY * best)
+    for first, last in pairwise((0, *_PLACES)):
+        positions = candidates[first:last]
+        positions = positions[admissible(positions)] if admissible(positions).any() else positions
+        for size in _SIZES:
+            for q in positions:
+                X = Kinematics(robot).forward(q)
+                motion = _Motion([old_front, front(robot, X[:3, 3])[1]], [old, X], size * larger)
+                path = motion.of(scenario.reference.path)
+                start = trial.start(path, q)
+                if start is not None:
+                    return _Placed(path, start, X[:3, 3], size * larger)
     raise ScenarioError(
         f"no place was found where {robot.name} can follow the path '{scenario.reference.path.kind}' of "
         f"{before.name}; say where it is: --set reference.path=... and home_deg"

@@ -55,6 +55,23 @@ def import_command(
             help="Where the meshes of a package are; repeatable. Others are looked for above the file.",
         ),
     ] = None,
+    mass: Annotated[
+        float | None,
+        typer.Option(
+            metavar="KG",
+            min=0.0,
+            help="Of the whole robot, where links do not say theirs; from its data sheet.",
+        ),
+    ] = None,
+    payload: Annotated[
+        float | None,
+        typer.Option(
+            metavar="KG",
+            min=0.0,
+            help="The largest that it carries.",
+            show_default="a seventh of the mass that moves",
+        ),
+    ] = None,
     write: Annotated[str | None, typer.Option(metavar="FILE.yaml", help="The robot file to write.")] = None,
 ) -> None:
     """Make a robot file of a URDF, and say what is assumed in it."""
@@ -63,7 +80,8 @@ def import_command(
         target = stack.enter_context(staged_file(write, *YAML)) if write else None
         if not is_urdf(urdf):
             raise ConfigurationError(f"'{urdf}' is no URDF: its name must end in .urdf or .xacro")
-        found = read_urdf(Path(urdf), f"URDF {urdf}", base, tip, _folders(package or []))
+        folders = _folders(package or [])
+        found = read_urdf(Path(urdf), f"URDF {urdf}", base, tip, folders, mass=mass, payload=payload)
         robot = robot_of(found.nodes)
         if write and target:
             write_text(target, robot_text(robot, beside=Path(write)))

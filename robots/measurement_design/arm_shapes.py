@@ -130,10 +130,13 @@ class ArmShapes:
 
 
 def _neighbours(shapes: list[list[GeometryId]], boxes: list[GeometryId]) -> CollisionFilterDeclaration:
-    """The pairs that need not be looked at: neighbours, the base and link 2, all that stands still."""
+    """The pairs that need not be looked at: neighbours, the base and link 2, all that stands still.
+
+    On either side of a link without length two others touch; Drake's search for their distance may not end.
+    """
     found = CollisionFilterDeclaration()
     base = shapes[0]
-    pairs = [*pairwise(shapes), (base, shapes[2]), (base, boxes)]
+    pairs = [*pairwise(ids for ids in shapes if ids), (base, shapes[2]), (base, boxes)]
     for a, b in pairs:
         if a and b:
             found.ExcludeBetween(GeometrySet(a), GeometrySet(b))

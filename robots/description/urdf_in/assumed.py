@@ -65,25 +65,27 @@ def assumed_tilting(drive_train: dict) -> dict:
     }
 
 
-def assumed_payload(masses: Sequence[float], p_FE: np.ndarray) -> dict:
+def assumed_payload(masses: Sequence[float], p_FE: np.ndarray, largest: float | None = None) -> dict:
     """The largest load, a cube of aluminium at the tool.
 
     Args:
         masses: of the links that move, kg.
         p_FE: the tool in the frame of the flange, m, shape (3,).
+        largest: its mass in kg; None for a seventh of the mass that moves.
     """
-    mass = rounded(_PAYLOAD * sum(masses))
+    mass = rounded(_PAYLOAD * sum(masses)) if largest is None else largest
+    share = "a seventh of the mass that moves, " if largest is None else ""
     edge = (mass / _DENSITY) ** (1.0 / 3.0)
     return {
         "largest_mass": mass,
         "inertia": [rounded(mass * edge**2 / 6.0)] * 3,
-        "source": "assumed: a seventh of the mass that moves, as a cube of aluminium",
+        "source": f"assumed: {share}as a cube of aluminium",
         "center_of_mass": [rounded(float(each)) for each in p_FE],
         "center_of_mass_source": "assumed: at the tool",
     }
 
 
 def assumed_radius(mass: float, moments: np.ndarray, reach: float) -> float:
-    """The radius of a solid cylinder of a link's smallest moment, at most a tenth of the reach, in m."""
+    """The radius of a solid cylinder of a link's smallest moment, at most 8 % of the reach, in m."""
     radius = math.sqrt(max(0.0, 2.0 * float(moments.min()) / mass))
-    return rounded(min(max(radius, 0.01 * reach), 0.1 * reach))
+    return rounded(min(max(radius, 0.01 * reach), 0.08 * reach))

@@ -18,7 +18,7 @@ import numpy as np
 from pydrake.math import RigidTransform
 from pydrake.multibody.parsing import Parser
 from pydrake.multibody.plant import MultibodyPlant
-from pydrake.multibody.tree import JacobianWrtVariable, RevoluteJoint, RigidBody
+from pydrake.multibody.tree import JacobianWrtVariable, RevoluteJoint, RigidBody, SpatialInertia
 from pydrake.systems.framework import Context
 
 from robots.configuration.nodes import ConfigurationError, Node
@@ -30,6 +30,7 @@ from robots.description.urdf_in.assumed import (
     assumed_tilting,
 )
 from robots.description.urdf_in.chain import NUM_AXES, Chain, UrdfText
+from robots.description.urdf_in.masses import add_inertia, assumed_masses
 from robots.description.urdf_in.pictures import Pictures
 
 SUFFIXES = (".urdf", ".xacro")
@@ -58,7 +59,14 @@ def is_urdf(name: str) -> bool:
 
 
 def read_urdf(
-    path: Path, label: str, base: str = "", tip: str = "", packages: Mapping[str, Path] | None = None
+    path: Path,
+    label: str,
+    base: str = "",
+    tip: str = "",
+    packages: Mapping[str, Path] | None = None,
+    *,
+    mass: float | None = None,
+    payload: float | None = None,
 ) -> UrdfRobot:
     """Reads six revolute joints in a row, of any geometry.
 
@@ -67,25 +75,40 @@ def read_urdf(
         label: how messages call it.
         base, tip: links whose frames are the world and the tool, see `UrdfText.chain`.
         packages: folders of packages, for meshes; others are looked for above the file.
+        mass: of the whole robot in kg, for links that do not say theirs.
+        payload: the largest that it carries in kg; None for what robots of its mass carry.
 
     Raises:
-        ConfigurationError: if it is no such robot, or a link that moves has no mass or inertia.
+        ConfigurationError: if it is no such robot, or a link that moves has no mass or inertia, and no mass
+            is given.
     """
     text = UrdfText(path, label)
     chain = text.chain(base, tip)
-    arm = _Arm(text, chain)
+    arm = _Arm(text, chain, payload)
+    if mass is not None:
+        shared = arm.share(mass)
+        arm = _Arm(text, chain, payload, shared)
     pictures = Pictures(text, packages or {})
     tree = arm.entries(pictures)
-    assumed = ["gears, motors and friction", "bearings", "payload", *arm.assumed]
+    assumed = ["gears, motors and friction", "bearings", *(["payload"] if payload is None else [])]
+    assumed += arm.assumed
     return UrdfRobot(_node(tree, label), chain, assumed, pictures.missing, pictures.unreadable)
 
 
 class _Arm:
     """Drake's plant of the six joints."""
 
-    def __init__(self, text: UrdfText, chain: Chain) -> None:
-        self._text, self._chain = text, chain
-        self.assumed: list[str] = []
+    def __init__(
+        self,
+        text: UrdfText,
+        chain: Chain,
+        payload: float | None = None,
+        shared: Mapping[int, str] | None = None,
+    ) -> None:
+        """``shared``: where masses that the URDF does not say are from, by the numbers of links."""
+        self._text, self._chain, self._payload = text, chain, payload
+        self._shared = shared or {}
+        self.assumed = [f"masses of {len(self._shared)} links"] if self._shared else []
         plant = MultibodyPlant(0.0)
         try:
             Parser(plant).AddModelsFromString(_for_drake(text, chain), "urdf")
@@ -104,6 +127,26 @@ class _Arm:
         names = [chain.joints[0].parent, *(joint.child for joint in chain.joints)]
         self._bodies: list[RigidBody] = [plant.GetBodyByName(name) for name in names]
 
+    def share(self, mass: float) -> dict[int, str]:
+        """Writes masses into the text for links that have none, and says where they are from.
+
+        Args:
+            mass: of the whole robot in kg.
+
+        Raises:
+            ConfigurationError: if nothing is left for them.
+        """
+        known = {number: self._inertia(number).get_mass() for number in range(NUM_AXES + 1)}
+        try:
+            masses = assumed_masses({n: m for n, m in known.items() if m > _NO_MASS}, mass)
+        except ValueError as error:
+            raise ConfigurationError(f"{self._text.label}: {error}") from error
+        ends = [*self._bodies[1:], self._plant.GetBodyByName(self._chain.tip)]
+        for number, each in masses.items():
+            stretch = self._between(self._bodies[number], ends[number]).translation()
+            add_inertia(self._text, self._bodies[number].name(), each, stretch)
+        return dict.fromkeys(masses, f"assumed: a share of {mass:g} kg, as a solid cylinder along the link")
+
     def entries(self, pictures: Pictures) -> dict[str, Any]:
         """What a robot file says of it."""
         plant, chain = self._plant, self._chain
@@ -112,7 +155,7 @@ class _Arm:
         reach = self._reach()
         source = f"URDF {self._text.path.name}"
         links = [self._link(number, source, reach, pictures) for number in range(NUM_AXES + 1)]
-        payload = assumed_payload([link["mass"] for link in links[1:]], X_FE.translation())
+        payload = assumed_payload([link["mass"] for link in links[1:]], X_FE.translation(), self._payload)
         trains = assumed_drive_trains(self._largest_inertia(payload["largest_mass"], tip))
         joints = []
         for number, (joint, train) in enumerate(zip(self._joints, trains, strict=True), 1):
@@ -169,12 +212,14 @@ class _Arm:
         shapes = [
             entry for name, X in X_of.items() if name in self._text.links for entry in pictures.of(name, X)
         ]
-        indices = [each.index() for each in welded if each.index() != self._plant.world_body().index()]
-        M = self._plant.CalcSpatialInertia(self._context, body.body_frame(), indices)
+        M = self._inertia(number)
+        source = self._shared.get(number, source)
         if not M.get_mass() > _NO_MASS:
             if number:
                 raise self._text.refuse(
-                    f"link '{body.name()}' moves and has no mass or inertia; a simulation needs both",
+                    f"link '{body.name()}' moves and has no mass or inertia; a simulation needs both. "
+                    "With the robot's mass from its data sheet they are assumed: "
+                    "truetip robots import --mass KG",
                     body.name(),
                 )
             self.assumed.append("mass of the base")
@@ -197,6 +242,12 @@ class _Arm:
             "radius_source": "assumed: a solid cylinder of this inertia",
             "pictures": shapes,
         }
+
+    def _inertia(self, number: int) -> SpatialInertia:
+        """Of a link with all that is fixed to it, about its origin; number 0 is the base."""
+        body, world = self._bodies[number], self._plant.world_body().index()
+        indices = [each.index() for each in self._plant.GetBodiesWeldedTo(body) if each.index() != world]
+        return self._plant.CalcSpatialInertia(self._context, body.body_frame(), indices)
 
     def _reach(self) -> float:
         """The sum of the distances from joint to joint and to the tool, from the second joint on, in m."""

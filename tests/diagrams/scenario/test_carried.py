@@ -30,7 +30,7 @@ def poses(scenario: Scenario) -> tuple[np.ndarray, np.ndarray]:
     return times, path.sample(times)[0]
 
 
-@pytest.mark.parametrize("name", ["ur10_robot.urdf", "puma560", "kr16"])
+@pytest.mark.parametrize("name", ["ur3_robot.urdf", "ur10_robot.urdf", "puma560", "kr16"])
 def test_the_path_is_followed_on_one_branch_within_limits_and_speeds(name: str):
     robot = robot_of(name)
     scenario, note = carried_over(load_scenario("misaligned"), IRB1200, robot)

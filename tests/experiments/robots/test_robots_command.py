@@ -31,6 +31,16 @@ def test_a_urdf_becomes_a_robot_file_and_the_assumptions_are_said(tmp_path: Path
     assert load_robot("my.yaml").name == "ur10"
 
 
+def test_a_urdf_without_inertia_needs_the_mass_of_the_robot_alone():
+    """ROS-Industrial has most robots so; the refusal says what to do."""
+    Path("arm.urdf").write_text(arm(bare=range(7)))
+    assert "truetip robots import --mass KG" in refusal(truetip("robots", "import", "arm.urdf"))
+    result = truetip("robots", "import", "arm.urdf", "--mass=52", "--payload=7", "--write=my.yaml")
+    assert result.exit_code == 0, result.output
+    assert "masses of 7 links" in result.stdout
+    assert load_robot("my.yaml").payload.largest_mass == 7.0
+
+
 def test_held_joints_and_lost_meshes_are_named():
     mesh = '<visual><geometry><mesh filename="package://lost/tool.obj"/></geometry></visual>'
     finger = link("finger", shape=mesh) + joint("slide", "l6", "finger", "prismatic")

@@ -10,10 +10,12 @@ from pydrake.multibody.parsing import Parser
 from pydrake.multibody.plant import MultibodyPlant
 from pydrake.systems.framework import DiagramBuilder
 
+from robots.configuration.nodes import ConfigurationError
 from robots.description.foreign_sources import foreign_sources_note
-from robots.description.model import RobotFileError, RobotModel, load_robot
+from robots.description.model import RobotFileError, RobotModel, load_robot, robot_of, shipped_robots
 from robots.description.robot_file import robot_text
 from robots.description.urdf import urdf_text
+from robots.description.urdf_in.masses import SHARES
 from robots.description.urdf_in.reader import read_urdf
 from robots.dynamics.plant import add_robot
 from robots.kinematics.forward import Kinematics
@@ -123,6 +125,38 @@ def test_a_gripper_is_held_and_an_end_can_be_chosen(tmp_path: Path):
     assert read_urdf(path, "URDF", tip="l6").chain.tip == "l6"
 
 
+def test_masses_that_are_missing_come_from_that_of_the_robot(tmp_path: Path):
+    """They add up to it, what links say stays, and each is a cylinder from joint to joint, or a ball."""
+    path = tmp_path / "arm.urdf"
+    path.write_text(arm(bare=[0, 1, 2, 4, 5, 6]))
+    found = read_urdf(path, "URDF", mass=40.0, payload=3.0)
+    robot = robot_of(found.nodes)
+    links = [robot.base_link, *robot.links]
+    assert sum(link.mass for link in links) == pytest.approx(40.0)
+    assert (robot.links[2].mass, robot.payload.largest_mass) == (2.0, 3.0)
+    assert found.assumed == ["gears, motors and friction", "bearings", "masses of 6 links"]
+    stretch = robot.joints[4].placement.translation
+    slender, length = robot.links[3], np.linalg.norm(stretch)
+    np.testing.assert_allclose(slender.center_of_mass, 0.5 * stretch, atol=1e-12)
+    tensor = np.diag(slender.inertia)
+    tensor[np.triu_indices(3, 1)] = tensor[np.tril_indices(3, -1)] = slender.products
+    radius = np.sqrt(2.0 * np.linalg.eigvalsh(tensor)[0] / slender.mass)
+    assert slender.mass / (np.pi * radius**2 * length) == pytest.approx(2500.0)
+    np.testing.assert_allclose(tensor @ stretch, 0.5 * slender.mass * radius**2 * stretch, rtol=1e-9)
+    assert np.ptp(robot.links[5].inertia) < 1e-12  # the flange is at the tool: a ball
+
+
+@pytest.mark.parametrize("name", shipped_robots())
+def test_shipped_robots_have_their_masses_where_they_are_assumed(name: str):
+    robot = load_robot(name)
+    masses = np.array([robot.base_link.mass, *(link.mass for link in robot.links)])
+    factors = masses / masses.sum() / SHARES
+    assert (factors[1:4] > 0.5).all()
+    assert (factors[1:4] < 1.9).all()
+    assert (factors > 1.0 / 3.2).all()
+    assert (factors < 3.7).all()
+
+
 MIMIC = '<mimic joint="j1"/>'
 REFUSED = {
     "no inertia": (arm(bare=[3]), r"link 'l3' moves and has no mass or inertia"),
@@ -154,6 +188,22 @@ def test_what_is_no_such_robot_is_refused_in_one_line(text: str, reason: str, tm
         load_robot(str(path))
     assert "arm.urdf" in str(refused.value)
     assert "\n" not in str(refused.value)
+
+
+@pytest.mark.parametrize(
+    ("bare", "mass", "reason"),
+    [
+        ([3], 12.0, "12 kg; its links that say their masses have 12 kg already"),
+        ([], 40.0, "here all have one"),
+    ],
+)
+def test_a_mass_that_leaves_nothing_to_assume_is_refused(
+    bare: list[int], mass: float, reason: str, tmp_path: Path
+):
+    path = tmp_path / "arm.urdf"
+    path.write_text(arm(bare=bare))
+    with pytest.raises(ConfigurationError, match=reason):
+        read_urdf(path, "URDF", mass=mass)
 
 
 def test_a_viewer_shows_its_meshes_or_capsules_where_they_are_missing(tmp_path: Path):

@@ -33,6 +33,16 @@ def test_a_folded_arm_touches_itself():
     np.testing.assert_array_equal(allowed(q), [True, False])
 
 
+def test_links_on_either_side_of_one_without_length_touch_by_design():
+    """As in the elbow of a Fanuc CRX-10iA: Drake's search for the distance of the two did not end."""
+    robot = load_robot("irb1200")
+    joints = list(robot.joints)
+    at_elbow = replace(joints[3].placement, translation=np.zeros(3))
+    joints[3] = replace(joints[3], placement=at_elbow)
+    allowed = AdmissibleConfigurations(replace(robot, joints=joints))
+    assert allowed(np.deg2rad([[0.0, 0.0, -30.0, 0.0, 60.0, 0.0]])).all()
+
+
 def test_the_tool_stays_in_the_volume_and_the_arm_off_the_boxes():
     corners = np.array([0.2, -0.6, 0.2]), np.array([1.0, 0.6, 1.0])
     q = random(UR10, 600)
