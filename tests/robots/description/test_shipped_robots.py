@@ -20,9 +20,10 @@ DATA_SHEETS = {
     "irb140": (0.810, 0.065, 98.0),
     "kr16": (1.611, 0.158, 235.0),
     "kr210": (2.696, 0.215, 1068.0),
+    "tx2_90": (float(np.hypot(0.900, 0.050)), 0.100, 114.0),  # the forearm is 50 mm beside the upper arm
 }
 
-NO_SPHERICAL_WRIST = ("ur10",)  # the analytic inverse does not know it
+NO_SPHERICAL_WRIST = ("ur10", "crx10ial", "crb15000")  # the analytic inverse does not know it
 
 
 @pytest.mark.parametrize(("name", "numbers"), DATA_SHEETS.items(), ids=DATA_SHEETS)

@@ -147,8 +147,10 @@ def test_masses_that_are_missing_come_from_that_of_the_robot(tmp_path: Path):
 
 
 @pytest.mark.parametrize("name", shipped_robots())
-def test_shipped_robots_have_their_masses_where_they_are_assumed(name: str):
+def test_robots_whose_links_are_known_have_their_masses_where_those_of_others_are_assumed(name: str):
     robot = load_robot(name)
+    if "a share of" in robot.links[0].source:
+        pytest.skip("its masses are assumed")
     masses = np.array([robot.base_link.mass, *(link.mass for link in robot.links)])
     factors = masses / masses.sum() / SHARES
     assert (factors[1:4] > 0.5).all()
