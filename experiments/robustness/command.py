@@ -90,37 +90,46 @@ def _case(name: str, settings: list[str]) -> Case:
 
 
 def _print(console: Console, scenario: str, results: list[dict[str, Any]], titles: dict[str, str]) -> None:
+    only = next(iter(titles.values())) if len(titles) == 1 else ""
+
+    def label(result: dict[str, Any]) -> str:
+        return (
+            escape(result["case"]) if only else f"{escape(result['case'])}, {escape(titles[result['law']])}"
+        )
+
+    is_single = all(result["runs"] == 1 for result in results)
+
+    def pair(values: tuple[float, float], digits: int) -> str:
+        worst, median = (f"{value:.{digits}f}" for value in values)
+        return worst if is_single else f"{worst} ({median})"
+
+    of_law = f", {escape(only)}" if only else ""
     table = Table(
         box=box.SIMPLE_HEAD,
-        title=f"Scenario {escape(scenario)}: true error, worst (median)",
+        title=f"Scenario {escape(scenario)}{of_law}: true error{'' if is_single else ', worst (median)'}",
         title_justify="left",
         title_style="italic",
     )
     has_events = any("recovered_mm" in result for result in results)
-    table.add_column("case, law", overflow="fold")
+    table.add_column("case" if only else "case, law", overflow="fold")
     for name in ("lap", "mm", "°", "at rest mm", *(["mm after event"] if has_events else [])):
         table.add_column(name, justify="right", no_wrap=name != "mm after event")
     for result in results:
-        label = f"{escape(result['case'])}, {escape(titles[result['law']])}"
         laps = result.get("laps", [])
         for number, lap in enumerate(laps, 1):
             is_last = number == len(laps)
-            cells = [str(number), _pair(lap["max_norm_mm"], 3), _pair(lap["max_angle_deg"], 3)]
-            cells.append(_pair(result["static_mm"], 4) if is_last else "")
+            cells = [str(number), pair(lap["max_norm_mm"], 3), pair(lap["max_angle_deg"], 3)]
+            cells.append(pair(result["static_mm"], 4) if is_last else "")
             if has_events:
-                cells.append(_pair(result["recovered_mm"], 3) if is_last and "recovered_mm" in result else "")
-            table.add_row(label if number == 1 else "", *cells)
+                cells.append(pair(result["recovered_mm"], 3) if is_last and "recovered_mm" in result else "")
+            table.add_row(label(result) if number == 1 else "", *cells)
     console.print(table)
     for result in results:
-        label = f"{escape(result['case'])}, {escape(titles[result['law']])}"
         if "coverage" in result:
             smallest, of_all = result["coverage"]
-            console.print(f"{label}: in the predicted 95 % ellipsoid {of_all:.3f}, worst run {smallest:.3f}")
+            worst = "" if is_single else f", worst run {smallest:.3f}"
+            console.print(f"{label(result)}: in the predicted 95 % ellipsoid {of_all:.3f}{worst}")
         if result.get("guard"):
-            console.print(f"{label}: the guard intervened in {result['guard']} ticks")
+            console.print(f"{label(result)}: the guard intervened in {result['guard']} ticks")
         for failure in result["failures"]:
-            console.print(f"[red]{label}: {escape(failure)}[/red]")
-
-
-def _pair(pair: tuple[float, float], digits: int) -> str:
-    return f"{pair[0]:.{digits}f} ({pair[1]:.{digits}f})"
+            console.print(f"[red]{label(result)}: {escape(failure)}[/red]")
