@@ -316,7 +316,7 @@ class SelfCalibrating(LeafSystem):
         self._learning.delay.search.command(memory.delay.search, time, coming.row.theta)
         forecast = self._forecast
         if coming.begins_path[0] or coming.is_led_in[0]:
-            self._drives.open_humps(memory.drives, is_early=not coming.begins_path[0])
+            self._drives.open_low_speeds(memory.drives, is_early=not coming.begins_path[0])
         if coming.begins_path[0] and forecast and forecast.sigma > self._config.probe.vague:
             event = Event(PATH_UNSEEN, forecast.sigma, forecast.sigma)
             self._learning.events.note(memory.events, time, event)

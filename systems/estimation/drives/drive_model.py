@@ -20,16 +20,19 @@ from systems.estimation.kernels.arrays import DriveMemory, Drives
 from systems.estimation.memory import Layout
 
 # Torque that is needed beside the feedforward; rotor, viscous, Coulomb, and what that has more at low speeds;
-# the load of a kilogram, and of a kg m of its first moment along x, y, z; a kilogram that is not held.
-_FILTERED = 10
+# the load of a kilogram, and of a kg m of its first moment along x, y, z; a kilogram that is not held; what
+# friction is more than believed where it turns over sharply.
+_FILTERED = 11
 COLUMNS = 6 * (_FILTERED + 1)  # of all but the first, of a planner, and of what is late beside the plan
 _HUMPS, _CONSTANTS = slice(16, 37, 4), slice(37, 43)
 DEAD_TIME, MASS, MOMENT, HELD, SMOOTHED = 0, 43, slice(44, 47), 47, 48
-SIZE = SMOOTHED + 1
+_SHARP = slice(SMOOTHED + 1, SMOOTHED + 7)
+SIZE = SMOOTHED + 7
 # Of Coulomb's friction, the spread of what there may be more of it; less where it is learnt early, or the
 # first lap of robots without a hump is twisted more
 _HUMP, _EARLY_HUMP = 0.3, 0.1
 _SLOW = 0.05  # rad/s, of Stribeck's effect, exp(-|v| / _SLOW) as Tustin has it; assumed
+_SHARPER = 2.0  # the spread of how much of Coulomb friction turns over more sharply than believed
 _SLACK = 0.3  # of Coulomb's friction, by which it may be off while little is known of it
 _STEEPEST = 0.5  # rad/s, what learning may add to the speed of a joint
 _RESTS = {"cascade": 1e-5, "velocity": 1e-5, "position": 3e-5}  # rad, where a motor rests beside its command
@@ -71,7 +74,7 @@ class DriveCommand(NamedTuple):
     position: np.ndarray  # (6,) rad
     velocity: np.ndarray  # (6,) rad/s
     torque: np.ndarray  # (6,) N m, joint side, on top of what the drives do for gravity
-    columns: np.ndarray  # (66,), what `DriveModel.features` needs of this instant
+    columns: np.ndarray  # (72,), what `DriveModel.features` needs of this instant
 
 
 class DriveModel:
@@ -79,8 +82,8 @@ class DriveModel:
 
     A drive is e = G w: the torque w that a motion needs and nobody gives it leaves the motor behind by e,
     with k_d e' + k_p e + k_i int e dt = w. The model is e = Phi beta with columns for a shared dead time, a
-    lag and an inertia of each joint, the torques of rotor, viscous and Coulomb friction and of its hump at
-    low speeds through G, a constant, and the load of a kilogram and of its first moment through G; beta is
+    lag and an inertia of each joint, the torques of rotor, viscous and Coulomb friction, of its hump at low
+    speeds and of how much more sharply it turns over through G, a constant, and the load of a kilogram and of its first moment through G; beta is
     learnt by recursive least squares.
     Without the moment friction is taken for what a payload whose centre is elsewhere weighs at the wrist:
     both turn over with the motion. Mass and moment in it make up for all that loads are wrong by. They are
@@ -133,6 +136,7 @@ class DriveModel:
         self._scale, self._moment = model.load_scale, config.moment_sigma * model.load_scale
         spread += [0.3, 0.3, 0.5, 0.0] * 6 + [_RESTS[kind]] * 6
         spread += [config.payload_sigma * self._scale] + [self._moment] * 3 + [0.0, config.smoothing_sigma]
+        spread += [0.0] * 6
         self._prior = np.diag(np.array(spread) ** 2)
         self.layout = Layout(
             started=(1,),
@@ -174,7 +178,7 @@ class DriveModel:
         return DriveCommand(position, velocity, torque, columns)
 
     def features(self, v: np.ndarray, a: np.ndarray, columns: np.ndarray) -> np.ndarray:
-        """Rows of the regression, shape (6, 49), from motion and the filtered torques (66,)."""
+        """Rows of the regression, shape (6, 55), from motion and the filtered torques (72,)."""
         Phi = np.zeros((6, SIZE))
         kernels.drives.features(v, a, columns, Phi)
         return Phi
@@ -193,7 +197,7 @@ class DriveModel:
         Args:
             memory: of the layout.
             planned: position, velocity and acceleration, (6,) each.
-            columns, correction: of the command of that instant, (66,) and (6,) in rad.
+            columns, correction: of the command of that instant, (72,) and (6,) in rad.
             actual: where the motors were, rad, (6,).
             most: nothing is learnt if more than this is not explained yet, rad; of a joint with much friction
                 for the stiffness of its drive that much more.
@@ -209,22 +213,24 @@ class DriveModel:
         """One step of recursive least squares: the motors were y behind a plan without correction, (6,)."""
         kernels.drives.learn(memory.P, memory.beta, Phi, y, self._config.following_sigma**2)
 
-    def open_humps(self, memory: SimpleNamespace, is_early: bool = False) -> None:
-        """From now on friction may have a hump, which it is supposed not to have before.
+    def open_low_speeds(self, memory: SimpleNamespace, is_early: bool = False) -> None:
+        """From now on friction at low speeds may be another one than believed.
 
-        Friction goes by the speed of a motor, and in the model by the planned one. As long as motors are far
-        off their plan, it turns over at other times, and a hump would be what makes up for that.
+        It may have a hump, and it may turn over more sharply. Friction goes by the speed of a motor, and in
+        the model by the planned one. As long as motors are far off their plan, it turns over at other times,
+        and a hump would be what makes up for that.
 
         Args:
             memory: of the layout.
-            is_early: whether only of joints whose friction moves them by more than they are known to be off:
-                without a hump other parameters would have to make up for it there.
+            is_early: whether only humps, and only of joints whose friction moves them by more than they are
+                known to be off: without a hump other parameters would have to make up for it there.
         """
         humps, spread = _DIAGONAL[_HUMPS], _HUMP
         if is_early:
             humps, spread = humps[self._drives.slack > self._config.following_sigma], _EARLY_HUMP
-        closed = humps[memory.P[humps, humps] == 0.0]
-        memory.P[closed, closed] = spread**2
+        _open(memory.P, humps, spread)
+        if not is_early:
+            _open(memory.P, _DIAGONAL[_SHARP], _SHARPER)
 
     def widen(self, memory: SimpleNamespace, is_told_otherwise: bool = False) -> None:
         """Load or dead time have changed: constants, payload and dead time are open again.
@@ -241,6 +247,12 @@ class DriveModel:
 
 
 _DIAGONAL = np.arange(SIZE)
+
+
+def _open(P: np.ndarray, parameters: np.ndarray, spread: float) -> None:
+    """Gives parameters that are supposed to be known a spread in a covariance."""
+    closed = parameters[P[parameters, parameters] == 0.0]
+    P[closed, closed] = spread**2
 
 
 def _gains(

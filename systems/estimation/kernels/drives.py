@@ -9,12 +9,13 @@ from systems.estimation.kernels.geometry import place_links
 from systems.estimation.kernels.loads import hold
 from systems.estimation.kernels.plan import follow
 
+_SHARP = 0.2  # of the believed width over which friction turns over, where it turns over more sharply
 _MOST_PERIODS = 1.5  # by which torques are sent ahead or held back
 
 
 @compiled
 def features(v, a, filtered, Phi):
-    """Rows of the regression, (6, 49), which are zero before; see `DriveModel.features`."""
+    """Rows of the regression, (6, 55), which are zero before; see `DriveModel.features`."""
     for i in range(6):
         Phi[i, 0] = Phi[i, 1 + i] = v[i] + filtered[60 + i]
         Phi[i, 7 + i] = 1e-2 * a[i]
@@ -23,6 +24,7 @@ def features(v, a, filtered, Phi):
         Phi[i, 37 + i] = 1.0
         for k in range(6):
             Phi[i, 43 + k] = filtered[6 * (4 + k) + i]
+        Phi[i, 49 + i] = filtered[66 + i]
 
 
 @inner
@@ -34,7 +36,7 @@ def _behind(v, a, filtered, beta, i):
         total += filtered[6 * k + i] * beta[13 + 4 * i + k]
     for k in range(6):
         total += filtered[6 * (4 + k) + i] * beta[43 + k]
-    return total + beta[37 + i]
+    return total + beta[37 + i] + filtered[66 + i] * beta[49 + i]
 
 
 @compiled
@@ -158,13 +160,13 @@ def command(drives, arm, masses, memory, motion, loads, mass, limits, out, filte
         mass: of the payload, kg.
         limits: the frequency in rad/s with which commands follow what was learnt, and what the correction
             may add to the speed of a joint in rad/s.
-        out: (3, 6), position, velocity and torque; filtered: (66,), what `features` takes, of rotor, viscous
+        out: (3, 6), position, velocity and torque; filtered: (72,), what `features` takes, of rotor, viscous
             and Coulomb friction and its hump, of a kilogram and of a kg m along each axis, of a kilogram
-            that is not held; the accelerations that a planner smooths, and how fast the command runs away
-            from the plan in rad/s; are written.
+            that is not held; the accelerations that a planner smooths, how fast the command runs away from
+            the plan in rad/s, and of what friction turns over more sharply; are written.
     """
     theta, v, a = motion
-    X_WE, frames, w = np.empty((4, 4)), np.empty((7, 4, 4)), np.empty(10)
+    X_WE, frames, w = np.empty((4, 4)), np.empty((7, 4, 4)), np.empty(11)
     held, with_more = np.empty(6), np.empty(6)
     place_links(arm, theta, X_WE, frames)
     hold(masses, drives.payload, frames, theta, held)
@@ -185,6 +187,7 @@ def command(drives, arm, masses, memory, motion, loads, mass, limits, out, filte
         turn = drives.period * a[i]
         w[3] = drives.coulomb[i] * _mean_sign(v[i] - 0.5 * turn, turn, drives.width[i])
         w[4] = w[3] * math.exp(-abs(v[i]) / drives.slow)
+        w[10] = drives.coulomb[i] * _mean_sign(v[i] - 0.5 * turn, turn, _SHARP * drives.width[i]) - w[3]
         for k in range(4):
             w[5 + k] = loads[1 + k, i]
         w[9] = with_more[i] - held[i]
@@ -198,7 +201,7 @@ def command(drives, arm, masses, memory, motion, loads, mass, limits, out, filte
             out[2, i] = needed if is_first else even + ahead * (even - last[0]) + turned
             last[0] = w[0] = 0.0  # nothing is missing
         if is_first:
-            for k in range(10):
+            for k in range(11):
                 z[k, 0] = w[k] / drives.ki[i]
         else:
             _filter(drives.step[i], z, last, w)
@@ -210,6 +213,7 @@ def command(drives, arm, masses, memory, motion, loads, mass, limits, out, filte
         last[0] = even if drives.takes_torque else needed
         for k in range(1, 10):
             last[k], filtered[6 * (k - 1) + i] = w[k], z[k, 1]
+        last[10], filtered[66 + i] = w[10], z[10, 1]
         if not drives.takes_torque:
             settled = a[i] / drives.following
             memory.smoothed[i] = settled + fading * (memory.smoothed[i] - settled)

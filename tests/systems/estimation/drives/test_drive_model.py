@@ -269,9 +269,33 @@ def test_friction_that_is_larger_at_low_speeds_is_made_up_for(velocity):
         model.learn(memory, model.features(rate, a, columns), behind[k])
         if k == 250:  # motors keep to their plan from now on; nothing was said of humps before
             assert not memory.beta[16:37:4].any()
-            model.open_humps(memory)
+            model.open_low_speeds(memory)
     # Two shapes of a hump differ by up to a fifth of it.
     assert left[-500:].std() < 0.3 * behind[-500:].std()
+
+
+def test_friction_that_sticks_is_learnt_once_it_may_turn_over_more_sharply():
+    """Coulomb's own friction jumps where the speed changes its sign; the file of the robot has a width."""
+    model, memory = drives()
+    times = PERIOD * np.arange(3000)
+    v = 0.05 * motion(times[:, None])[1]
+    width = model._drives.width
+    sharper = model._drives.coulomb * (np.sign(v) - np.tanh(v / width))
+    gains = zip(model._drives.kd, model._drives.kp, model._drives.ki, strict=True)
+    behind = np.transpose(
+        [lsim(([1.0, 0.0], gain), torque, times)[1] for gain, torque in zip(gains, sharper.T, strict=True)]
+    )
+    left = np.empty_like(behind)
+    model.open_low_speeds(memory)
+    for k, time in enumerate(times):
+        theta, rate, a = (0.05 * each for each in motion(time))
+        columns = model.command(memory, (theta, rate, a), LOADS, 7.0).columns
+        left[k] = behind[k] - memory.correction
+        model.learn(memory, model.features(rate, a, columns), behind[k])
+    # A jump and a fifth of the width differ by a fifth, and each takes a time constant of the drive to pass.
+    assert left[-1000:].std() < 0.35 * behind[-1000:].std()
+    # Of the wrist; friction moves the heavy axes too little for all of it to be seen.
+    np.testing.assert_allclose(memory.beta[52:], 1.0, atol=0.2)
 
 
 @pytest.mark.parametrize("robot", ["kr16", "kr16-realistic"])
@@ -297,11 +321,11 @@ def test_humps_are_open_early_where_friction_moves_a_joint_most(robot, early):
     def spreads():
         return np.diag(memory.P)[16:37:4].copy()
 
-    model.open_humps(memory, is_early=True)
+    model.open_low_speeds(memory, is_early=True)
     assert np.flatnonzero(spreads()).tolist() == early
     known = 0.5 * spreads()
     memory.P[np.arange(16, 37, 4), np.arange(16, 37, 4)] = known
-    model.open_humps(memory)
+    model.open_low_speeds(memory)
     assert spreads().all()
     # What was learnt in the meantime is not forgotten.
     np.testing.assert_array_equal(spreads()[early], known[early])
