@@ -18,6 +18,7 @@ TOOL = len(FRAMES) - 1  # body E in the count of the bodies
 # How a parameter acts on the placement of its body.
 OFFSET, SHIFT, BEFORE, AFTER = "offset", "shift", "before", "after"
 
+_FREE = 0.1  # of a radian by which the axis of a joint moves, for a radian of what turns it
 _LETTERS = ("alpha", "beta", "gamma")  # about x, y, z; the tool's ZYX Euler angles about z, y, x
 
 
@@ -56,8 +57,13 @@ def error_parameters(robot: RobotModel) -> tuple[ErrorParameter, ...]:
     x, y, z ahead of the joint's rotation, about the others behind it. For a joint about y this is
     exp(x alpha) R exp(z gamma), Probst (2024) eq. (2.49), corrected. The base has all three rotations. The
     errors of the tool are added to its ZYX Euler angles, alpha about z, beta about y, gamma about x.
+
+    Probst's frames are parallel where all joints are zero. In others, as in those of a UR10, an error ahead
+    may turn what the joint before or an error behind that one turns already, and nothing would turn the axis
+    the other way. Then another one acts ahead, or both do: there it is exp(z gamma) R exp(x alpha).
     """
     axes = joint_axes(robot)
+    ahead = _turned_ahead(robot, axes)
     parameters = [ErrorParameter(f"p_q{i}", OFFSET, i, k) for i, k in enumerate(axes, 1)]
     for body, frame in enumerate(FRAMES):
         parameters += [ErrorParameter(f"pl_{frame}{'xyz'[k]}", SHIFT, body, k) for k in range(3)]
@@ -65,10 +71,33 @@ def error_parameters(robot: RobotModel) -> tuple[ErrorParameter, ...]:
     for i, own in enumerate(axes, 1):
         for k in range(3):
             if k != own:
-                kind = BEFORE if k < own else AFTER
+                kind = BEFORE if k in ahead[i - 1] else AFTER
                 parameters.append(ErrorParameter(f"p_{_LETTERS[k]}{i}", kind, i, k))
     parameters += [ErrorParameter(f"p_{_LETTERS[2 - k]}_E", BEFORE, TOOL, k) for k in (2, 1, 0)]
     return tuple(parameters)
+
+
+def _turned_ahead(robot: RobotModel, axes: list[int]) -> list[set[int]]:
+    """Of each joint about which axes (0, 1, 2) of its link frame a rotation error acts ahead of its rotation.
+
+    The axis of a joint is free if errors ahead of it, errors behind the joint before and that joint itself
+    turn it both ways.
+    """
+    chosen: list[set[int]] = []
+    behind = {0, 1, 2}  # of the base
+    for own, joint in zip(axes, robot.joints, strict=True):
+        R, usual = joint.placement.pose().rotation().matrix(), {k for k in range(3) if k < own}
+        across = {k for k in range(3) if k != own}
+
+        def frees(ahead: set[int], R: np.ndarray = R, own: int = own, behind: set[int] = behind) -> bool:
+            turns = np.column_stack([np.eye(3)[:, sorted(behind)], R[:, sorted(ahead)]])
+            moves = np.cross(turns.T, R[:, own])  # of the axis
+            return int(np.sum(np.linalg.svd(moves, compute_uv=False) > _FREE)) == 2
+
+        options = [usual, *({k} for k in sorted(across, reverse=True)), across]
+        chosen.append(next((ahead for ahead in options if frees(ahead)), usual))
+        behind = {own} | (across - chosen[-1])
+    return chosen
 
 
 def parameter_names(robot: RobotModel) -> tuple[str, ...]:

@@ -32,7 +32,7 @@ SIZE = SMOOTHED + 7
 # first lap of robots without a hump is twisted more
 _HUMP, _EARLY_HUMP = 0.3, 0.1
 _SLOW = 0.05  # rad/s, of Stribeck's effect, exp(-|v| / _SLOW) as Tustin has it; assumed
-_SHARPER = 2.0  # the spread of how much of Coulomb friction turns over more sharply than believed
+_SHARPER = 3.0  # the spread of how much of Coulomb friction turns over more sharply than believed
 _SLACK = 0.3  # of Coulomb's friction, by which it may be off while little is known of it
 _STEEPEST = 0.5  # rad/s, what learning may add to the speed of a joint
 _RESTS = {"cascade": 1e-5, "velocity": 1e-5, "position": 3e-5}  # rad, where a motor rests beside its command
@@ -83,8 +83,8 @@ class DriveModel:
     A drive is e = G w: the torque w that a motion needs and nobody gives it leaves the motor behind by e,
     with k_d e' + k_p e + k_i int e dt = w. The model is e = Phi beta with columns for a shared dead time, a
     lag and an inertia of each joint, the torques of rotor, viscous and Coulomb friction, of its hump at low
-    speeds and of how much more sharply it turns over through G, a constant, and the load of a kilogram and of its first moment through G; beta is
-    learnt by recursive least squares.
+    speeds and of how much more sharply it turns over through G, a constant, and the load of a kilogram and of
+    its first moment through G; beta is learnt by recursive least squares.
     Without the moment friction is taken for what a payload whose centre is elsewhere weighs at the wrist:
     both turn over with the motion. Mass and moment in it make up for all that loads are wrong by. They are
     not those of the payload, and nobody else may take them for that. What load the robot's controller was
@@ -222,15 +222,15 @@ class DriveModel:
 
         Args:
             memory: of the layout.
-            is_early: whether only humps, and only of joints whose friction moves them by more than they are
-                known to be off: without a hump other parameters would have to make up for it there.
+            is_early: whether humps only of joints whose friction moves them by more than they are known to
+                be off: without a hump other parameters would have to make up for it there.
         """
-        humps, spread = _DIAGONAL[_HUMPS], _HUMP
+        humps, sharp, spread = _DIAGONAL[_HUMPS], _DIAGONAL[_SHARP], _HUMP
         if is_early:
-            humps, spread = humps[self._drives.slack > self._config.following_sigma], _EARLY_HUMP
+            is_large = self._drives.slack > self._config.following_sigma
+            humps, sharp, spread = humps[is_large], sharp[~is_large], _EARLY_HUMP
         _open(memory.P, humps, spread)
-        if not is_early:
-            _open(memory.P, _DIAGONAL[_SHARP], _SHARPER)
+        _open(memory.P, sharp, _SHARPER)
 
     def widen(self, memory: SimpleNamespace, is_told_otherwise: bool = False) -> None:
         """Load or dead time have changed: constants, payload and dead time are open again.

@@ -9,7 +9,7 @@ from systems.estimation.kernels.geometry import place_links
 from systems.estimation.kernels.loads import hold
 from systems.estimation.kernels.plan import follow
 
-_SHARP = 0.2  # of the believed width over which friction turns over, where it turns over more sharply
+_SHARP = 0.02  # of the believed width over which friction turns over, where it turns over at once
 _MOST_PERIODS = 1.5  # by which torques are sent ahead or held back
 
 
