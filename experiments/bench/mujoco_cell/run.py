@@ -1,0 +1,93 @@
+"""Runs the law on a MuJoCo cell and says how far its tip was from the path."""
+
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from pydrake.systems.analysis import Simulator
+from pydrake.systems.framework import DiagramBuilder
+
+from diagrams.runs.simulation import start_position
+from diagrams.servo import Servo, learnt
+from experiments.bench.mujoco_cell.arm import Wrong, drawn_arm, true_arm
+from experiments.bench.mujoco_cell.cell import Camera, Drives, MujocoCell
+from experiments.cli.workers import Progress
+from experiments.robustness.cases import CASES
+from experiments.robustness.contenders import Contender
+from experiments.robustness.study import Trial
+from robots.description.model import load_robot
+from robots.pose import rotation_vector
+
+LAW = "self_calibrating"
+LAPS = 2
+_SETTLED = 0.5  # s of the dwell, after which the tip is at rest
+_LONGEST = 5.0  # times the planned duration, after which a run is over
+
+
+@dataclass(frozen=True)
+class CellRun:
+    """A robot with everything wrong, and the path that it runs."""
+
+    robot: str
+    seed: int
+    path: str = "rectangle"
+    wrong: Wrong = field(default_factory=Wrong)
+    drives: Drives = field(default_factory=Drives)
+    camera: Camera = field(default_factory=Camera)
+
+
+def run(job: CellRun, progress: Progress) -> dict[str, Any]:
+    """Runs all laps, from rest, with the drawing of the robot as the controller's belief.
+
+    Of the scenario `everything`, carried over to the robot, are the path, the load and what the controller
+    believes.
+
+    Returns:
+        ``robot``, ``seed`` and ``path``; ``laps``, each ``max_norm_mm`` and ``max_angle_deg`` of the true
+        tip; ``static_mm``; ``guard``, how often it intervened; and what was ``learnt``.
+    """
+    plain, law = CASES["plain"], Contender(LAW, LAW)
+    scenario = Trial("everything", plain, law, job.seed, job.path, LAPS, job.robot).load()
+    robot, station = load_robot(scenario.robot), scenario.station
+    servo = Servo(robot, scenario, LAW)
+    theta = start_position(servo.model, scenario, servo.reference.path)
+    true = true_arm(robot, station.payload, job.wrong, job.seed)
+    drawn = drawn_arm(robot, station.payload)
+    builder = DiagramBuilder()
+    builder.AddNamedSystem("servo", servo)
+    cell = builder.AddNamedSystem(
+        "cell", MujocoCell(true, drawn, job.drives, job.camera, station.period, theta, job.seed)
+    )
+    for name in ("position_command", "velocity_command", "torque_feedforward"):
+        builder.Connect(servo.GetOutputPort(name), cell.GetInputPort(name))
+    for name in ("joint_sample", "pose_sample"):
+        builder.Connect(cell.GetOutputPort(name), servo.GetInputPort(name))
+    simulator = Simulator(builder.Build())
+    context = simulator.get_mutable_context()
+    simulator.Initialize()
+    path = servo.reference.path
+    rows: list[tuple[float, float, float]] = []
+    while servo.path_time(context) < path.duration and context.get_time() < _LONGEST * path.duration:
+        simulator.AdvanceTo((len(rows) + 1) * station.period)
+        time = servo.path_time(context)
+        X_WE = cell.GetOutputPort("truth.X_WE").Eval(cell.GetMyContextFromRoot(context)).reshape(4, 4)
+        wanted = path.sample(time)[0]
+        turn = rotation_vector(X_WE[:3, :3] @ wanted[:3, :3].T)
+        rows.append((time, float(np.linalg.norm(X_WE[:3, 3] - wanted[:3, 3])), float(np.linalg.norm(turn))))
+        progress(min(1.0, time / path.duration))
+    table = np.array(rows)
+    ends = [*path.lap_starts[1:], path.dwell_start]
+    laps = [
+        table[(table[:, 0] >= start) & (table[:, 0] < end), 1:].max(axis=0)
+        for start, end in zip(path.lap_starts, ends, strict=True)
+    ]
+    status = servo.GetOutputPort("guard_status").Eval(servo.GetMyContextFromRoot(context))
+    return {
+        "robot": job.robot,
+        "seed": job.seed,
+        "path": job.path,
+        "laps": [{"max_norm_mm": 1e3 * d, "max_angle_deg": float(np.rad2deg(a))} for d, a in laps],
+        "static_mm": 1e3 * float(table[table[:, 0] > path.dwell_start + _SETTLED, 1].max()),
+        "guard": int(np.sum(status)),
+        "learnt": learnt(servo, context) or {},
+    }

@@ -1,0 +1,79 @@
+"""A cell on MuJoCo: it is the same robot as Drake's, and the law puts its true tip on the path, too."""
+
+# MuJoCo's functions are in a library of which type checkers see nothing.
+# pyright: reportAttributeAccessIssue=false
+
+import mujoco
+import numpy as np
+import pytest
+from pydrake.multibody.plant import MultibodyPlant
+
+from experiments.bench.mujoco_cell.arm import Wrong, drawn_arm, true_arm
+from experiments.bench.mujoco_cell.run import CellRun, run
+from robots.description.model import load_robot
+from robots.dynamics.plant import add_robot
+
+EXACT = Wrong(0.0, 0.0, 0.0, 0.0, 0.0)
+ROBOTS = ["irb1200", "ur10", "puma560", "crx10ial", "mh5"]
+
+
+def masses(model: mujoco.MjModel, data: mujoco.MjData) -> np.ndarray:
+    M = np.zeros((model.nv, model.nv))
+    mujoco.mj_fullM(model, data, M)
+    return M
+
+
+@pytest.mark.parametrize("name", ROBOTS)
+def test_two_engines_have_the_same_rigid_robot(name: str):
+    robot = load_robot(name)
+    load = 0.5 * robot.payload.largest_mass
+    plant = MultibodyPlant(0.0)
+    links = add_robot(plant, robot, "rigid", load)
+    plant.Finalize()
+    context, arm = plant.CreateDefaultContext(), drawn_arm(robot, load)
+    data = mujoco.MjData(arm.model)
+    for q in np.random.default_rng(0).uniform(-2.0, 2.0, (5, 6)):
+        plant.SetPositions(context, q)
+        data.qpos[:] = q
+        mujoco.mj_forward(arm.model, data)
+        np.testing.assert_allclose(masses(arm.model, data), plant.CalcMassMatrix(context), atol=1e-12)
+        gravity = plant.CalcGravityGeneralizedForces(context)
+        np.testing.assert_allclose(-data.qfrc_bias, gravity, atol=1e-11)
+        np.testing.assert_allclose(
+            arm.tip(data), links.tool.CalcPoseInWorld(context).GetAsMatrix4(), atol=1e-13
+        )
+
+
+@pytest.mark.parametrize("name", ROBOTS)
+def test_two_engines_let_the_elastic_robot_sag_alike(name: str):
+    """To a micrometre: the sag itself is millimetres, and each engine finds it in a few steps."""
+    robot = load_robot(name)
+    load = robot.payload.largest_mass
+    plant = MultibodyPlant(0.0)
+    links = add_robot(plant, robot, "structure", load)
+    plant.Finalize()
+    context, arm = plant.CreateDefaultContext(), true_arm(robot, load, EXACT, 0)
+    for q in np.random.default_rng(1).uniform(-1.5, 1.5, (5, 6)):
+        links.set_at_rest(context, q)
+        there = links.tool.CalcPoseInWorld(context).GetAsMatrix4()
+        np.testing.assert_allclose(arm.tip(arm.data_at_rest(q)), there, atol=1e-6)
+
+
+def test_a_robot_that_the_model_is_not_made_for_is_refused():
+    with pytest.raises(ValueError, match=r"KR 210.* has a counterbalance"):
+        true_arm(load_robot("kr210"), 0.0, EXACT, 0)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("robot", "first", "second"), [("irb1200", 0.05, 0.04), ("ur10", 0.05, 0.04)])
+def test_the_true_tip_is_on_its_path_from_the_first_lap_on_physics_that_are_not_ours(
+    robot: str, first: float, second: float
+):
+    """With every frame of the robot wrong, friction that sticks, and drives that the law has never seen."""
+    found = run(CellRun(robot, 1), lambda share: None)
+    one, two = found["laps"]
+    assert one["max_norm_mm"] < first
+    assert two["max_norm_mm"] < second
+    assert found["static_mm"] < 0.01
+    assert found["guard"] == 0
+    assert not found["learnt"]["events"]
