@@ -244,6 +244,9 @@ class DriveModel:
         extra[MOMENT] = 5.0 * self._moment  # of 7 kg that are gripped 50 mm away
         extra[HELD] = 5.0 * self._scale * is_told_otherwise
         memory.P[_DIAGONAL, _DIAGONAL] += extra**2
+        if is_told_otherwise:
+            # Motors were off their plan by that load, and friction turned over when nobody thought it did.
+            memory.beta[_SHARP] = memory.P[_SHARP] = memory.P[:, _SHARP] = 0.0
 
 
 _DIAGONAL = np.arange(SIZE)

@@ -314,6 +314,20 @@ def test_friction_that_is_off_by_a_third_is_not_taken_for_another_load(robot):
     assert 3e-4 < left[1] <= 4e-4 + 1e-12
 
 
+def test_how_sharply_friction_turns_over_is_learnt_anew_where_the_load_was_another_one():
+    """With a load that nobody told motors are off their plan, and turn over at other times than planned."""
+    model, memory = drives()
+    model.open_low_speeds(memory)
+    memory.beta[49:], memory.P[49:, 0], memory.P[0, 49:] = 0.5, 1e-4, 1e-4
+    model.widen(memory)
+    assert memory.beta[49:].all()
+    model.widen(memory, is_told_otherwise=True)
+    assert not memory.beta[49:].any()
+    assert not memory.P[49:].any()
+    model.open_low_speeds(memory)
+    np.testing.assert_array_equal(np.diag(memory.P)[49:], 9.0)
+
+
 @pytest.mark.parametrize(("robot", "early"), [("kr16", [3, 4, 5]), ("irb1200", [])])
 def test_humps_are_open_early_where_friction_moves_a_joint_most(robot, early):
     model, memory = drives(robot=robot)
