@@ -222,8 +222,9 @@ class DriveModel:
 
         Args:
             memory: of the layout.
-            is_early: whether humps only of joints whose friction moves them by more than they are known to
-                be off: without a hump other parameters would have to make up for it there.
+            is_early: whether motors have only come to their plan: then humps only of joints whose friction
+                moves them by more than they are known to be off, where without a hump other parameters would
+                have to make up for it, and how sharply it turns over only of the others.
         """
         humps, sharp, spread = _DIAGONAL[_HUMPS], _DIAGONAL[_SHARP], _HUMP
         if is_early:
