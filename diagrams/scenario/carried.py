@@ -186,12 +186,14 @@ def _place(scenario: Scenario, before: RobotModel, robot: RobotModel) -> _Placed
     _, old_front = front(before, old[:3, 3])
     candidates = np.deg2rad([robot.home_deg]) if robot.home_deg else working_positions(robot, _PLACES[-1])
     admissible = AdmissibleConfigurations(robot)
-    best = float(dexterity(robot, candidates[: _PLACES[0]]).max())
-    larger = arm_length(robot) / arm_length(before)
-    trial = _Trial(scenario.reference, robot, admissible, _DEXTERITY * best)
+    larger, best = arm_length(robot) / arm_length(before), 0.0
     for first, last in pairwise((0, *_PLACES)):
         positions = candidates[first:last]
+        if not len(positions):
+            break
         positions = positions[admissible(positions)] if admissible(positions).any() else positions
+        best = max(best, float(dexterity(robot, positions).max()))
+        trial = _Trial(scenario.reference, robot, admissible, _DEXTERITY * best)
         for size in _SIZES:
             for q in positions:
                 X = Kinematics(robot).forward(q)

@@ -78,26 +78,30 @@ def error_parameters(robot: RobotModel) -> tuple[ErrorParameter, ...]:
 
 
 def _turned_ahead(robot: RobotModel, axes: list[int]) -> list[set[int]]:
-    """Of each joint about which axes (0, 1, 2) of its link frame a rotation error acts ahead of its rotation.
-
-    The axis of a joint is free if errors ahead of it, errors behind the joint before and that joint itself
-    turn it both ways.
-    """
+    """Of each joint the axes (0, 1, 2) of its frame about which a rotation error acts ahead of it."""
     chosen: list[set[int]] = []
     behind = {0, 1, 2}  # of the base
     for own, joint in zip(axes, robot.joints, strict=True):
         R, usual = joint.placement.pose().rotation().matrix(), {k for k in range(3) if k < own}
-        across = {k for k in range(3) if k != own}
-
-        def frees(ahead: set[int], R: np.ndarray = R, own: int = own, behind: set[int] = behind) -> bool:
-            turns = np.column_stack([np.eye(3)[:, sorted(behind)], R[:, sorted(ahead)]])
-            moves = np.cross(turns.T, R[:, own])  # of the axis
-            return int(np.sum(np.linalg.svd(moves, compute_uv=False) > _FREE)) == 2
-
+        across = {0, 1, 2} - {own}
         options = [usual, *({k} for k in sorted(across, reverse=True)), across]
-        chosen.append(next((ahead for ahead in options if frees(ahead)), usual))
+        chosen.append(next((ahead for ahead in options if _is_free(R, own, behind, ahead)), usual))
         behind = {own} | (across - chosen[-1])
     return chosen
+
+
+def _is_free(R: np.ndarray, own: int, behind: set[int], ahead: set[int]) -> bool:
+    """Whether the axis of a joint is turned both ways.
+
+    Args:
+        R: its frame in that of the link before, (3, 3).
+        own: the axis in its frame.
+        behind: axes of the link before about which that joint, or an error behind it, turns.
+        ahead: axes of its frame about which an error turns.
+    """
+    turns = np.column_stack([np.eye(3)[:, sorted(behind)], R[:, sorted(ahead)]])
+    moves = np.cross(turns.T, R[:, own])
+    return int(np.sum(np.linalg.svd(moves, compute_uv=False) > _FREE)) == 2
 
 
 def parameter_names(robot: RobotModel) -> tuple[str, ...]:

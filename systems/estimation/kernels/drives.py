@@ -9,7 +9,7 @@ from systems.estimation.kernels.geometry import place_links
 from systems.estimation.kernels.loads import hold
 from systems.estimation.kernels.plan import follow
 
-_SHARP = 0.02  # of the believed width over which friction turns over, where it turns over at once
+_SHARP_WIDTH = 0.02  # of the believed width over which friction turns over, where it turns over at once
 _MOST_PERIODS = 1.5  # by which torques are sent ahead or held back
 
 
@@ -187,7 +187,7 @@ def command(drives, arm, masses, memory, motion, loads, mass, limits, out, filte
         turn = drives.period * a[i]
         w[3] = drives.coulomb[i] * _mean_sign(v[i] - 0.5 * turn, turn, drives.width[i])
         w[4] = w[3] * math.exp(-abs(v[i]) / drives.slow)
-        w[10] = drives.coulomb[i] * _mean_sign(v[i] - 0.5 * turn, turn, _SHARP * drives.width[i]) - w[3]
+        w[10] = drives.coulomb[i] * _mean_sign(v[i] - 0.5 * turn, turn, _SHARP_WIDTH * drives.width[i]) - w[3]
         for k in range(4):
             w[5 + k] = loads[1 + k, i]
         w[9] = with_more[i] - held[i]
