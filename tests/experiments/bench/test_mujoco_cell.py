@@ -3,12 +3,15 @@
 # MuJoCo's functions are in a library of which type checkers see nothing.
 # pyright: reportAttributeAccessIssue=false
 
+from dataclasses import replace
+
 import mujoco
 import numpy as np
 import pytest
 from pydrake.multibody.plant import MultibodyPlant
 
-from experiments.bench.mujoco_cell.arm import Wrong, drawn_arm, true_arm
+from experiments.bench.mujoco_cell.arm import STEP, Wrong, drawn_arm, true_arm
+from experiments.bench.mujoco_cell.cell import Camera, Drives, MujocoCell
 from experiments.bench.mujoco_cell.run import CellRun, run
 from robots.description.model import load_robot
 from robots.dynamics.plant import add_robot
@@ -62,6 +65,33 @@ def test_two_engines_let_the_elastic_robot_sag_alike(name: str):
 def test_a_robot_that_the_model_is_not_made_for_is_refused():
     with pytest.raises(ValueError, match=r"KR 210.* has a counterbalance"):
         true_arm(load_robot("kr210"), 0.0, EXACT, 0)
+
+
+def test_links_that_bend_let_the_tip_sag_further():
+    robot, q = load_robot("irb1200"), np.zeros(6)
+    tips = []
+    for bending in (0.0, 0.3):
+        arm = true_arm(robot, 7.0, replace(EXACT, bending=bending), 0)
+        tips.append(arm.tip(arm.data_at_rest(q))[2, 3])
+    assert 1e-5 < tips[0] - tips[1] < 1e-3
+
+
+def test_a_set_point_is_where_the_commands_were_a_delay_before():
+    """A cubic between values and rates is off by h^4 / 384 of the fourth derivative, here 7e-11 rad."""
+    robot, period, delay = load_robot("irb1200"), 4e-3, 7e-3
+    arm, drives = drawn_arm(robot, 0.0), Drives(delay=delay)
+    cell = MujocoCell(arm, arm, drives, Camera(), period, np.zeros(6), 0)
+    context = cell.CreateDefaultContext()
+    now = context.get_abstract_state(0).get_value()
+    now.ticks = 10
+    for k in range(len(now.commands)):
+        issued = (10 - (len(now.commands) - 1 - k)) * period
+        now.commands[k] = np.repeat([np.sin(3.0 * issued), 3.0 * np.cos(3.0 * issued), issued], 6)
+    for time in np.arange(10 * period, 11 * period, STEP):
+        position, speed, torque = cell._setpoint(now, time)
+        np.testing.assert_allclose(position, np.sin(3.0 * (time - delay)), atol=2e-10)
+        np.testing.assert_allclose(speed, 3.0 * np.cos(3.0 * (time - delay)), atol=1e-6)
+        assert 0.0 <= time - delay - torque[0] + 1e-12 < period
 
 
 @pytest.mark.slow
