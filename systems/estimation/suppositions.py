@@ -66,6 +66,25 @@ class Suppositions:
         event = self._given_up(memory, P, b)
         return event and (event, self.prior(memory) - before)
 
+    def kept(self, memory: SimpleNamespace, P: np.ndarray, b: np.ndarray, A: np.ndarray) -> np.ndarray:
+        """What samples say of the drift of the clock, where information A is what is left of them.
+
+        The estimate alone, of which it is supposed that there is none, says something else. Let I be the
+        information of the supposition, and P' as above without it: A P b and this are (A - I) P' b.
+
+        Args:
+            memory: of the layout.
+            P, b: as of `look`, before.
+            A: information on the same estimate from now on, the suppositions among it, (n, n).
+
+        Returns:
+            What to add to A P b, (n,).
+        """
+        D, held = self._model.D, memory.drift[0] - 1.0
+        against = A @ P[D]
+        against[D] -= 1.0
+        return held * (P[D] @ b) / (1.0 - held * P[D, D]) * against
+
     def _given_up(self, memory: SimpleNamespace, P: np.ndarray, b: np.ndarray) -> Event | None:
         model = self._model
         if memory.drift[0] > 1.0:

@@ -287,11 +287,10 @@ class TipEstimator:
         memory.is_busy[0] = 1.0
         keyframes, is_settled = memory.keyframes, self._keyframes.is_settled(memory.keyframes, memory.xi)
         found = self._suppositions.look(memory.supposed, memory.P, keyframes.b + memory.b_open, is_settled)
-        if found is None:
-            return None
-        self._keyframes.add(keyframes, found[1])
-        self._solve(memory)
-        return found[0]
+        if found:
+            self._keyframes.add(keyframes, found[1])
+            self._solve(memory)
+        return found and found[0]
 
     def work(self, memory: SimpleNamespace) -> None:
         """What can be done in a tick without a sample, or after its command is out: relinearise.
@@ -319,8 +318,7 @@ class TipEstimator:
 
     def _close(self, memory: SimpleNamespace) -> None:
         """Makes the open samples a keyframe."""
-        constants = self.constants(memory)
-        if self._keyframes.close(memory.keyframes, constants, memory.xi, open_keyframe(memory)):
+        if self._keyframes.close(memory.keyframes, self.constants(memory), memory.xi, open_keyframe(memory)):
             forget_open(memory)
 
     def _solve(self, memory: SimpleNamespace) -> None:
@@ -393,8 +391,10 @@ class TipEstimator:
 
     def _begin_from(self, memory: SimpleNamespace, A: np.ndarray, xi: np.ndarray) -> None:
         """Goes on with the information A about xi, and without keyframes."""
+        estimate = memory.P, memory.keyframes.b + memory.b_open
+        kept = self._suppositions.kept(memory.supposed, *estimate, A) if xi is memory.xi else 0.0
         memory.xi[:] = xi
-        self._keyframes.reset(memory.keyframes, 0.5 * (A + A.T), memory.xi)
+        self._keyframes.reset(memory.keyframes, 0.5 * (A + A.T), memory.xi, kept)
         memory.supposed.load[0] = 0.0
         forget_open(memory)
         self._invert(memory)

@@ -15,7 +15,8 @@ from rich import box
 from rich.console import Console
 from rich.table import Table
 
-from experiments.bench.mujoco_cell.arm import Wrong
+from experiments.bench.mujoco_cell.arm import STEP, Wrong
+from experiments.bench.mujoco_cell.cell import Drives
 from experiments.bench.mujoco_cell.run import CellRun, run
 from experiments.cli.console import progress_bar
 from experiments.cli.workers import in_processes
@@ -30,12 +31,23 @@ def main() -> None:
     parser.add_argument("--paths", default="rectangle", help="rectangle, circle, figure_eight")
     parser.add_argument("--seeds", type=int, default=3, help="robots of each name")
     parser.add_argument("--first-seed", type=int, default=1)
+    parser.add_argument("--egm", action="store_true", help="behind a planner as that of EGM, without torques")
     parser.add_argument("--bending", type=float, default=0.0, help="of links, over that of their bearings")
+    parser.add_argument(
+        "--friction-time",
+        type=float,
+        default=Wrong.friction_time,
+        help="s, in which friction that holds brakes a motor: 0.0005, two steps, is as hard as it can stick",
+    )
     parser.add_argument("--jobs", type=int, default=None, help="parallel processes; one per core")
     parser.add_argument("--json", metavar="FILE", default="")
     options = parser.parse_args()
+    if options.friction_time < 2.0 * STEP:
+        parser.error(f"--friction-time must be two steps of {STEP} s or more, got {options.friction_time}")
+    wrong = Wrong(bending=options.bending, friction_time=options.friction_time)
+    drives = Drives(planner=20.0 if options.egm else 0.0)
     jobs = [
-        CellRun(robot, seed, path, Wrong(bending=options.bending))
+        CellRun(robot, seed, path, wrong, drives)
         for robot in options.robots.split(",")
         for path in options.paths.split(",")
         for seed in range(options.first_seed, options.first_seed + options.seeds)

@@ -15,7 +15,6 @@ from robots.description.model import Link, Placement, RobotModel
 
 STEP = 2.5e-4  # s, of the physics
 JOINTS = range(1, 7)
-_FRICTION_TIME = 2e-3  # s, in which friction that holds brakes a motor; MuJoCo wants two steps or more
 _FRAMES = 8  # base, six joints, tool
 
 
@@ -29,6 +28,8 @@ class Wrong:
     friction: float = 0.2  # share of viscous and Coulomb friction
     payload_centre: float = 5.8e-3  # m, along each axis
     bending: float = 0.0  # of upper arm and forearm, over what their bearings yield: no belief knows of it
+    # s, in which friction that holds brakes a motor: the shorter the harder it sticks, no less than two steps
+    friction_time: float = 2e-3
 
 
 @dataclass(frozen=True)
@@ -92,7 +93,7 @@ def true_arm(robot: RobotModel, payload: float, wrong: Wrong, seed: int) -> Arm:
             robot.payload.center_of_mass + off(wrong.payload_centre, 3),
             shifts,
             turns,
-            [_elastic(robot, number, springs[number - 1], friction[number - 1]) for number in JOINTS],
+            [_elastic(robot, k + 1, springs[k], friction[k], wrong.friction_time) for k in range(6)],
             wrong.bending,
         )
     )
@@ -109,7 +110,9 @@ def drawn_arm(robot: RobotModel, payload: float) -> Arm:
     return Arm(_model(robot, payload, robot.payload.center_of_mass, zero, zero, joints, 0.0))
 
 
-def _elastic(robot: RobotModel, number: int, springs: np.ndarray, friction: np.ndarray) -> str:
+def _elastic(
+    robot: RobotModel, number: int, springs: np.ndarray, friction: np.ndarray, friction_time: float
+) -> str:
     """Motor, gear and bearing of a joint, one behind the other between the same two links."""
     i = number - 1
     axis, joint = robot.axes[i], robot.joints[i]
@@ -117,7 +120,7 @@ def _elastic(robot: RobotModel, number: int, springs: np.ndarray, friction: np.n
         f'<joint name="motor_{number}" axis="{_text(axis)}" armature="{_text([robot.reflected_inertia[i]])}" '
         f'damping="{_text([friction[0] * robot.joint_viscous_friction[i]])}" '
         f'frictionloss="{_text([friction[1] * robot.joint_coulomb_friction[i]])}" '
-        f'solreffriction="{_FRICTION_TIME} 1"/>'
+        f'solreffriction="{friction_time} 1"/>'
     )
     gear = _spring(f"gear_{number}", axis, springs[0] * robot.joint_stiffness[i], robot.joint_damping[i])
     if joint.tilting is None:

@@ -36,6 +36,10 @@ class Drives:
     speed_filter: float = 1e-3  # s, over which steps of the encoder are a speed
     step: float = 2.0 * math.pi / 2**24  # rad, of the encoders as they know them
     reported_step: float = 2.0 * math.pi / 2**19  # rad, of the angles that the controller reports
+    planner: float = (
+        0.0  # 1/s, with which a controller before them follows references; they take torques if 0
+    )
+    planner_lag: float = 2e-3  # s, with which it changes its speed, and so behind what it is told
 
 
 @dataclass(frozen=True)
@@ -70,7 +74,10 @@ class _Now:
 
 
 class MujocoCell(LeafSystem):
-    """Ports as of `diagrams.station.SimulatedStation`, torques included, and ``truth.X_WE``, (16,)."""
+    """Ports as of `diagrams.station.SimulatedStation`, and ``truth.X_WE``, (16,).
+
+    Torques are not among them if a controller is before the drives, which plans its own motion.
+    """
 
     def __init__(
         self,
@@ -106,7 +113,7 @@ class MujocoCell(LeafSystem):
         begin.torque = self._gravity(begin.seen)
         self._inputs = [
             self.DeclareVectorInputPort(name, 6)
-            for name in ("position_command", "velocity_command", "torque_feedforward")
+            for name in ("position_command", "velocity_command", "torque_feedforward")[: self.taken]
         ]
         state = self.DeclareAbstractState(Value[object](begin))
         state_ticket = {self.abstract_state_ticket(state), self.time_ticket()}
@@ -119,6 +126,11 @@ class MujocoCell(LeafSystem):
         )
         self.DeclareVectorOutputPort("truth.X_WE", 16, self._truth, state_ticket)
         self.DeclarePeriodicUnrestrictedUpdateEvent(period, period - _BEFORE, self._advance)
+
+    @property
+    def taken(self) -> int:
+        """How many of the three commands it takes."""
+        return 2 if self._drives.planner else 3
 
     def _now(self, context: Context) -> _Now:
         return context.get_abstract_state(int(self._state)).get_value()
@@ -149,7 +161,9 @@ class MujocoCell(LeafSystem):
     def _advance(self, context: Context, state: State) -> None:
         """From the last tick to the next one."""
         now = self._now(context)
-        now.commands = [*now.commands[1:], np.concatenate([port.Eval(context) for port in self._inputs])]
+        told = [port.Eval(context) for port in self._inputs]
+        command = np.concatenate(told) if len(told) == 3 else self._planned(now.commands[-1], *told)
+        now.commands = [*now.commands[1:], command]
         start = now.ticks * self._period
         gravity = self._gravity(now.seen)
         first = round(self._camera.phase / STEP)
@@ -166,6 +180,13 @@ class MujocoCell(LeafSystem):
         if due:
             now.pose, now.coming = due[-1], now.coming[len(due) :]
         state.get_mutable_abstract_state(int(self._state)).set_value(now)
+
+    def _planned(self, last: np.ndarray, position: np.ndarray, speed: np.ndarray) -> np.ndarray:
+        """What a controller makes of a reference and its speed: a motion of its own, and no torque, (18,)."""
+        drives, T = self._drives, self._period
+        wanted = speed + drives.planner * (position - (last[:6] + T * last[6:12]))
+        now = last[6:12] + (1.0 - math.exp(-T / drives.planner_lag)) * (wanted - last[6:12])
+        return np.concatenate([last[:6] + 0.5 * T * (last[6:12] + now), now, np.zeros(6)])
 
     def _expose(self, now: _Now, time: float) -> None:
         camera = self._camera

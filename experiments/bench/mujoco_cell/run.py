@@ -12,7 +12,7 @@ from diagrams.servo import Servo, learnt
 from experiments.bench.mujoco_cell.arm import Wrong, drawn_arm, true_arm
 from experiments.bench.mujoco_cell.cell import Camera, Drives, MujocoCell
 from experiments.cli.workers import Progress
-from experiments.robustness.cases import CASES
+from experiments.robustness.cases import Case
 from experiments.robustness.contenders import Contender
 from experiments.robustness.study import Trial
 from robots.description.model import load_robot
@@ -35,6 +35,11 @@ class CellRun:
     drives: Drives = field(default_factory=Drives)
     camera: Camera = field(default_factory=Camera)
 
+    @property
+    def settings(self) -> tuple[str, ...]:
+        """Of the scenario: what is believed of the interface is right."""
+        return ("station.interface=egm",) if self.drives.planner else ()
+
 
 def run(job: CellRun, progress: Progress) -> dict[str, Any]:
     """Runs all laps, from rest, with the drawing of the robot as the controller's belief.
@@ -46,7 +51,7 @@ def run(job: CellRun, progress: Progress) -> dict[str, Any]:
         ``robot``, ``seed`` and ``path``; ``laps``, each ``max_norm_mm`` and ``max_angle_deg`` of the true
         tip; ``static_mm``; ``guard``, how often it intervened; and what was ``learnt``.
     """
-    plain, law = CASES["plain"], Contender(LAW, LAW)
+    plain, law = Case("plain", job.settings), Contender(LAW, LAW)
     scenario = Trial("everything", plain, law, job.seed, job.path, LAPS, job.robot).load()
     robot, station = load_robot(scenario.robot), scenario.station
     servo = Servo(robot, scenario, LAW)
@@ -58,7 +63,7 @@ def run(job: CellRun, progress: Progress) -> dict[str, Any]:
     cell = builder.AddNamedSystem(
         "cell", MujocoCell(true, drawn, job.drives, job.camera, station.period, theta, job.seed)
     )
-    for name in ("position_command", "velocity_command", "torque_feedforward"):
+    for name in ("position_command", "velocity_command", "torque_feedforward")[: cell.taken]:
         builder.Connect(servo.GetOutputPort(name), cell.GetInputPort(name))
     for name in ("joint_sample", "pose_sample"):
         builder.Connect(cell.GetOutputPort(name), servo.GetInputPort(name))

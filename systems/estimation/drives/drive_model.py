@@ -24,7 +24,7 @@ from systems.estimation.memory import Layout
 # friction is more than believed where it turns over sharply.
 _FILTERED = 11
 COLUMNS = 6 * (_FILTERED + 1)  # of all but the first, of a planner, and of what is late beside the plan
-_HUMPS, _CONSTANTS = slice(16, 37, 4), slice(37, 43)
+_VISCOUS, _COULOMB, _HUMPS, _CONSTANTS = slice(14, 37, 4), slice(15, 37, 4), slice(16, 37, 4), slice(37, 43)
 DEAD_TIME, MASS, MOMENT, HELD, SMOOTHED = 0, 43, slice(44, 47), 47, 48
 _SHARP = slice(SMOOTHED + 1, SMOOTHED + 7)
 SIZE = SMOOTHED + 7
@@ -32,7 +32,10 @@ SIZE = SMOOTHED + 7
 # first lap of robots without a hump is twisted more
 _HUMP, _EARLY_HUMP = 0.3, 0.1
 _SLOW = 0.05  # rad/s, of Stribeck's effect, exp(-|v| / _SLOW) as Tustin has it; assumed
-_SHARPER = 3.0  # the spread of how much of Coulomb friction turns over more sharply than believed
+# The spreads of how much of Coulomb friction turns over more sharply than believed, in all joints alike and
+# in one beside the others: all have bearings and seals of a kind, and one stop of one shows it
+_SHARPER, _SHARPER_ALONE = 6.0, 0.6
+_VISCOUS_SPREAD, _COULOMB_SPREAD = 0.3, 0.5  # of what a robot's file says of friction
 _SLACK = 0.3  # of Coulomb's friction, by which it may be off while little is known of it
 _STEEPEST = 0.5  # rad/s, what learning may add to the speed of a joint
 _RESTS = {"cascade": 1e-5, "velocity": 1e-5, "position": 3e-5}  # rad, where a motor rests beside its command
@@ -134,7 +137,7 @@ class DriveModel:
         self._held = drawn.constants(np.zeros(NUM_PARAMETERS)), ArmLoads(robot).masses
         spread = [config.dead_time_sigma, *[config.lag_sigma] * 6, *[1e-4] * 6]
         self._scale, self._moment = model.load_scale, config.moment_sigma * model.load_scale
-        spread += [0.3, 0.3, 0.5, 0.0] * 6 + [_RESTS[kind]] * 6
+        spread += [0.3, _VISCOUS_SPREAD, _COULOMB_SPREAD, 0.0] * 6 + [_RESTS[kind]] * 6
         spread += [config.payload_sigma * self._scale] + [self._moment] * 3 + [0.0, config.smoothing_sigma]
         spread += [0.0] * 6
         self._prior = np.diag(np.array(spread) ** 2)
@@ -147,6 +150,7 @@ class DriveModel:
             P=(SIZE, SIZE),
             correction=(6,),
             smoothed=(6,),
+            hung=(6,),  # rad, by which motors were off when they were slow, fading
         )
 
     def start(self, memory: SimpleNamespace) -> None:
@@ -205,13 +209,13 @@ class DriveModel:
         Returns:
             The most that was not explained before, beyond what friction may do, in rad.
         """
-        known = memory.P, memory.beta, self._config.following_sigma**2, most
-        slack = self._drives.slack
-        return kernels.drives.look_back(planned, correction, columns, actual, slack, *known)
+        known = memory.hung, memory.P, memory.beta, self._config.following_sigma**2, most
+        return kernels.drives.look_back(self._drives, planned, correction, columns, actual, *known)
 
     def learn(self, memory: SimpleNamespace, Phi: np.ndarray, y: np.ndarray) -> None:
         """One step of recursive least squares: the motors were y behind a plan without correction, (6,)."""
-        kernels.drives.learn(memory.P, memory.beta, Phi, y, self._config.following_sigma**2)
+        variances = np.full(len(y), self._config.following_sigma**2)
+        kernels.drives.learn(memory.P, memory.beta, Phi, y, variances)
 
     def open_low_speeds(self, memory: SimpleNamespace, is_early: bool = False) -> None:
         """From now on friction at low speeds may be another one than believed.
@@ -224,14 +228,18 @@ class DriveModel:
             memory: of the layout.
             is_early: whether motors have only come to their plan: then humps only of joints whose friction
                 moves them by more than they are known to be off, where without a hump other parameters would
-                have to make up for it, and how sharply it turns over only of the others.
+                have to make up for it.
         """
-        humps, sharp, spread = _DIAGONAL[_HUMPS], _DIAGONAL[_SHARP], _HUMP
+        P, humps, spread = memory.P, _DIAGONAL[_HUMPS], _HUMP
         if is_early:
-            is_large = self._drives.slack > self._config.following_sigma
-            humps, sharp, spread = humps[is_large], sharp[~is_large], _EARLY_HUMP
-        _open(memory.P, humps, spread)
-        _open(memory.P, sharp, _SHARPER)
+            humps, spread = humps[self._drives.slack > self._config.following_sigma], _EARLY_HUMP
+        humps = humps[P[humps, humps] == 0.0]
+        P[humps, humps] = spread**2
+        if not P[_SHARP, _SHARP].any():
+            P[_SHARP, _SHARP] = _SHARPER**2 + _SHARPER_ALONE**2 * np.eye(6)
+            # Until now they had to make up for friction that turns over sharply.
+            P[_DIAGONAL[_VISCOUS], _DIAGONAL[_VISCOUS]] += _VISCOUS_SPREAD**2
+            P[_DIAGONAL[_COULOMB], _DIAGONAL[_COULOMB]] += _COULOMB_SPREAD**2
 
     def widen(self, memory: SimpleNamespace, is_told_otherwise: bool = False) -> None:
         """Load or dead time have changed: constants, payload and dead time are open again.
@@ -251,12 +259,6 @@ class DriveModel:
 
 
 _DIAGONAL = np.arange(SIZE)
-
-
-def _open(P: np.ndarray, parameters: np.ndarray, spread: float) -> None:
-    """Gives parameters that are supposed to be known a spread in a covariance."""
-    closed = parameters[P[parameters, parameters] == 0.0]
-    P[closed, closed] = spread**2
 
 
 def _gains(

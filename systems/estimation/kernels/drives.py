@@ -10,6 +10,9 @@ from systems.estimation.kernels.loads import hold
 from systems.estimation.kernels.plan import follow
 
 _SHARP_WIDTH = 0.02  # of the believed width over which friction turns over, where it turns over at once
+_STILL = 0.1  # of that width, below which a motor may hang in its friction
+_FORGOTTEN = 0.1  # s, in which what it was off by then has fallen to a third
+_DOUBT = 30.0  # times that, by which its following error may be due to it
 _MOST_PERIODS = 1.5  # by which torques are sent ahead or held back
 
 
@@ -40,8 +43,8 @@ def _behind(v, a, filtered, beta, i):
 
 
 @compiled
-def learn(P, beta, Phi, y, variance):
-    """Takes six equations y = Phi beta of one variance into covariance P and parameters beta."""
+def learn(P, beta, Phi, y, variances):
+    """Takes six equations y = Phi beta of variances (6,) into covariance P and parameters beta."""
     n, m = len(beta), len(y)
     # Transposed, as rows are quicker.
     PH, S, gain, r = np.zeros((m, n)), np.zeros((m, m)), np.empty((m, n)), np.empty(m)
@@ -51,7 +54,7 @@ def learn(P, beta, Phi, y, variance):
                 for i in range(n):
                     PH[k, i] += Phi[k, j] * P[j, i]
     for k in range(m):
-        S[k, k] = variance
+        S[k, k] = variances[k]
         for i in range(n):
             if Phi[k, i] != 0.0:
                 for j in range(m):
@@ -96,30 +99,36 @@ def learn(P, beta, Phi, y, variance):
 
 
 @compiled
-def look_back(planned, correction, filtered, actual, slack, P, beta, variance, most):
+def look_back(drives, planned, correction, filtered, actual, hung, P, beta, variance, most):
     """Learns from one planned instant that has passed; see `DriveModel.look_back`.
 
     Args:
+        drives: `Drives`.
         planned: position, velocity and acceleration of the motors, (6,) each.
         correction: that was commanded beside the plan, rad, (6,).
         filtered: as of `features`.
         actual: positions of the motors, rad, (6,).
-        slack: of `Drives`.
-        P, beta, variance: as of `learn`.
+        hung: rad, by which motors were off when they were slow, fading, (6,); is renewed.
+        P, beta: as of `learn`.
+        variance: of the following error of a motor that does not hang.
         most: rad, that may be unexplained if there shall be something to learn.
 
     Returns:
         By how much the positions are off at most at the beta from before, beyond the slack, rad.
     """
     theta, v, a = planned
-    Phi, y = np.zeros((6, len(beta))), np.empty(6)
+    Phi, y, variances = np.zeros((6, len(beta))), np.empty(6), np.empty(6)
     features(v, a, filtered, Phi)
-    largest = 0.0
+    largest, fading = 0.0, math.exp(-drives.period / _FORGOTTEN)
     for i in range(6):
+        hung[i] *= fading
+        if abs(v[i]) < _STILL * drives.width[i] + 0.5 * drives.period * abs(a[i]):
+            hung[i] = max(hung[i], abs(theta[i] - actual[i]))
+        variances[i] = variance + (_DOUBT * hung[i]) ** 2
         y[i] = theta[i] - actual[i] + correction[i]
-        largest = max(largest, abs(y[i] - _behind(v[i], a[i], filtered, beta, i)) - slack[i])
+        largest = max(largest, abs(y[i] - _behind(v[i], a[i], filtered, beta, i)) - drives.slack[i])
     if largest <= most:
-        learn(P, beta, Phi, y, variance)
+        learn(P, beta, Phi, y, variances)
     return largest
 
 

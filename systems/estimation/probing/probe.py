@@ -33,7 +33,7 @@ class ProbeConfig:
     amplitude: list[float] | None = None
     largest_excursion: float | None = None
     begin: float = 0.8  # s after the start
-    rest: float = 0.3  # s before the path begins
+    rest: float = 0.05  # s before the path begins: motors that stick wind up at rest
     # s, for which the camera may see nothing on the path: what is needed then is shown before. Of 0.35, 0.5
     # and 0.8 s this leaves least at worst, 0.052, 0.046 and 0.057 mm (`truetip robustness --laws
     # self_calibrating --cases drop-outs --first-seed 5001 --seeds 3`).
@@ -43,7 +43,7 @@ class ProbeConfig:
 
 
 class Pattern(NamedTuple):
-    """Oscillations of the joints under one window."""
+    """Oscillations of the joints under one window, (5 s^3 - 3 s^5) / 2 with s = sin(pi t / length)."""
 
     size: np.ndarray  # (6,) rad
     periods: np.ndarray  # (6,), in the window
@@ -52,8 +52,11 @@ class Pattern(NamedTuple):
     def at(self, times: np.ndarray, length: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Displacement and its two derivatives at times in s since the window began, (n, 6) each."""
         w, times = 2.0 * np.pi / length, times[:, None]
-        window = 0.5 - 0.5 * np.cos(w * times)
-        slope, bend = 0.5 * w * np.sin(w * times), 0.5 * w * w * np.cos(w * times)
+        # Its first two derivatives vanish at both ends: a step of the acceleration would be one of the
+        # deflection of the gears. And it shows more than sin^2, as it is wider.
+        s, c = np.sin(0.5 * w * times), np.cos(0.5 * w * times)
+        window = s**3 * (2.5 - 1.5 * s * s)
+        slope, bend = 3.75 * w * s**2 * c**3, 1.875 * w * w * s * c * c * (2.0 * c * c - 3.0 * s * s)
         f = w * self.periods
         sine, cosine = np.sin(f * times + self.phases), np.cos(f * times + self.phases)
         return (
@@ -68,7 +71,7 @@ USUAL = Pattern(np.ones(NUM_JOINTS), np.array([1, 1, 2, 2, 3, 3]), np.array([0, 
 
 
 class Probe:
-    """A short knock that shows the dead time, then oscillations of all joints under a sin^2 window.
+    """A short knock that shows the dead time, then oscillations of all joints under a smooth window.
 
     Both begin and end at rest; times count from the start. Which axis oscillates how often, and how far, is
     for who knows the path to say: `pattern` is the usual one, as large as it may be, until it is replaced.

@@ -298,6 +298,53 @@ def test_friction_that_sticks_is_learnt_once_it_may_turn_over_more_sharply():
     np.testing.assert_allclose(memory.beta[52:], 1.0, atol=0.2)
 
 
+def test_that_friction_sticks_one_joint_shows_for_all():
+    """All have bearings and seals of a kind: what has been seen of one is expected of the others."""
+    model, memory = drives()
+    model.open_low_speeds(memory)
+    for k in range(1000):
+        theta, v, a = (0.05 * each for each in motion(PERIOD * k))
+        columns = model.command(memory, (theta, v, a), LOADS, 7.0).columns
+        Phi = model.features(v, a, columns)
+        Phi[np.arange(6) != 4] = 0.0
+        model.learn(memory, Phi, Phi[:, 53])
+    np.testing.assert_allclose(memory.beta[53], 1.0, atol=0.1)
+    np.testing.assert_allclose(memory.beta[49:], memory.beta[53], atol=0.1)
+
+
+def test_what_motors_that_hung_do_after_a_rest_does_not_hide_that_they_stick():
+    """At rest friction is whatever keeps a motor there: it hangs until its drive pulls more than that.
+
+    The motors, without inertia: k_d (v_command - v) + k_p e + k_i int e dt and the torque that was sent for
+    friction are the friction that there is.
+    """
+    model, memory = drives()
+    coulomb, width, kp, ki, kd = (
+        getattr(model._drives, name) for name in ("coulomb", "width", "kp", "ki", "kd")
+    )
+    model.open_low_speeds(memory)
+    theta = command = begin = np.zeros(6)
+    sum_of_e = np.zeros(6)
+    for way in (0.1, 0.1, -0.1, 0.1, -0.1, -0.1, 0.1, 0.1):  # rad within a second, and a rest
+        for time in np.arange(0.0, 1.4, PERIOD):
+            s, w = min(time, 1.0), 2.0 * np.pi
+            turn, v, a = way * np.outer(
+                [s - np.sin(w * s) / w, 1.0 - np.cos(w * s), w * np.sin(w * s)], np.ones(6)
+            )
+            columns = model.command(memory, (begin + turn, v, a), LOADS, 7.0).columns
+            before, command = command, begin + turn + memory.correction
+            rate = (command - before) / PERIOD
+            for part in 0.1 * np.arange(1, 11):
+                e = before + part * (command - before) - theta
+                pull = kd * rate + kp * e + ki * sum_of_e + coulomb * np.tanh(v / width)
+                theta = theta + 0.1 * PERIOD * np.sign(pull) * np.maximum(np.abs(pull) - coulomb, 0.0) / kd
+                sum_of_e = sum_of_e + 0.1 * PERIOD * e
+            model.look_back(memory, (begin + turn, v, a), columns, memory.correction.copy(), theta)
+        begin = begin + way
+    # Were what they do after a rest believed as all else is, it would be 0.1 to 0.2.
+    assert (memory.beta[49:] > 0.6).all()
+
+
 @pytest.mark.parametrize("robot", ["kr16", "kr16-realistic"])
 def test_friction_that_is_off_by_a_third_is_not_taken_for_another_load(robot):
     """Whether the robot's file has it as two numbers or as a curve; of the wrists it is a milliradian."""
@@ -325,7 +372,7 @@ def test_how_sharply_friction_turns_over_is_learnt_anew_where_the_load_was_anoth
     assert not memory.beta[49:].any()
     assert not memory.P[49:].any()
     model.open_low_speeds(memory)
-    np.testing.assert_array_equal(np.diag(memory.P)[49:], 9.0)
+    assert (np.diag(memory.P)[49:] > 1.0).all()
 
 
 @pytest.mark.parametrize(("robot", "early"), [("kr16", [3, 4, 5]), ("irb1200", [])])

@@ -22,7 +22,9 @@ def test_rates_are_derivatives_and_both_ends_are_at_rest():
         np.testing.assert_allclose(v, (p1 - p0) / (2.0 * h), atol=1e-7)
         np.testing.assert_allclose(a, (v1 - v0) / (2.0 * h), atol=1e-6)
     for time in (0.15 + 1e-6, 0.55 - 1e-6, begin + 1e-6, begin + length - 1e-6):
-        assert max(np.abs(part).max() for part in probe.at(time, PATH_START, size)[:2]) < 1e-6
+        p, v, a = probe.at(time, PATH_START, size)
+        assert max(np.abs(p).max(), np.abs(v).max()) < 1e-6
+        assert np.abs(a).max() < 1e-3  # or gears, which it deflects, would be thrown about
     assert not np.any(probe.at(PATH_START, PATH_START, size))
 
 

@@ -93,7 +93,7 @@ def test_what_a_slow_camera_misses_a_larger_motion_makes_up_for():
 
 def test_the_longer_the_camera_may_be_blind_the_more_is_shown_before():
     probe = Probe(load_robot("irb1200"), ProbeConfig())
-    sees, blind = needs(Circle(), late=0.05), needs(Circle(), late=2.0)
+    sees, blind = needs(Rectangle(), late=0.05), needs(Rectangle(), late=0.8)
     shown = []
     for of in (sees, blind):
         probe.pattern, promised = designed(of, probe, 4.0, RATE, sharp=0.0)
