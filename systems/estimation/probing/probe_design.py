@@ -49,7 +49,7 @@ def designed(
         pattern = pattern._replace(size=probe.within_limits(pattern, room, J, length))
         return needs.expected(shown(pattern), rate), pattern
 
-    best = judged(USUAL._replace(size=np.full(NUM_JOINTS, np.inf)))
+    best = judged(USUAL._replace(size=np.full(NUM_JOINTS, np.inf), wider=probe.pattern.wider))
     rng = np.random.default_rng(0)
     for _ in range(_MORE_TRIES if rate < _FEW else _TRIES):
         candidate = judged(_changed(best[1], rng))
@@ -59,7 +59,7 @@ def designed(
 
 
 def _changed(pattern: Pattern, rng: np.random.Generator) -> Pattern:
-    size, periods, phases = (np.array(part) for part in pattern)
+    size, periods, phases = (np.array(part) for part in pattern[:3])
     for axis in rng.choice(NUM_JOINTS, rng.integers(1, 4), replace=False):
         what = rng.integers(3)
         if what == 0:
@@ -69,4 +69,4 @@ def _changed(pattern: Pattern, rng: np.random.Generator) -> Pattern:
         else:
             phases[axis] = _QUARTER * rng.integers(4)
     # As large as limits allow: they make it smaller again.
-    return Pattern(1.3 * size, periods, phases)
+    return pattern._replace(size=1.3 * size, periods=periods, phases=phases)

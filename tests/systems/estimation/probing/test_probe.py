@@ -11,8 +11,9 @@ HOME = np.array([0.9, 0.3, 0.2, 0.5, 0.9, 0.1])
 JACOBIAN = np.vstack([np.zeros((3, 6)), 0.5 * np.ones((3, 6))])
 
 
-def test_rates_are_derivatives_and_both_ends_are_at_rest():
-    probe = Probe(load_robot("irb1200"), ProbeConfig())
+@pytest.mark.parametrize("has_gear_errors", [False, True])
+def test_rates_are_derivatives_and_both_ends_are_at_rest(has_gear_errors):
+    probe = Probe(load_robot("irb1200"), ProbeConfig(), has_gear_errors=has_gear_errors)
     size, h = probe.amplitude(HOME, JACOBIAN, PATH_START), 1e-5
     begin, length = probe.window(PATH_START)
     for time in (0.2, 0.3, 0.5, *np.linspace(begin + 0.1, begin + length - 0.1, 7)):
