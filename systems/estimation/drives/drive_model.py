@@ -150,7 +150,8 @@ class DriveModel:
             P=(SIZE, SIZE),
             correction=(6,),
             smoothed=(6,),
-            hung=(6,),  # rad, by which motors were off when they were slow, fading
+            hung=(2, 6),  # rad, by which motors were off when they were slow, fading, and are if they are
+            wound=(3, 6),  # of what drives wound up meanwhile: integral and error; for how long, s
         )
 
     def start(self, memory: SimpleNamespace) -> None:
@@ -174,7 +175,15 @@ class DriveModel:
 
         """
         filters = memory.started, memory.z, memory.w
-        known = DriveMemory(*filters, memory.beta, memory.led, memory.correction, memory.smoothed)
+        known = DriveMemory(
+            *filters,
+            memory.beta,
+            memory.led,
+            memory.correction,
+            memory.smoothed,
+            memory.hung,
+            memory.wound,
+        )
         out, columns = np.empty((3, 6)), np.empty(COLUMNS)
         limits = _LED_IN, _STEEPEST
         kernels.drives.command(self._drives, *self._held, known, motion, loads, mass, limits, out, columns)

@@ -132,6 +132,8 @@ class DriveMemory(NamedTuple):
     led: np.ndarray  # (2, 55), the same as they are used, which follow those, and their rates
     correction: np.ndarray  # (6,) rad
     smoothed: np.ndarray  # (6,) rad/s, accelerations through 1 / (s + following)
+    hung: np.ndarray  # (2, 6) rad, by which motors were off when they were slow, fading, and are if they are
+    wound: np.ndarray  # (3, 6), integral and error left of what drives wound up; s, that motors hang
 
 
 class Gap(NamedTuple):

@@ -12,6 +12,7 @@ from systems.estimation.kernels.plan import follow
 _SHARP_WIDTH = 0.02  # of the believed width over which friction turns over, where it turns over at once
 _STILL = 0.1  # of that width, below which a motor may hang in its friction
 _FORGOTTEN = 0.1  # s, in which what it was off by then has fallen to a third
+_WINDS = 0.5  # s, longer at rest than that, steps of an encoder may be taken for it
 _DOUBT = 30.0  # times that, by which its following error may be due to it
 _MOST_PERIODS = 1.5  # by which torques are sent ahead or held back
 
@@ -108,7 +109,8 @@ def look_back(drives, planned, correction, filtered, actual, hung, P, beta, vari
         correction: that was commanded beside the plan, rad, (6,).
         filtered: as of `features`.
         actual: positions of the motors, rad, (6,).
-        hung: rad, by which motors were off when they were slow, fading, (6,); is renewed.
+        hung: rad, (2, 6), by which motors were off when they were slow, fading, and are if they are; is
+            renewed.
         P, beta: as of `learn`.
         variance: of the following error of a motor that does not hang.
         most: rad, that may be unexplained if there shall be something to learn.
@@ -121,15 +123,40 @@ def look_back(drives, planned, correction, filtered, actual, hung, P, beta, vari
     features(v, a, filtered, Phi)
     largest, fading = 0.0, math.exp(-drives.period / _FORGOTTEN)
     for i in range(6):
-        hung[i] *= fading
+        hung[0, i] *= fading
+        hung[1, i] = 0.0
         if abs(v[i]) < _STILL * drives.width[i] + 0.5 * drives.period * abs(a[i]):
-            hung[i] = max(hung[i], abs(theta[i] - actual[i]))
-        variances[i] = variance + (_DOUBT * hung[i]) ** 2
+            hung[1, i] = theta[i] - actual[i]
+            hung[0, i] = max(hung[0, i], abs(hung[1, i]))
+        variances[i] = variance + (_DOUBT * hung[0, i]) ** 2
         y[i] = theta[i] - actual[i] + correction[i]
         largest = max(largest, abs(y[i] - _behind(v[i], a[i], filtered, beta, i)) - drives.slack[i])
     if largest <= most:
         learn(P, beta, Phi, y, variances)
     return largest
+
+
+@inner
+def _unwound(drives, v, a, off, sticks, wound, i):
+    """The error that is left of what a drive has wound up while its motor hung, and how fast it changes.
+
+    Args:
+        v, a: planned, of this joint.
+        off: rad, by which it hangs.
+        sticks: the share of its friction that does.
+        wound: integral and error that are left, and for how long it has hung, (3, 6); are renewed.
+        i: which joint.
+    """
+    step, most = drives.step[i], drives.coulomb[i] / drives.ki[i]
+    if abs(v) < _SHARP_WIDTH * drives.width[i] + 0.5 * drives.period * abs(a):
+        wound[2, i] = min(wound[2, i] + drives.period, _WINDS)
+    elif wound[2, i] > 0.0:
+        wound[0, i] += min(max(sticks, 0.0), 1.0) * min(max(off * wound[2, i], -most), most)
+        wound[2, i] = 0.0
+    integral, e = wound[0, i], wound[1, i]
+    wound[0, i] = step[0, 0] * integral + step[0, 1] * e
+    wound[1, i] = step[1, 0] * integral + step[1, 1] * e
+    return e, -(drives.ki[i] * integral + drives.kp[i] * e) / drives.kd[i]
 
 
 @inner
@@ -231,6 +258,8 @@ def command(drives, arm, masses, memory, motion, loads, mass, limits, out, filte
         before = correction if is_first else memory.correction[i]
         correction = before + min(max(correction - before, -most), most)
         memory.correction[i] = correction
-        out[0, i] += correction
-        out[1, i] += (correction - before) / drives.period
+        off, sticks = memory.hung[1, i], led[49 + i]
+        unwound, speed = _unwound(drives, v[i], a[i], off, sticks, memory.wound, i)
+        out[0, i] += correction + unwound
+        out[1, i] += (correction - before) / drives.period + speed
     memory.started[0] = 1.0

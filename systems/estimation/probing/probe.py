@@ -43,12 +43,11 @@ class ProbeConfig:
 
 
 class Pattern(NamedTuple):
-    """Oscillations of the joints under one window, s^3 (1 + k cos^2) with s = sin(pi t / length)."""
+    """Oscillations of the joints under one window, sin^3(pi t / length)."""
 
     size: np.ndarray  # (6,) rad
     periods: np.ndarray  # (6,), in the window
     phases: np.ndarray  # (6,) rad
-    wider: float = 1.5  # k: by how much the window is wider than sin^3; the wider, the more is shown
 
     def at(self, times: np.ndarray, length: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Displacement and its two derivatives at times in s since the window began, (n, 6) each."""
@@ -56,10 +55,7 @@ class Pattern(NamedTuple):
         # Its first two derivatives vanish at both ends: a step of the acceleration would be one of the
         # deflection of the gears.
         s, c = np.sin(0.5 * w * times), np.cos(0.5 * w * times)
-        first = s * s * (3.0 * (1.0 + self.wider) - 5.0 * self.wider * s * s)
-        second = s * (6.0 * (1.0 + self.wider) - 20.0 * self.wider * s * s)
-        window = s**3 * (1.0 + self.wider * c * c)
-        slope, bend = 0.5 * w * c * first, 0.25 * w * w * (c * c * second - s * first)
+        window, slope, bend = s**3, 1.5 * w * s * s * c, 0.75 * w * w * s * (2.0 * c * c - s * s)
         f = w * self.periods
         sine, cosine = np.sin(f * times + self.phases), np.cos(f * times + self.phases)
         return (
@@ -114,8 +110,7 @@ class Probe:
             raise ValueError(f"probe: blind must be a time of at least 0 s, got {config.blind}")
         self._config, self._amplitude = config, amplitude
         self._lower, self._upper, self._speed = robot.lower, robot.upper, robot.speed
-        # The narrower window goes less far away for as long.
-        self.pattern = USUAL._replace(size=amplitude, wider=0.0 if has_gear_errors else USUAL.wider)
+        self.pattern = USUAL._replace(size=amplitude)
 
     def window(self, path_start: float) -> tuple[float, float]:
         """Begin and length in s; a length of zero if there is no time for it or it is not wanted."""

@@ -49,7 +49,7 @@ def designed(
         pattern = pattern._replace(size=probe.within_limits(pattern, room, J, length))
         return needs.expected(shown(pattern), rate), pattern
 
-    best = judged(USUAL._replace(size=np.full(NUM_JOINTS, np.inf), wider=probe.pattern.wider))
+    best = judged(USUAL._replace(size=np.full(NUM_JOINTS, np.inf)))
     rng = np.random.default_rng(0)
     for _ in range(_MORE_TRIES if rate < _FEW else _TRIES):
         candidate = judged(_changed(best[1], rng))

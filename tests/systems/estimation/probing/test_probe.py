@@ -11,9 +11,8 @@ HOME = np.array([0.9, 0.3, 0.2, 0.5, 0.9, 0.1])
 JACOBIAN = np.vstack([np.zeros((3, 6)), 0.5 * np.ones((3, 6))])
 
 
-@pytest.mark.parametrize("has_gear_errors", [False, True])
-def test_rates_are_derivatives_and_both_ends_are_at_rest(has_gear_errors):
-    probe = Probe(load_robot("irb1200"), ProbeConfig(), has_gear_errors=has_gear_errors)
+def test_rates_are_derivatives_and_both_ends_are_at_rest():
+    probe = Probe(load_robot("irb1200"), ProbeConfig())
     size, h = probe.amplitude(HOME, JACOBIAN, PATH_START), 1e-5
     begin, length = probe.window(PATH_START)
     for time in (0.2, 0.3, 0.5, *np.linspace(begin + 0.1, begin + length - 0.1, 7)):
@@ -69,17 +68,12 @@ def test_a_camera_that_looks_less_often_is_shown_more_unless_limits_are_given(pe
     np.testing.assert_allclose(free[1], growth * limited[1])
 
 
-def test_gears_with_errors_are_moved_less_and_for_a_shorter_time():
-    farthest, mean = [], []
-    for has in (False, True):
-        probe = Probe(load_robot("irb1200"), ProbeConfig(), has_gear_errors=has)
-        size = probe.amplitude(HOME, JACOBIAN, PATH_START)
-        times = np.linspace(0.8, PATH_START, 400)  # after the knock
-        ways = np.abs([JACOBIAN[5] @ probe.at(time, PATH_START, size)[0] for time in times])
-        farthest.append(ways.max())
-        mean.append(ways.mean())
-    assert farthest[1] == pytest.approx(0.8 * farthest[0], rel=0.02)
-    assert mean[1] < 0.75 * mean[0]
+def test_gears_with_errors_are_moved_less():
+    usual, less = (
+        Probe(load_robot("irb1200"), ProbeConfig(), has_gear_errors=has).amplitude(HOME, JACOBIAN, PATH_START)
+        for has in (False, True)
+    )
+    np.testing.assert_allclose(less[1], 0.8 * usual[1])
 
 
 @pytest.mark.parametrize(("kind", "path_start"), [("none", 4.0), ("smooth", 1.2)])
