@@ -237,13 +237,17 @@ class DriveModel:
             memory: of the layout.
             is_early: whether motors have only come to their plan: then humps only of joints whose friction
                 moves them by more than they are known to be off, where without a hump other parameters would
-                have to make up for it.
+                have to make up for it. Of a robot with such joints they tell too little of how sharply it
+                turns over.
         """
         P, humps, spread = memory.P, _DIAGONAL[_HUMPS], _HUMP
+        has_much = self._drives.slack > self._config.following_sigma
         if is_early:
-            humps, spread = humps[self._drives.slack > self._config.following_sigma], _EARLY_HUMP
+            humps, spread = humps[has_much], _EARLY_HUMP
         humps = humps[P[humps, humps] == 0.0]
         P[humps, humps] = spread**2
+        if is_early and has_much.any():
+            return
         if not P[_SHARP, _SHARP].any():
             P[_SHARP, _SHARP] = _SHARPER**2 + _SHARPER_ALONE**2 * np.eye(6)
             # Until now they had to make up for friction that turns over sharply.
@@ -263,8 +267,11 @@ class DriveModel:
         extra[HELD] = 5.0 * self._scale * is_told_otherwise
         memory.P[_DIAGONAL, _DIAGONAL] += extra**2
         if is_told_otherwise:
-            # Motors were off their plan by that load, and friction turned over when nobody thought it did.
-            memory.beta[_SHARP] = memory.P[_SHARP] = memory.P[:, _SHARP] = 0.0
+            # Motors were off their plan by that load, and friction turned over when nobody thought it did:
+            # what was learnt of it until now is forgotten.
+            for part, spread in ((_VISCOUS, _VISCOUS_SPREAD), (_COULOMB, _COULOMB_SPREAD), (_SHARP, 0.0)):
+                memory.beta[part] = memory.P[part] = memory.P[:, part] = 0.0
+                memory.P[_DIAGONAL[part], _DIAGONAL[part]] = spread**2
 
 
 _DIAGONAL = np.arange(SIZE)

@@ -380,16 +380,20 @@ def test_friction_that_is_off_by_a_third_is_not_taken_for_another_load(robot):
     assert 3e-4 < left[1] <= 4e-4 + 1e-12
 
 
-def test_how_sharply_friction_turns_over_is_learnt_anew_where_the_load_was_another_one():
+def test_friction_is_learnt_anew_where_the_load_was_another_one():
     """With a load that nobody told motors are off their plan, and turn over at other times than planned."""
     model, memory = drives()
     model.open_low_speeds(memory)
-    memory.beta[49:], memory.P[49:, 0], memory.P[0, 49:] = 0.5, 1e-4, 1e-4
+    friction = np.array([*range(14, 37, 4), *range(15, 37, 4), *range(49, 55)])
+    memory.beta[friction], memory.P[friction, 0], memory.P[0, friction] = 0.5, 1e-4, 1e-4
     model.widen(memory)
-    assert memory.beta[49:].all()
+    assert memory.beta[friction].all()
     model.widen(memory, is_told_otherwise=True)
-    assert not memory.beta[49:].any()
+    assert not memory.beta[friction].any()
     assert not memory.P[49:].any()
+    assert not memory.P[friction, 0].any()
+    started = drives()[1].P
+    np.testing.assert_array_equal(memory.P[friction[:12]], started[friction[:12]])
     model.open_low_speeds(memory)
     assert (np.diag(memory.P)[49:] > 1.0).all()
 
@@ -403,6 +407,7 @@ def test_humps_are_open_early_where_friction_moves_a_joint_most(robot, early):
 
     model.open_low_speeds(memory, is_early=True)
     assert np.flatnonzero(spreads()).tolist() == early
+    assert (memory.P[49, 49] > 0.0) == (not early)  # how sharply it turns over others show early
     known = 0.5 * spreads()
     memory.P[np.arange(16, 37, 4), np.arange(16, 37, 4)] = known
     model.open_low_speeds(memory)
