@@ -35,7 +35,9 @@ _SLOW = 0.05  # rad/s, of Stribeck's effect, exp(-|v| / _SLOW) as Tustin has it;
 # The spreads of how much of Coulomb friction turns over more sharply than believed, in all joints alike and
 # in one beside the others: all have bearings and seals of a kind, and one stop of one shows it
 _SHARPER, _SHARPER_ALONE = 6.0, 0.6
+_DOUBT = 30.0  # times what a motor was off by while it hung: by that its following error may be due to it
 _VISCOUS_SPREAD, _COULOMB_SPREAD = 0.3, 0.5  # of what a robot's file says of friction
+_HIDING = 1e-3  # rad, slack of a joint whose following errors have other reasons at low speeds
 _SLACK = 0.3  # of Coulomb's friction, by which it may be off while little is known of it
 _STEEPEST = 0.5  # rad/s, what learning may add to the speed of a joint
 _RESTS = {"cascade": 1e-5, "velocity": 1e-5, "position": 3e-5}  # rad, where a motor rests beside its command
@@ -132,6 +134,7 @@ class DriveModel:
             model.takes_torque,
             config.following,
         )
+        self._hides_sticking = bool((self._drives.slack > _HIDING).any())
         # The arm as the drives know it, which hold it against gravity.
         drawn = ArmGeometry(robot, np.array([], dtype=int))
         self._held = drawn.constants(np.zeros(NUM_PARAMETERS)), ArmLoads(robot).masses
@@ -218,7 +221,8 @@ class DriveModel:
         Returns:
             The most that was not explained before, beyond what friction may do, in rad.
         """
-        known = memory.hung, memory.P, memory.beta, self._config.following_sigma**2, most
+        doubt = 0.0 if self._hides_sticking else _DOUBT
+        known = memory.hung, memory.P, memory.beta, self._config.following_sigma**2, doubt, most
         return kernels.drives.look_back(self._drives, planned, correction, columns, actual, *known)
 
     def learn(self, memory: SimpleNamespace, Phi: np.ndarray, y: np.ndarray) -> None:
@@ -229,26 +233,23 @@ class DriveModel:
     def open_low_speeds(self, memory: SimpleNamespace, is_early: bool = False) -> None:
         """From now on friction at low speeds may be another one than believed.
 
-        It may have a hump, and it may turn over more sharply. Friction goes by the speed of a motor, and in
-        the model by the planned one. As long as motors are far off their plan, it turns over at other times,
-        and a hump would be what makes up for that.
+        It may have a hump, and it may turn over more sharply; the latter not of a robot whose friction moves
+        motors by milliradians, which hide it. Friction goes by the speed of a motor, and in the model by the
+        planned one. As long as motors are far off their plan, it turns over at other times, and a hump would
+        be what makes up for that.
 
         Args:
             memory: of the layout.
             is_early: whether motors have only come to their plan: then humps only of joints whose friction
                 moves them by more than they are known to be off, where without a hump other parameters would
-                have to make up for it. Of a robot with such joints they tell too little of how sharply it
-                turns over.
+                have to make up for it.
         """
         P, humps, spread = memory.P, _DIAGONAL[_HUMPS], _HUMP
-        has_much = self._drives.slack > self._config.following_sigma
         if is_early:
-            humps, spread = humps[has_much], _EARLY_HUMP
+            humps, spread = humps[self._drives.slack > self._config.following_sigma], _EARLY_HUMP
         humps = humps[P[humps, humps] == 0.0]
         P[humps, humps] = spread**2
-        if is_early and has_much.any():
-            return
-        if not P[_SHARP, _SHARP].any():
+        if not P[_SHARP, _SHARP].any() and not self._hides_sticking:
             P[_SHARP, _SHARP] = _SHARPER**2 + _SHARPER_ALONE**2 * np.eye(6)
             # Until now they had to make up for friction that turns over sharply.
             P[_DIAGONAL[_VISCOUS], _DIAGONAL[_VISCOUS]] += _VISCOUS_SPREAD**2

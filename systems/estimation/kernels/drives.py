@@ -13,7 +13,6 @@ _SHARP_WIDTH = 0.02  # of the believed width over which friction turns over, whe
 _STILL = 0.1  # of that width, below which a motor may hang in its friction
 _FORGOTTEN = 0.1  # s, in which what it was off by then has fallen to a third
 _WINDS = 0.5  # s, longer at rest than that, steps of an encoder may be taken for it
-_DOUBT = 30.0  # times that, by which its following error may be due to it
 _MOST_PERIODS = 1.5  # by which torques are sent ahead or held back
 
 
@@ -100,7 +99,7 @@ def learn(P, beta, Phi, y, variances):
 
 
 @compiled
-def look_back(drives, planned, correction, filtered, actual, hung, P, beta, variance, most):
+def look_back(drives, planned, correction, filtered, actual, hung, P, beta, variance, doubt, most):
     """Learns from one planned instant that has passed; see `DriveModel.look_back`.
 
     Args:
@@ -113,6 +112,7 @@ def look_back(drives, planned, correction, filtered, actual, hung, P, beta, vari
             renewed.
         P, beta: as of `learn`.
         variance: of the following error of a motor that does not hang.
+        doubt: times what a motor hung by, by which its following error may be due to that.
         most: rad, that may be unexplained if there shall be something to learn.
 
     Returns:
@@ -128,7 +128,7 @@ def look_back(drives, planned, correction, filtered, actual, hung, P, beta, vari
         if abs(v[i]) < _STILL * drives.width[i] + 0.5 * drives.period * abs(a[i]):
             hung[1, i] = theta[i] - actual[i]
             hung[0, i] = max(hung[0, i], abs(hung[1, i]))
-        variances[i] = variance + (_DOUBT * hung[0, i]) ** 2
+        variances[i] = variance + (doubt * hung[0, i]) ** 2
         y[i] = theta[i] - actual[i] + correction[i]
         largest = max(largest, abs(y[i] - _behind(v[i], a[i], filtered, beta, i)) - drives.slack[i])
     if largest <= most:

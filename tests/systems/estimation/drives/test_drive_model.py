@@ -407,7 +407,7 @@ def test_humps_are_open_early_where_friction_moves_a_joint_most(robot, early):
 
     model.open_low_speeds(memory, is_early=True)
     assert np.flatnonzero(spreads()).tolist() == early
-    assert (memory.P[49, 49] > 0.0) == (not early)  # how sharply it turns over others show early
+    assert (memory.P[49, 49] > 0.0) == (not early)  # how sharply it turns over, such joints hide
     known = 0.5 * spreads()
     memory.P[np.arange(16, 37, 4), np.arange(16, 37, 4)] = known
     model.open_low_speeds(memory)
