@@ -153,9 +153,7 @@ def test_what_a_step_of_the_physics_changes_is_microns_and_in_proportion_to_it(m
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(
-    ("robot", "planner"), [("irb1200", 0.0), ("irb1200", 20.0), ("ur10", 0.0), ("crx10ial", 0.0)]
-)
+@pytest.mark.parametrize(("robot", "planner"), [("irb1200", 0.0), ("irb1200", 20.0), ("ur10", 0.0)])
 def test_the_true_tip_is_on_its_path_from_the_first_lap_on_physics_that_are_not_ours(
     robot: str, planner: float
 ):

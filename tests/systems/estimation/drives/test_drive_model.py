@@ -18,23 +18,7 @@ from systems.estimation.drives.drive_model import (
     DriveModelConfig,
 )
 from systems.link.abb.motion import EgmMotion, EgmMotionConfig
-
-PERIOD = 4e-3
-LOADS = np.zeros((5, 18))
-
-
-def motion(time: float | np.ndarray):
-    """Position, velocity and acceleration of six joints."""
-    w, u = 2.0 + 0.4 * np.arange(6), 1.0 + np.arange(6)
-    return 0.3 * np.sin(w * time + u), 0.3 * w * np.cos(w * time + u), -0.3 * w**2 * np.sin(w * time + u)
-
-
-def drives(takes_torque=True, robot="irb1200", **config):
-    belief = ControllerModel(load_robot(robot), 7.0, PERIOD, takes_torque=takes_torque)
-    model = DriveModel(belief, DriveModelConfig(**config))
-    memory = model.layout.view(np.zeros(model.layout.size))
-    model.start(memory)
-    return model, memory
+from tests.systems.estimation.drives.motors import LOADS, PERIOD, drives, motion
 
 
 def run(model, memory, duration: float, beta: np.ndarray):
@@ -272,96 +256,6 @@ def test_friction_that_is_larger_at_low_speeds_is_made_up_for(velocity):
             model.open_low_speeds(memory)
     # Two shapes of a hump differ by up to a fifth of it.
     assert left[-500:].std() < 0.3 * behind[-500:].std()
-
-
-def test_friction_that_sticks_is_learnt_once_it_may_turn_over_more_sharply():
-    """Coulomb's own friction jumps where the speed changes its sign; the file of the robot has a width."""
-    model, memory = drives()
-    times = PERIOD * np.arange(3000)
-    v = 0.05 * motion(times[:, None])[1]
-    width = model._drives.width
-    sharper = model._drives.coulomb * (np.sign(v) - np.tanh(v / width))
-    gains = zip(model._drives.kd, model._drives.kp, model._drives.ki, strict=True)
-    behind = np.transpose(
-        [lsim(([1.0, 0.0], gain), torque, times)[1] for gain, torque in zip(gains, sharper.T, strict=True)]
-    )
-    left = np.empty_like(behind)
-    model.open_low_speeds(memory)
-    for k, time in enumerate(times):
-        theta, rate, a = (0.05 * each for each in motion(time))
-        columns = model.command(memory, (theta, rate, a), LOADS, 7.0).columns
-        left[k] = behind[k] - memory.correction
-        model.learn(memory, model.features(rate, a, columns), behind[k])
-    # A jump and a fifth of the width differ by a fifth, and each takes a time constant of the drive to pass.
-    assert left[-1000:].std() < 0.35 * behind[-1000:].std()
-    # Of the wrist; friction moves the heavy axes too little for all of it to be seen.
-    np.testing.assert_allclose(memory.beta[52:], 1.0, atol=0.2)
-
-
-def test_that_friction_sticks_one_joint_shows_for_all():
-    """All have bearings and seals of a kind: what has been seen of one is expected of the others."""
-    model, memory = drives()
-    model.open_low_speeds(memory)
-    for k in range(1000):
-        theta, v, a = (0.05 * each for each in motion(PERIOD * k))
-        columns = model.command(memory, (theta, v, a), LOADS, 7.0).columns
-        Phi = model.features(v, a, columns)
-        Phi[np.arange(6) != 4] = 0.0
-        model.learn(memory, Phi, Phi[:, 53])
-    np.testing.assert_allclose(memory.beta[53], 1.0, atol=0.1)
-    np.testing.assert_allclose(memory.beta[49:], memory.beta[53], atol=0.1)
-
-
-def moved_with_sticking_friction(model, memory, is_hanging_known: bool = True) -> np.ndarray:
-    """Eight motions with rests between: how far motors were off as each began, at most, in rad, (8, 6).
-
-    At rest friction is whatever keeps a motor there: it hangs until its drive pulls more than that. The
-    motors, without inertia: k_d (v_command - v) + k_p e + k_i int e dt and the torque that was sent for
-    friction are the friction that there is.
-    """
-    coulomb, width, kp, ki, kd = (
-        getattr(model._drives, name) for name in ("coulomb", "width", "kp", "ki", "kd")
-    )
-    theta = command = begin = sum_of_e = np.zeros(6)
-    farthest = np.zeros((8, 6))
-    for k, way in enumerate((0.1, 0.1, -0.1, 0.1, -0.1, -0.1, 0.1, 0.1)):  # rad within a second, and a rest
-        for time in np.arange(0.0, 1.4, PERIOD):
-            s, w = min(time, 1.0), 2.0 * np.pi
-            turn, v, a = way * np.outer(
-                [s - np.sin(w * s) / w, 1.0 - np.cos(w * s), w * np.sin(w * s)], np.ones(6)
-            )
-            memory.hung[1] *= is_hanging_known
-            issued = model.command(memory, (begin + turn, v, a), LOADS, 7.0)
-            before, command = command, issued.position
-            for part in 0.1 * np.arange(1, 11):
-                e = before + part * (command - before) - theta
-                pull = (
-                    kd * (command - before) / PERIOD + kp * e + ki * sum_of_e + coulomb * np.tanh(v / width)
-                )
-                theta = theta + 0.1 * PERIOD * np.sign(pull) * np.maximum(np.abs(pull) - coulomb, 0.0) / kd
-                sum_of_e = sum_of_e + 0.1 * PERIOD * e
-            if time < 0.3:
-                farthest[k] = np.maximum(farthest[k], np.abs(begin + turn - theta))
-            model.look_back(memory, (begin + turn, v, a), issued.columns, memory.correction.copy(), theta)
-        begin = begin + way
-    return farthest
-
-
-def test_what_motors_that_hung_do_after_a_rest_does_not_hide_that_they_stick():
-    model, memory = drives()
-    model.open_low_speeds(memory)
-    moved_with_sticking_friction(model, memory)
-    # Were what they do after a rest believed as all else is, it would be 0.1 to 0.2.
-    assert (memory.beta[49:] > 0.6).all()
-
-
-def test_motors_that_hung_do_not_start_with_what_their_drives_wound_up_meanwhile():
-    farthest = []
-    for is_known in (True, False):
-        model, memory = drives()
-        model.open_low_speeds(memory)
-        farthest.append(moved_with_sticking_friction(model, memory, is_known)[-3:, 3:])
-    assert (farthest[0] < 0.6 * farthest[1]).all()  # of the wrist, which friction moves most
 
 
 @pytest.mark.parametrize("robot", ["kr16", "kr16-realistic"])
