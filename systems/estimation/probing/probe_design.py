@@ -59,7 +59,7 @@ def designed(
 
 
 def _changed(pattern: Pattern, rng: np.random.Generator) -> Pattern:
-    size, periods, phases = (np.array(part) for part in pattern[:3])
+    size, periods, phases = (np.array(part) for part in pattern)
     for axis in rng.choice(NUM_JOINTS, rng.integers(1, 4), replace=False):
         what = rng.integers(3)
         if what == 0:
@@ -69,4 +69,4 @@ def _changed(pattern: Pattern, rng: np.random.Generator) -> Pattern:
         else:
             phases[axis] = _QUARTER * rng.integers(4)
     # As large as limits allow: they make it smaller again.
-    return pattern._replace(size=1.3 * size, periods=periods, phases=phases)
+    return Pattern(1.3 * size, periods, phases)
