@@ -6,11 +6,11 @@ import numpy as np
 
 from diagrams.scenario.scenario import StationConfig
 from robots.description.model import NUM_JOINTS, RobotModel
-from robots.description.variation import Factors, varied
+from robots.description.variation import Factors, varied, with_backlash
 
 
 def true_robot(nominal: RobotModel, config: StationConfig) -> RobotModel:
-    """The nominal robot with the station's springs, friction and centre of the payload.
+    """The nominal robot with the station's springs, friction, backlash and centre of the payload.
 
     Random factors are uniform within plus and minus the shares of ``config.variation``; each kind stays the
     same whatever the shares of the others are.
@@ -18,8 +18,8 @@ def true_robot(nominal: RobotModel, config: StationConfig) -> RobotModel:
     Raises:
         ValueError: if a share is not in [0, 1) or the centre of the payload is not three numbers.
     """
-    robot = with_payload_centre(nominal, config.payload_centre_mm)
     variation = config.variation
+    robot = with_payload_centre(with_backlash(nominal, variation.backlash), config.payload_centre_mm)
     shares = (variation.stiffness, variation.friction)
     if not all(0.0 <= share < 1.0 for share in shares):
         raise ValueError(f"station.variation: shares must be in [0, 1), got {shares}")

@@ -35,11 +35,12 @@ __all__ = ["Scenario", "ScenarioError", "load_scenario", "scenario_text", "shipp
 
 @dataclass
 class Variation:
-    """By how much springs and friction of the true robot are off its drawing: drawn within +- the shares."""
+    """By how much the true robot is off its file: springs and friction drawn within +- the shares."""
 
     stiffness: float = quantity(0.0, 0.0, 0.9)  # of each gear, bearing and beam
     friction: float = quantity(0.0, 0.0, 0.9)  # viscous and Coulomb, of each joint
     seed: int = quantity(0, 0, 2**32 - 1)  # of the random draw
+    backlash: float = quantity(1.0, 0.0, 20.0)  # by what the gaps between teeth are multiplied
 
 
 @dataclass

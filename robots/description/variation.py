@@ -1,10 +1,11 @@
-"""A robot whose springs and friction are by known factors others than those in its file."""
+"""A robot whose springs, friction and backlash are by known factors others than those in its file."""
 
 from dataclasses import dataclass, field, replace
 
 import numpy as np
 
 from robots.description.beam import Beam
+from robots.description.drive_parts import Backlash
 from robots.description.model import NUM_JOINTS, DriveTrain, Joint, RobotModel, Tilting
 
 
@@ -40,6 +41,19 @@ def varied(robot: RobotModel, factors: Factors) -> RobotModel:
         for link, factor in zip(robot.links, factors.beams, strict=True)
     ]
     return replace(robot, joints=joints, links=links)
+
+
+def with_backlash(robot: RobotModel, factor: float) -> RobotModel:
+    """A robot whose gaps between teeth are multiplied by a factor; what damps within them is the same."""
+
+    def with_gap(train: DriveTrain) -> DriveTrain:
+        play = train.backlash
+        if not isinstance(play, Backlash):
+            return train
+        return replace(train, backlash=replace(play, arc_minutes=factor * play.arc_minutes))
+
+    joints = [replace(joint, drive_train=with_gap(joint.drive_train)) for joint in robot.joints]
+    return replace(robot, joints=joints)
 
 
 def _varied_joint(joint: Joint, gear: float, bearing: np.ndarray, friction: float) -> Joint:

@@ -22,6 +22,7 @@ from robots.description.drive_parts import (
 )
 from robots.description.model import RobotFileError, RobotModel, load_robot
 from robots.description.robot_file import robot_text
+from robots.description.variation import with_backlash
 
 FRICTIONS = (
     Sigmoid(5.0, 2.0, 200.0),
@@ -130,3 +131,13 @@ def test_a_realistic_robot_is_the_base_with_softer_springs_and_every_part_assume
         assert parts.gap == pytest.approx(1.454e-4, rel=1e-3)  # 0.5'
         assert train.motor_lag == 3e-3
         assert parts.hysteresis.stiffness == (0.1 * train.stiffness,)
+
+
+def test_other_gaps_leave_all_else_as_it_is():
+    drawn = load_robot("irb1200-realistic")
+    parts = [joint.drive_train.backlash for joint in with_backlash(drawn, 0.2).joints]
+    assert parts == [
+        Backlash(0.1, cast(Backlash, joint.drive_train.backlash).lubricant) for joint in drawn.joints
+    ]
+    assert robot_text(with_backlash(drawn, 1.0)) == robot_text(drawn)
+    assert robot_text(with_backlash(load_robot("irb1200"), 0.2)) == robot_text(load_robot("irb1200"))
