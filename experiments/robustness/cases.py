@@ -51,9 +51,10 @@ CASES = {
             ),
             recovered_at=_AT + 1.5,
         ),
-        # All of its 7 kg: told to nobody, and to the robot's controller alone
+        # All of its 7 kg: told to nobody, to the robot's controller alone, and to truetip alone
         Case("load-not-told", ("station.drive.payload=0", "servo.model.payload=0")),
         Case("load-told-robot-only", ("servo.model.payload=0",)),
+        Case("load-not-told-robot", ("station.drive.payload=0",)),
         Case(
             "camera-moved",
             (_event(f"!CameraShift {{at: {_AT}, shift_mm: [0.3, 0, 0]}}"),),

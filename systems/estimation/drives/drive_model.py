@@ -23,11 +23,11 @@ from systems.estimation.memory import Layout
 # the load of a kilogram, and of a kg m of its first moment along x, y, z; a kilogram that is not held; what
 # friction is more than believed where it turns over sharply.
 _FILTERED = 11
-COLUMNS = 6 * (_FILTERED + 1)  # of all but the first, of a planner, and of what is late beside the plan
+COLUMNS = 6 * (_FILTERED + 2)  # of each of them, of a planner, and of what is late beside the plan
 _VISCOUS, _COULOMB, _HUMPS, _CONSTANTS = slice(14, 37, 4), slice(15, 37, 4), slice(16, 37, 4), slice(37, 43)
-DEAD_TIME, MASS, MOMENT, HELD, SMOOTHED = 0, 43, slice(44, 47), 47, 48
-_SHARP = slice(SMOOTHED + 1, SMOOTHED + 7)
-SIZE = SMOOTHED + 7
+DEAD_TIME, MASS, MOMENT, SMOOTHED = 0, 43, slice(44, 47), 47
+SHARP, NOT_HELD, GIVING = slice(48, 54), slice(54, 60), slice(60, 66)
+SIZE = 66
 # Of Coulomb's friction, the spread of what there may be more of it; less where it is learnt early, or the
 # first lap of robots without a hump is twisted more
 _HUMP, _EARLY_HUMP = 0.3, 0.1
@@ -35,6 +35,10 @@ _SLOW = 0.05  # rad/s, of Stribeck's effect, exp(-|v| / _SLOW) as Tustin has it;
 # The spreads of how much of Coulomb friction turns over more sharply than believed, in all joints alike and
 # in one beside the others: all have bearings and seals of a kind, and one stop of one shows it
 _SHARPER, _SHARPER_ALONE = 6.0, 0.6
+# kg that the robot's controller may not hold, or hold too much, of a robot that carries 7 kg: of all joints
+# alike, and of one beside the others, as it may have other gains for the load that it was told
+_UNTOLD, _UNTOLD_ALONE = 5.0, 3.0
+_GIVES = 1.0  # share by which drives without torques may give way more or less for that reason
 _DOUBT = 30.0  # times what a motor was off by while it hung: by that its following error may be due to it
 _VISCOUS_SPREAD, _COULOMB_SPREAD = 0.3, 0.5  # of what a robot's file says of friction
 _HIDING = 1e-3  # rad, slack of a joint whose following errors have other reasons at low speeds
@@ -79,7 +83,7 @@ class DriveCommand(NamedTuple):
     position: np.ndarray  # (6,) rad
     velocity: np.ndarray  # (6,) rad/s
     torque: np.ndarray  # (6,) N m, joint side, on top of what the drives do for gravity
-    columns: np.ndarray  # (72,), what `DriveModel.features` needs of this instant
+    columns: np.ndarray  # (78,), what `DriveModel.features` needs of this instant
 
 
 class DriveModel:
@@ -94,7 +98,8 @@ class DriveModel:
     both turn over with the motion. Mass and moment in it make up for all that loads are wrong by. They are
     not those of the payload, and nobody else may take them for that. What load the robot's controller was
     told, and holds against gravity, may be another one than the robot carries and than anybody believes: a
-    kilogram that is not held is a column of its own, from when the load turns out not to be as believed.
+    kilogram that is not held is a column of its own, of each joint, as the gains of drives follow that load.
+    For the same reason they may give way more or less to all that a motion needs, where no torque is sent.
 
     Where drives take torques, these are sent ahead by the dead time that was learnt, as positions are; of
     Coulomb friction, which turns over in an instant, its mean over the period that they will last. Where they
@@ -141,9 +146,10 @@ class DriveModel:
         spread = [config.dead_time_sigma, *[config.lag_sigma] * 6, *[1e-4] * 6]
         self._scale, self._moment = model.load_scale, config.moment_sigma * model.load_scale
         spread += [0.3, _VISCOUS_SPREAD, _COULOMB_SPREAD, 0.0] * 6 + [_RESTS[kind]] * 6
-        spread += [config.payload_sigma * self._scale] + [self._moment] * 3 + [0.0, config.smoothing_sigma]
-        spread += [0.0] * 6
+        spread += [config.payload_sigma * self._scale] + [self._moment] * 3 + [config.smoothing_sigma]
+        spread += [0.0] * 12 + [0.0 if model.takes_torque else _GIVES] * 6
         self._prior = np.diag(np.array(spread) ** 2)
+        self._prior[NOT_HELD, NOT_HELD] = self._scale**2 * (_UNTOLD**2 + _UNTOLD_ALONE**2 * np.eye(6))
         self.layout = Layout(
             started=(1,),
             z=(_FILTERED, 6, 2),  # integral of e, and e
@@ -194,7 +200,7 @@ class DriveModel:
         return DriveCommand(position, velocity, torque, columns)
 
     def features(self, v: np.ndarray, a: np.ndarray, columns: np.ndarray) -> np.ndarray:
-        """Rows of the regression, shape (6, 55), from motion and the filtered torques (72,)."""
+        """Rows of the regression, shape (6, 66), from motion and the filtered torques (78,)."""
         Phi = np.zeros((6, SIZE))
         kernels.drives.features(v, a, columns, Phi)
         return Phi
@@ -213,7 +219,7 @@ class DriveModel:
         Args:
             memory: of the layout.
             planned: position, velocity and acceleration, (6,) each.
-            columns, correction: of the command of that instant, (72,) and (6,) in rad.
+            columns, correction: of the command of that instant, (78,) and (6,) in rad.
             actual: where the motors were, rad, (6,).
             most: nothing is learnt if more than this is not explained yet, rad; of a joint with much friction
                 for the stiffness of its drive that much more.
@@ -249,8 +255,8 @@ class DriveModel:
             humps, spread = humps[self._drives.slack > self._config.following_sigma], _EARLY_HUMP
         humps = humps[P[humps, humps] == 0.0]
         P[humps, humps] = spread**2
-        if not P[_SHARP, _SHARP].any() and not self._hides_sticking:
-            P[_SHARP, _SHARP] = _SHARPER**2 + _SHARPER_ALONE**2 * np.eye(6)
+        if not P[SHARP, SHARP].any() and not self._hides_sticking:
+            P[SHARP, SHARP] = _SHARPER**2 + _SHARPER_ALONE**2 * np.eye(6)
             # Until now they had to make up for friction that turns over sharply.
             P[_DIAGONAL[_VISCOUS], _DIAGONAL[_VISCOUS]] += _VISCOUS_SPREAD**2
             P[_DIAGONAL[_COULOMB], _DIAGONAL[_COULOMB]] += _COULOMB_SPREAD**2
@@ -262,17 +268,17 @@ class DriveModel:
             memory: of the layout.
             is_told_otherwise: whether the load that the drives hold may not be as believed either.
         """
+        P, beta = memory.P, memory.beta
+        if is_told_otherwise:
+            # Motors were off their plan by that load, which stood in for gains, and friction turned over when
+            # nobody thought it did: but for the dead time all that was learnt until now is forgotten.
+            late, variance = beta[DEAD_TIME], P[DEAD_TIME, DEAD_TIME]
+            beta[:], P[:] = 0.0, self._prior
+            beta[DEAD_TIME], P[DEAD_TIME, DEAD_TIME] = late, variance
         extra = np.zeros(SIZE)
         extra[_CONSTANTS], extra[MASS], extra[DEAD_TIME] = 3e-5, 5.0 * self._scale, 1e-3
         extra[MOMENT] = 5.0 * self._moment  # of 7 kg that are gripped 50 mm away
-        extra[HELD] = 5.0 * self._scale * is_told_otherwise
-        memory.P[_DIAGONAL, _DIAGONAL] += extra**2
-        if is_told_otherwise:
-            # Motors were off their plan by that load, and friction turned over when nobody thought it did:
-            # what was learnt of it until now is forgotten.
-            for part, spread in ((_VISCOUS, _VISCOUS_SPREAD), (_COULOMB, _COULOMB_SPREAD), (_SHARP, 0.0)):
-                memory.beta[part] = memory.P[part] = memory.P[:, part] = 0.0
-                memory.P[_DIAGONAL[part], _DIAGONAL[part]] = spread**2
+        P[_DIAGONAL, _DIAGONAL] += extra**2
 
 
 _DIAGONAL = np.arange(SIZE)

@@ -128,8 +128,8 @@ class DriveMemory(NamedTuple):
     started: np.ndarray  # (1,)
     z: np.ndarray  # (10, 6, 2), integral of a following error, and the error, of each of ten torques
     w: np.ndarray  # (10, 6), those torques; if torques are taken, of the first what changes evenly
-    beta: np.ndarray  # (55,), parameters of the regression
-    led: np.ndarray  # (2, 55), the same as they are used, which follow those, and their rates
+    beta: np.ndarray  # (66,), parameters of the regression
+    led: np.ndarray  # (2, 66), the same as they are used, which follow those, and their rates
     correction: np.ndarray  # (6,) rad
     smoothed: np.ndarray  # (6,) rad/s, accelerations through 1 / (s + following)
     hung: np.ndarray  # (2, 6) rad, by which motors were off when they were slow, fading, and are if they are

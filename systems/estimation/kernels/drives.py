@@ -18,16 +18,19 @@ _MOST_PERIODS = 1.5  # by which torques are sent ahead or held back
 
 @compiled
 def features(v, a, filtered, Phi):
-    """Rows of the regression, (6, 55), which are zero before; see `DriveModel.features`."""
+    """Rows of the regression, (6, 66), which are zero before; see `DriveModel.features`."""
     for i in range(6):
         Phi[i, 0] = Phi[i, 1 + i] = v[i] + filtered[60 + i]
         Phi[i, 7 + i] = 1e-2 * a[i]
         for k in range(4):
             Phi[i, 13 + 4 * i + k] = filtered[6 * k + i]
         Phi[i, 37 + i] = 1.0
-        for k in range(6):
-            Phi[i, 43 + k] = filtered[6 * (4 + k) + i]
-        Phi[i, 49 + i] = filtered[66 + i]
+        for k in range(4):
+            Phi[i, 43 + k] = filtered[24 + 6 * k + i]
+        Phi[i, 47] = filtered[54 + i]
+        Phi[i, 48 + i] = filtered[66 + i]
+        Phi[i, 54 + i] = filtered[48 + i]
+        Phi[i, 60 + i] = filtered[72 + i]
 
 
 @inner
@@ -37,9 +40,10 @@ def _behind(v, a, filtered, beta, i):
     total = rate * beta[0] + rate * beta[1 + i] + 1e-2 * a * beta[7 + i]
     for k in range(4):
         total += filtered[6 * k + i] * beta[13 + 4 * i + k]
-    for k in range(6):
-        total += filtered[6 * (4 + k) + i] * beta[43 + k]
-    return total + beta[37 + i] + filtered[66 + i] * beta[49 + i]
+    for k in range(4):
+        total += filtered[24 + 6 * k + i] * beta[43 + k]
+    total += filtered[54 + i] * beta[47] + filtered[66 + i] * beta[48 + i]
+    return total + beta[37 + i] + filtered[48 + i] * beta[54 + i] + filtered[72 + i] * beta[60 + i]
 
 
 @compiled
@@ -196,10 +200,11 @@ def command(drives, arm, masses, memory, motion, loads, mass, limits, out, filte
         mass: of the payload, kg.
         limits: the frequency in rad/s with which commands follow what was learnt, and what the correction
             may add to the speed of a joint in rad/s.
-        out: (3, 6), position, velocity and torque; filtered: (72,), what `features` takes, of rotor, viscous
+        out: (3, 6), position, velocity and torque; filtered: (78,), what `features` takes, of rotor, viscous
             and Coulomb friction and its hump, of a kilogram and of a kg m along each axis, of a kilogram
             that is not held; the accelerations that a planner smooths, how fast the command runs away from
-            the plan in rad/s, and of what friction turns over more sharply; are written.
+            the plan in rad/s, of what friction turns over more sharply, and of all that the motion needs
+            and is not given as a torque; are written.
     """
     theta, v, a = motion
     X_WE, frames, w = np.empty((4, 4)), np.empty((7, 4, 4)), np.empty(11)
@@ -250,6 +255,7 @@ def command(drives, arm, masses, memory, motion, loads, mass, limits, out, filte
         for k in range(1, 10):
             last[k], filtered[6 * (k - 1) + i] = w[k], z[k, 1]
         last[10], filtered[66 + i] = w[10], z[10, 1]
+        filtered[72 + i] = z[0, 1]
         if not drives.takes_torque:
             settled = a[i] / drives.following
             memory.smoothed[i] = settled + fading * (memory.smoothed[i] - settled)
@@ -258,7 +264,7 @@ def command(drives, arm, masses, memory, motion, loads, mass, limits, out, filte
         before = correction if is_first else memory.correction[i]
         correction = before + min(max(correction - before, -most), most)
         memory.correction[i] = correction
-        off, sticks = memory.hung[1, i], led[49 + i]
+        off, sticks = memory.hung[1, i], led[48 + i]
         unwound, speed = _unwound(drives, v[i], a[i], off, sticks, memory.wound, i)
         out[0, i] += correction + unwound
         out[1, i] += (correction - before) / drives.period + speed

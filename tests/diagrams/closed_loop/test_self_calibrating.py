@@ -268,6 +268,19 @@ def test_a_load_that_neither_robot_nor_law_was_told_is_made_up_for_and_named():
 
 
 @pytest.mark.slow
+@pytest.mark.parametrize(("interface", "allowed"), [("direct", 0.05e-3), ("egm", 0.1e-3)])
+def test_a_load_of_which_the_robot_alone_was_not_told_is_made_up_for(interface, allowed):
+    """What users forget: truetip and the camera know of the load, the robot's own controller does not."""
+    drawn = [f"{name}=4001" for name in ("seed", "station.errors.random.seed", "station.variation.seed")]
+    untold = ["station.drive.payload=0", f"station.interface={interface}"]
+    log = run(load_scenario("everything", [*untold, *drawn]), "self_calibrating")
+    on_path, at_rest = tip_errors(log)
+    assert on_path.max() < allowed  # 0.6 mm and more if drives are believed to hold what the law was told
+    assert at_rest.max() < 0.005e-3
+    assert not any(log.guard_counts.values())
+
+
+@pytest.mark.slow
 def test_a_dead_time_that_changes_on_the_path_is_learnt_while_the_tip_stays_on_its_track():
     only = "servo.laws.self_calibrating.known_on_path=1"  # nothing else makes it slower
     settings = ["station.events=[!DeadTimeChange {at: 6, dead_time: 0.033}]", "seed=1001", only]

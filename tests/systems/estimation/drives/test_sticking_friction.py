@@ -3,6 +3,7 @@
 import numpy as np
 from scipy.signal import lsim
 
+from systems.estimation.drives.drive_model import SHARP
 from tests.systems.estimation.drives.motors import LOADS, PERIOD, drives, motion
 
 
@@ -27,7 +28,7 @@ def test_friction_that_sticks_is_learnt_once_it_may_turn_over_more_sharply():
     # A jump and a fifth of the width differ by a fifth, and each takes a time constant of the drive to pass.
     assert left[-1000:].std() < 0.35 * behind[-1000:].std()
     # Of the wrist; friction moves the heavy axes too little for all of it to be seen.
-    np.testing.assert_allclose(memory.beta[52:], 1.0, atol=0.2)
+    np.testing.assert_allclose(memory.beta[SHARP][3:], 1.0, atol=0.2)
 
 
 def test_that_friction_sticks_one_joint_shows_for_all():
@@ -39,9 +40,9 @@ def test_that_friction_sticks_one_joint_shows_for_all():
         columns = model.command(memory, (theta, v, a), LOADS, 7.0).columns
         Phi = model.features(v, a, columns)
         Phi[np.arange(6) != 4] = 0.0
-        model.learn(memory, Phi, Phi[:, 53])
-    np.testing.assert_allclose(memory.beta[53], 1.0, atol=0.1)
-    np.testing.assert_allclose(memory.beta[49:], memory.beta[53], atol=0.1)
+        model.learn(memory, Phi, Phi[:, SHARP][:, 4])
+    np.testing.assert_allclose(memory.beta[SHARP][4], 1.0, atol=0.1)
+    np.testing.assert_allclose(memory.beta[SHARP], memory.beta[SHARP][4], atol=0.1)
 
 
 def moved_with_sticking_friction(model, memory, is_hanging_known: bool = True) -> np.ndarray:
@@ -84,7 +85,7 @@ def test_what_motors_that_hung_do_after_a_rest_does_not_hide_that_they_stick():
     model.open_low_speeds(memory)
     moved_with_sticking_friction(model, memory)
     # Were what they do after a rest believed as all else is, it would be 0.1 to 0.2.
-    assert (memory.beta[49:] > 0.6).all()
+    assert (memory.beta[SHARP] > 0.6).all()
 
 
 def test_motors_that_hung_do_not_start_with_what_their_drives_wound_up_meanwhile():
