@@ -97,10 +97,23 @@ class Suppositions:
         if memory.load[0] and memory.settled[0] >= _SETTLED:
             held = model.prior[model.M, model.M]
             x, covariance = _if_free(P, b, model.M, held - self._any_load)
-            if x @ np.linalg.solve(covariance + np.linalg.inv(held), x) > _LOAD_CHI_SQUARED:
+            is_unlike = x @ np.linalg.solve(covariance + np.linalg.inv(held), x) > _LOAD_CHI_SQUARED
+            if is_unlike and self._may_be_carried(x[0], math.sqrt(covariance[0, 0])):
                 memory.load[0] = 0.0
                 return Event(LOAD_UNLIKE_BELIEF, float(x[0] * model.sigma[model.M][0]), 0.0)
         return None
+
+    def _may_be_carried(self, more: float, sigma: float) -> bool:
+        """Whether robots carry so much more than believed, in units of the spread.
+
+        What gears with play do beyond all models looks like a load, too: of a KR 16, twice what it can carry.
+        """
+        model = self._model
+        of_belief, spread = model.mean[model.M][0], model.sigma[model.M][0]
+        return (
+            of_belief + spread * (more + sigma) >= 0.0
+            and of_belief + spread * (more - sigma) <= model.most_carried
+        )
 
 
 def _if_free(P: np.ndarray, b: np.ndarray, of: slice, held: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -24,6 +24,7 @@ _BASE = 0  # the body whose placement in the world it is
 _SHIFT, _ANGLE = 0.15, 0.4  # m and rad, by which a frame may be elsewhere
 _SOFTEST = 8.0  # times the compliance that is believed
 _HEAVIEST = 21.0  # kg, of a robot that carries 7 kg; at most half a metre from its flange
+_CARRIED = 8.75  # kg, the most that is put on such a robot
 _LATEST, _FASTEST = 1.0, 1e-2  # s and s/s, by which the camera's clock may be off
 _LARGEST_ERROR = 5e-3  # rad, of a gear
 _STAYS = 0.02  # of the spread, by which what was measured of a robot may have changed since
@@ -119,6 +120,7 @@ class TipModel:
         self.sigma[g + 18] = spread.payload * model.load_scale
         self.sigma[g + 19 : g + 22] = spread.payload_centre * max(model.payload, 0.1)
         self.changed_load = model.load_scale * _CHANGED_LOAD / self.sigma[self.M]  # in units of the spreads
+        self.most_carried = max(_CARRIED * model.load_scale, self.mean[g + 18])  # kg
         self.sigma[self.C], self.sigma[self.D] = spread.clock, spread.clock_drift
         if self.has_gear_errors:
             shares = np.ones((NUM_SHAPES, NUM_JOINTS))

@@ -28,7 +28,7 @@ def samples_of(x: np.ndarray, rows: int, seed: int = 0) -> tuple[np.ndarray, np.
     return H.T @ H, H.T @ (H @ x)
 
 
-@pytest.mark.parametrize(("drift", "load"), [(0.0, 0.0), (500e-6, 0.0), (0.0, 6.0)])
+@pytest.mark.parametrize(("drift", "load"), [(0.0, 0.0), (500e-6, 0.0), (0.0, -6.0)])
 def test_what_is_given_up_is_what_is_wrong_and_the_estimate_is_as_if_it_had_never_been_supposed(drift, load):
     suppositions, memory = supposed()
     x = np.zeros(MODEL.size)
@@ -53,10 +53,21 @@ def test_what_is_given_up_is_what_is_wrong_and_the_estimate_is_as_if_it_had_neve
 def test_the_load_is_not_given_up_by_samples_that_were_linearised_far_off(settled):
     suppositions, memory = supposed()
     x = np.zeros(MODEL.size)
-    x[MODEL.M.start] = 6.0 / MODEL.sigma[MODEL.M][0]
+    x[MODEL.M.start] = -6.0 / MODEL.sigma[MODEL.M][0]
     A, b = samples_of(x, 3 * MODEL.size)
     P = np.linalg.inv(A + suppositions.prior(memory))
     assert not any(suppositions.look(memory, P, b, is_settled) for is_settled in settled)
+
+
+@pytest.mark.parametrize(("load", "is_given_up"), [(-6.5, True), (1.5, True), (8.0, False), (-9.0, False)])
+def test_nobody_carries_less_than_nothing_or_twice_what_a_robot_can(load, is_given_up):
+    """A robot that carries 7 kg, and 7 kg that are believed."""
+    suppositions, memory = supposed()
+    x = np.zeros(MODEL.size)
+    x[MODEL.M.start + 1], x[MODEL.M.start] = 8.0, load / MODEL.sigma[MODEL.M][0]
+    A, b = samples_of(x, 30 * MODEL.size)
+    found = look_twice(suppositions, memory, np.linalg.inv(A + suppositions.prior(memory)), b)
+    assert (found is not None) == is_given_up
 
 
 def test_a_load_within_its_spread_is_what_was_believed():
