@@ -1,6 +1,7 @@
 """Friction that sticks: how sharply it turns over is learnt, and motors that hung start well."""
 
 import numpy as np
+import pytest
 from scipy.signal import lsim
 
 from systems.estimation.drives.drive_model import SHARP
@@ -95,3 +96,18 @@ def test_motors_that_hung_do_not_start_with_what_their_drives_wound_up_meanwhile
         model.open_low_speeds(memory)
         farthest.append(moved_with_sticking_friction(model, memory, is_known)[-3:, 3:])
     assert (farthest[0] < 0.6 * farthest[1]).all()  # of the wrist, which friction moves most
+
+
+@pytest.mark.parametrize(
+    ("robot", "is_doubted"), [("irb1200", True), ("kr16", False), ("kr16-realistic", False)]
+)
+def test_motors_that_hung_are_doubted_but_where_friction_moves_them_by_milliradians(robot, is_doubted):
+    def learnt(hung: float) -> np.ndarray:
+        model, memory = drives(robot=robot)
+        memory.hung[0] = hung
+        theta, v, a = motion(1.0)
+        columns = model.command(memory, (theta, v, a), LOADS, 7.0).columns
+        model.look_back(memory, (theta, v, a), columns, np.zeros(6), theta - 1e-4)
+        return memory.P
+
+    assert np.array_equal(learnt(1e-3), learnt(0.0)) != is_doubted
