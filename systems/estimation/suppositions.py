@@ -110,7 +110,7 @@ class Suppositions:
         """
         model = self._model
         of_belief, spread = model.mean[model.M][0], model.sigma[model.M][0]
-        return (
+        return not model.has_gear_errors or (
             of_belief + spread * (more + sigma) >= 0.0
             and of_belief + spread * (more - sigma) <= model.most_carried
         )

@@ -94,7 +94,7 @@ def hours_scenario(hours: float, seed: int, max_step: float | None = None) -> Sc
     scenario = load_scenario("everything", drawn)
     reference = replace(scenario.reference, dwell=REST, laps=1)
     pair = make_path(replace(reference, path=Points([Waypoint(), Waypoint()]), settle=0.0))
-    count = math.ceil(3600.0 * hours / pair.duration) + 1
+    count = math.ceil(3600.0 * hours / (pair.duration - REST)) + 1  # it rests at the first of two, too
     points = random_waypoints(load_robot(scenario.robot), scenario, count, seed)
     return replace(
         scenario,
