@@ -126,8 +126,8 @@ class DriveMemory(NamedTuple):
     """What one command hands on to the next."""
 
     started: np.ndarray  # (1,)
-    z: np.ndarray  # (10, 6, 2), integral of a following error, and the error, of each of ten torques
-    w: np.ndarray  # (10, 6), those torques; if torques are taken, of the first what changes evenly
+    z: np.ndarray  # (11, 6, 2), integral of a following error, and the error, of each of eleven torques
+    w: np.ndarray  # (11, 6), those torques; if torques are taken, of the first what changes evenly
     beta: np.ndarray  # (66,), parameters of the regression
     led: np.ndarray  # (2, 66), the same as they are used, which follow those, and their rates
     correction: np.ndarray  # (6,) rad
