@@ -275,7 +275,7 @@ def test_a_load_of_which_the_robot_alone_was_not_told_is_made_up_for(interface, 
     untold = ["station.drive.payload=0", f"station.interface={interface}"]
     log = run(load_scenario("everything", [*untold, *drawn]), "self_calibrating")
     on_path, at_rest = tip_errors(log)
-    assert on_path.max() < allowed  # of six robots 0.3 mm and more if drives are believed to hold what the law was told
+    assert on_path.max() < allowed  # 0.3 mm and more if the drives are believed to hold it
     assert at_rest.max() < 0.005e-3
     assert not any(log.guard_counts.values())
 
