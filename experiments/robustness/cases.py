@@ -1,5 +1,6 @@
 """Test cases for robustness: the plain scenario, and one property of the station degraded at a time."""
 
+from experiments.robustness.mixed import mixture
 from experiments.robustness.study import Case
 
 _LATE = ("station.drive.dead_time=0.139", "servo.model.command_delay=0.14")
@@ -76,5 +77,6 @@ CASES = {
         ),
         Case("reflections", ("station.camera.outlier_probability=0.2",)),
         Case("clock-drift", ("station.camera.clock_drift_ppm=500",)),
+        Case("mixed", draw=mixture),  # a robot of ten types with many of these and others at once
     )
 }

@@ -15,6 +15,7 @@ from experiments.metrics.laps import lap_metrics
 from experiments.metrics.run_metrics import error_metrics, pose_errors
 from experiments.robustness.calibrated import calibrated_robots
 from experiments.robustness.contenders import Contender
+from experiments.robustness.mixed import Mixture
 from robots.description.model import RobotModel, load_robot
 
 _NOTHING_BESIDE = Contender("open_loop", "open_loop")
@@ -27,6 +28,7 @@ class Case:
     name: str
     settings: tuple[str, ...] = ()  # of the scenario, as ``--set`` takes them
     recovered_at: float | None = None  # s, from when on what has happened must be made up for
+    draw: Callable[[int], Mixture] | None = None  # what else a seed draws
 
 
 @dataclass(frozen=True)
@@ -43,10 +45,16 @@ class Trial:
     calibrated: RobotModel | None = None  # as the controller knows it
 
     @property
+    def drawn(self) -> Mixture:
+        """What the seed draws beside the errors."""
+        return self.case.draw(self.seed) if self.case.draw else Mixture()
+
+    @property
     def settings(self) -> list[str]:
         """Of the scenario."""
         drawn = ("seed", "station.errors.random.seed", "station.variation.seed")
         return [
+            *self.drawn.settings,
             *self.case.settings,
             *self.contender.settings,
             *(f"{name}={self.seed}" for name in drawn),
@@ -57,10 +65,11 @@ class Trial:
     def load(self) -> Scenario:
         """The scenario. Raises what `load_scenario` and `carried_over` raise."""
         scenario = load_scenario(self.scenario, self.settings)
-        if self.robot is None:
+        robot = self.robot or self.drawn.robot
+        if robot is None:
             return scenario
-        named = with_robot(scenario, self.robot)
-        return carried_over(named, load_robot(scenario.robot), load_robot(self.robot))[0]
+        named = with_robot(scenario, robot)
+        return carried_over(named, load_robot(scenario.robot), load_robot(robot))[0]
 
 
 def trials(
@@ -135,6 +144,8 @@ def run_trial(trial: Trial, progress: Progress) -> dict[str, Any]:
         "path": trial.path,
         "failure": None,
     }
+    if trial.case.draw:
+        row |= {"robot": trial.robot or trial.drawn.robot, "settings": list(trial.drawn.settings)}
     try:
         with simulating(trial.contender.text, trial.seed):
             log = run(trial.load(), trial.contender.law, trial.calibrated, progress=progress)

@@ -32,7 +32,7 @@ _EXPLAINED = 0.15  # what a cause leaves of the mean error if it is the cause
 
 
 TOOL_DISPLACED, LOAD_CHANGED = "tool displaced", "load changed"
-DEAD_TIME_CHANGED, CLOCK_DRIFTS = "dead time changed", "clock drifts"
+DEAD_TIME_CHANGED = "dead time changed"
 FOREIGN_FRAME = "camera frame is another"
 CAMERA_MOVED = "camera moved"
 LOAD_UNLIKE_BELIEF = "load unlike belief"  # from the start, by about so much
@@ -44,7 +44,6 @@ _UNITS = {  # others: m
     LOAD_CHANGED: "kg",
     LOAD_UNLIKE_BELIEF: "kg",
     DEAD_TIME_CHANGED: "s",
-    CLOCK_DRIFTS: "s/s",
     FOREIGN_FRAME: "rad",
     JOINTS_SHIFTED: "rad",
     IMPLAUSIBLE: "parameters",
@@ -65,7 +64,7 @@ class Event(NamedTuple):
     """What happened to the robot."""
 
     kind: str  # one of those above
-    size: float  # m, kg, s, s/s or rad, or a number of parameters
+    size: float  # m, kg, s or rad, or a number of parameters
     error: float  # m, of the tip where it is known
 
 
@@ -77,7 +76,6 @@ class EventLog:
         TOOL_DISPLACED,
         LOAD_CHANGED,
         DEAD_TIME_CHANGED,
-        CLOCK_DRIFTS,
         FOREIGN_FRAME,
         PATH_UNSEEN,
         CAMERA_MOVED,

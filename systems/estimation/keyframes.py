@@ -56,9 +56,9 @@ class Keyframes:
             b_leaving=(n,),
         )
 
-    def reset(self, memory: SimpleNamespace, A: np.ndarray, xi: np.ndarray, kept: np.ndarray | float) -> None:
-        """Forgets all keyframes; the information A about xi is what is left, and A xi with what is kept."""
-        b = A @ xi + kept
+    def reset(self, memory: SimpleNamespace, A: np.ndarray, xi: np.ndarray) -> None:
+        """Forgets all keyframes; the information A about xi is what is left."""
+        b = A @ xi
         memory.xi_sum[:] = xi
         memory.first[0] = memory.end[0] = 0.0
         memory.position[0] = -1.0

@@ -1,21 +1,20 @@
-"""What is taken for granted until samples speak against it: a clock that does not drift, and the load."""
+"""What is taken for granted until samples speak against it: the load."""
 
 import math
 from types import SimpleNamespace
 
 import numpy as np
 
-from systems.estimation.events import CLOCK_DRIFTS, LOAD_UNLIKE_BELIEF, Event
+from systems.estimation.events import LOAD_UNLIKE_BELIEF, Event
 from systems.estimation.memory import Layout
 from systems.estimation.tip_model import TipModel
 
-_LEAST_DRIFT, _DRIFT_SIGMAS = 1e-4, 8.0  # s/s; and how sure it has to be: what nothing describes adds up
 _LOAD_CHI_SQUARED = 30.0  # of four: what nothing describes, as errors of gears, makes up to 13
 _SETTLED = 2  # looks: a sum that was read anew just now has been right once by chance, never twice
 
 
 class Suppositions:
-    """Two beliefs that hold an estimate firmly, and are given up by what it would be without them.
+    """A belief that holds an estimate firmly, and is given up by what it would be without it.
 
     With information I on some unknowns x_o about zero the estimate is P b. Without it the covariance is
 
@@ -31,19 +30,17 @@ class Suppositions:
         # Information on a load that may be any; who believes in a larger spread already is left with that
         self._any_load = np.diag(np.minimum(model.changed_load**-2, np.diag(model.prior)[model.M]))
         self.layout = Layout(
-            drift=(1,),  # information on it
             load=(1,),  # whether it has been held all along; else it was given up, or something has happened
             settled=(1,),  # looks in a row at samples that were linearised near the estimate
         )
 
     def start(self, memory: SimpleNamespace) -> None:
         """Writes what is supposed before the first sample."""
-        memory.drift[0], memory.load[0] = self._model.prior[self._model.D, self._model.D], 1.0
+        memory.load[0] = 1.0
 
     def prior(self, memory: SimpleNamespace) -> np.ndarray:
         """What is known before any sample as far as it still holds, (n, n)."""
         model, prior = self._model, self._model.prior.copy()
-        prior[model.D, model.D] = memory.drift[0]
         if not memory.load[0]:
             prior[model.M, model.M] = self._any_load
         return prior
@@ -66,34 +63,8 @@ class Suppositions:
         event = self._given_up(memory, P, b)
         return event and (event, self.prior(memory) - before)
 
-    def kept(self, memory: SimpleNamespace, P: np.ndarray, b: np.ndarray, A: np.ndarray) -> np.ndarray:
-        """What samples say of the drift of the clock, where information A is what is left of them.
-
-        The estimate alone, of which it is supposed that there is none, says something else. Let I be the
-        information of the supposition, and P' as above without it: A P b and this are (A - I) P' b.
-
-        Args:
-            memory: of the layout.
-            P, b: as of `look`, before.
-            A: information on the same estimate from now on, the suppositions among it, (n, n).
-
-        Returns:
-            What to add to A P b, (n,).
-        """
-        D, held = self._model.D, memory.drift[0] - 1.0
-        against = A @ P[D]
-        against[D] -= 1.0
-        return held * (P[D] @ b) / (1.0 - held * P[D, D]) * against
-
     def _given_up(self, memory: SimpleNamespace, P: np.ndarray, b: np.ndarray) -> Event | None:
         model = self._model
-        if memory.drift[0] > 1.0:
-            drift = slice(model.D, model.D + 1)
-            x, covariance = _if_free(P, b, drift, np.array([[memory.drift[0] - 1.0]]))
-            size = float(x[0] * model.sigma[model.D])
-            if abs(size) > _LEAST_DRIFT and abs(x[0]) > _DRIFT_SIGMAS * math.sqrt(covariance[0, 0]):
-                memory.drift[0] = 1.0
-                return Event(CLOCK_DRIFTS, size, 0.0)
         if memory.load[0] and memory.settled[0] >= _SETTLED:
             held = model.prior[model.M, model.M]
             x, covariance = _if_free(P, b, model.M, held - self._any_load)

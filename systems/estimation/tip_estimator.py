@@ -391,10 +391,8 @@ class TipEstimator:
 
     def _begin_from(self, memory: SimpleNamespace, A: np.ndarray, xi: np.ndarray) -> None:
         """Goes on with the information A about xi, and without keyframes."""
-        estimate = memory.P, memory.keyframes.b + memory.b_open
-        kept = self._suppositions.kept(memory.supposed, *estimate, A) if xi is memory.xi else 0.0
         memory.xi[:] = xi
-        self._keyframes.reset(memory.keyframes, 0.5 * (A + A.T), memory.xi, kept)
+        self._keyframes.reset(memory.keyframes, 0.5 * (A + A.T), memory.xi)
         memory.supposed.load[0] = 0.0
         forget_open(memory)
         self._invert(memory)

@@ -16,7 +16,6 @@ from systems.estimation.gear_errors import NUM_SHAPES, NUM_STATES, OPEN, SHAPE_N
 from systems.estimation.kernels.arrays import Seen, SeenOnce, Unknowns
 from systems.estimation.learnt_robot import known_before
 
-HELD = 1e5  # information on the drift of a clock as long as nothing shows that there is one
 NO_SHAPES = np.empty((0, 6))
 _CHANGED_LOAD = np.array([4.0, 0.3, 0.3, 0.3])  # kg and kg m, of a robot that carries 7 kg
 _BASE = 0  # the body whose placement in the world it is
@@ -43,7 +42,7 @@ class Spread:
     payload: float = 0.5  # kg, of a robot that carries 7 kg; of a larger one in proportion
     payload_centre: float = 0.015  # m
     clock: float = 2e-3  # s, between the stamps of the camera and those of the joints
-    clock_drift: float = 3e-4  # s/s, by which that changes if it does
+    clock_drift: float = 3e-4  # s/s, by which that changes
     gear_error: float = (
         0.0  # rad, of a gear's waves, gap and hysteresis; 5e-5 is a good guess where there are
     )
@@ -129,7 +128,6 @@ class TipModel:
         self._tool, self._world, self._zeros = (self._directions(body) for body in (TOOL, _BASE, None))
         self._least, self._most = self._plausible_range(model.load_scale)
         self.prior = np.eye(self.size)  # information, in units of the spreads
-        self.prior[self.D, self.D] = HELD
         known = known_before(robot, drawn, chosen) if robot.is_calibrated else None
         if known is not None:
             self._take_over(*known)

@@ -1,6 +1,7 @@
 """Laws on many random robots: what is drawn, how it is judged, and what is refused."""
 
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -9,6 +10,7 @@ import pytest
 from diagrams.scenario.scenario import load_scenario
 from experiments.robustness.cases import CASES
 from experiments.robustness.contenders import contenders
+from experiments.robustness.mixed import ROBOTS
 from experiments.robustness.study import Case, judged, trials
 from systems.reference.paths import make_path
 from systems.reference.shapes import Circle
@@ -19,13 +21,39 @@ OPEN_LOOP = contenders("open_loop")
 
 
 def test_every_case_is_a_scenario_and_only_the_seed_draws_the_robot():
-    for trial in trials("everything", list(CASES.values()), OPEN_LOOP, [3], ["circle"], laps=2):
+    chosen = [case for case in CASES.values() if case.draw is None]
+    for trial in trials("everything", chosen, OPEN_LOOP, [3], ["circle"], laps=2):
         scenario = load_scenario(trial.scenario, trial.settings)
         station = scenario.station
         assert (scenario.seed, station.errors.random.seed, station.variation.seed) == (3, 3, 3)
         assert isinstance(scenario.reference.path, Circle)
         assert scenario.reference.laps == 2
         assert bool(station.events) == (trial.case.recovered_at is not None)
+
+
+def test_a_mixture_is_a_scenario_and_the_same_whenever_its_seed_is_drawn():
+    todo, again = (trials("everything", [CASES["mixed"]], OPEN_LOOP, range(60), ["circle"]) for _ in "12")
+    assert [trial.settings for trial in todo] == [trial.settings for trial in again]
+    loaded = [load_scenario(trial.scenario, trial.settings) for trial in todo]
+    assert {trial.drawn.robot for trial in todo} == set(ROBOTS)
+    for name in ("dead_time", "command_delay"):
+        assert len({getattr(each.station.drive, name) for each in loaded}) >= 4
+    # Some controllers are told of their dead time to 3 ms, some not at all.
+    late = [
+        scenario.station.drive.command_delay
+        + scenario.station.drive.dead_time
+        - scenario.servo.model.command_delay
+        for scenario in loaded
+    ]
+    assert min(late) == pytest.approx(3e-3)
+    assert max(late) > 0.1
+
+
+def test_what_is_set_for_all_outweighs_what_is_drawn():
+    case = replace(CASES["mixed"], settings=("station.period=0.006", "station.drive.command_delay=0.006"))
+    (trial,) = trials("everything", [case], OPEN_LOOP, [3], ["circle"], robot="ur10")
+    assert trial.load().station.period == 0.006
+    assert trial.load().robot == "ur10"
 
 
 def row(seed: int, laps: list[float], failure: str | None = None) -> dict:

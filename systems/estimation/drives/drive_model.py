@@ -1,6 +1,6 @@
 """What the motors make of commands: known up to factors, which their encoders show."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from types import SimpleNamespace
 from typing import NamedTuple
 
@@ -23,11 +23,15 @@ from systems.estimation.memory import Layout
 # the load of a kilogram, and of a kg m of its first moment along x, y, z; a kilogram that is not held; what
 # friction is more than believed where it turns over sharply.
 _FILTERED = 11
-COLUMNS = 6 * (_FILTERED + 2)  # of each of them, of a planner, and of what is late beside the plan
+# Factors of the gains of position and of the integral that are believed, and of others that drives may have
+_GAINS = ((1.0, 1.0), (1.0, 0.5), (1.0, 2.0), (0.6, 1.0))
+# Of each torque, of a planner, of what is late beside the plan, and of the first torque with other gains
+COLUMNS = 6 * (_FILTERED + 1 + len(_GAINS))
 _VISCOUS, _COULOMB, _HUMPS, _CONSTANTS = slice(14, 37, 4), slice(15, 37, 4), slice(16, 37, 4), slice(37, 43)
 DEAD_TIME, MASS, MOMENT, SMOOTHED = 0, 43, slice(44, 47), 47
 SHARP, NOT_HELD, GIVING = slice(48, 54), slice(54, 60), slice(60, 66)
-SIZE = 66
+OTHER_GAINS = slice(66, 69)
+SIZE = 69
 # Of Coulomb's friction, the spread of what there may be more of it; less where it is learnt early, or the
 # first lap of robots without a hump is twisted more
 _HUMP, _EARLY_HUMP = 0.3, 0.1
@@ -38,7 +42,8 @@ _SHARPER, _SHARPER_ALONE = 6.0, 0.6
 # kg that the robot's controller may not hold, or hold too much, of a robot that carries 7 kg: of all joints
 # alike, and of one beside the others, as it may have other gains for the load that it was told
 _UNTOLD, _UNTOLD_ALONE = 5.0, 3.0
-_GIVES = 1.0  # share by which drives without torques may give way more or less for that reason
+_GIVES = 1.0  # share by which drives may give way more or less for that reason
+_OTHERWISE = 0.12  # share of what other gains would make of it, in all joints alike
 _DOUBT = 30.0  # times what a motor was off by while it hung: by that its following error may be due to it
 _VISCOUS_SPREAD, _COULOMB_SPREAD = 0.3, 0.5  # of what a robot's file says of friction
 _HIDING = 1e-3  # rad, slack of a joint whose following errors have other reasons at low speeds
@@ -83,7 +88,7 @@ class DriveCommand(NamedTuple):
     position: np.ndarray  # (6,) rad
     velocity: np.ndarray  # (6,) rad/s
     torque: np.ndarray  # (6,) N m, joint side, on top of what the drives do for gravity
-    columns: np.ndarray  # (78,), what `DriveModel.features` needs of this instant
+    columns: np.ndarray  # (96,), what `DriveModel.features` needs of this instant
 
 
 class DriveModel:
@@ -100,6 +105,9 @@ class DriveModel:
     told, and holds against gravity, may be another one than the robot carries and than anybody believes: a
     kilogram that is not held is a column of its own, of each joint, as the gains of drives follow that load.
     For the same reason they may give way more or less to all that a motion needs, where no torque is sent.
+    Nor are the gains of a robot's controller known. Those of a cascade make G = s / (k_d (s + p) (s + i)) with
+    the gain p of the position loop and the inverse i of the integral action time: columns of their own say
+    what is different about e where that is i / 2, 2 i or 0.6 p, for the torques that nobody gives.
 
     Where drives take torques, these are sent ahead by the dead time that was learnt, as positions are; of
     Coulomb friction, which turns over in an instant, its mean over the period that they will last. Where they
@@ -121,7 +129,8 @@ class DriveModel:
         kind = kind if model.takes_torque else "cascade"
         self._config = config
         payload = min(model.payload, robot.payload.largest_mass)
-        kp, ki, kd = _gains(robot, payload, config, kind, period)
+        sets = [_gains(robot, payload, _with_factors(config, *each), kind, period) for each in _GAINS]
+        kp, _, kd = sets[0]
         coulomb, viscous = friction_line(robot)
         self._drives = Drives(
             robot.reflected_inertia,
@@ -131,9 +140,9 @@ class DriveModel:
             _SLACK * coulomb / kp,
             _SLOW,
             kp,
-            ki,
+            np.array([gains[1] for gains in sets]),
             kd,
-            np.array([_filter_step(*gains, period) for gains in zip(kp, ki, kd, strict=True)]),
+            np.array([_filter_steps(*gains, period) for gains in sets]),
             period,
             payload,
             model.takes_torque,
@@ -147,12 +156,12 @@ class DriveModel:
         self._scale, self._moment = model.load_scale, config.moment_sigma * model.load_scale
         spread += [0.3, _VISCOUS_SPREAD, _COULOMB_SPREAD, 0.0] * 6 + [_RESTS[kind]] * 6
         spread += [config.payload_sigma * self._scale] + [self._moment] * 3 + [config.smoothing_sigma]
-        spread += [0.0] * 12 + [0.0 if model.takes_torque else _GIVES] * 6
+        spread += [0.0] * 12 + [0.0 if model.takes_torque else _GIVES] * 6 + [_OTHERWISE] * 3
         self._prior = np.diag(np.array(spread) ** 2)
         self._prior[NOT_HELD, NOT_HELD] = self._scale**2 * (_UNTOLD**2 + _UNTOLD_ALONE**2 * np.eye(6))
         self.layout = Layout(
             started=(1,),
-            z=(_FILTERED, 6, 2),  # integral of e, and e
+            z=(len(_GAINS), _FILTERED, 6, 2),  # integral of e, and e
             w=(_FILTERED, 6),
             beta=(SIZE,),
             led=(2, SIZE),  # beta as commands use it, and its rate
@@ -200,7 +209,7 @@ class DriveModel:
         return DriveCommand(position, velocity, torque, columns)
 
     def features(self, v: np.ndarray, a: np.ndarray, columns: np.ndarray) -> np.ndarray:
-        """Rows of the regression, shape (6, 66), from motion and the filtered torques (78,)."""
+        """Rows of the regression, shape (6, 69), from motion and the filtered torques (96,)."""
         Phi = np.zeros((6, SIZE))
         kernels.drives.features(v, a, columns, Phi)
         return Phi
@@ -219,7 +228,7 @@ class DriveModel:
         Args:
             memory: of the layout.
             planned: position, velocity and acceleration, (6,) each.
-            columns, correction: of the command of that instant, (78,) and (6,) in rad.
+            columns, correction: of the command of that instant, (96,) and (6,) in rad.
             actual: where the motors were, rad, (6,).
             most: nothing is learnt if more than this is not explained yet, rad; of a joint with much friction
                 for the stiffness of its drive that much more.
@@ -305,6 +314,15 @@ def _inertia(robot: RobotModel, payload: float) -> np.ndarray:
     add_robot(plant, robot, "rigid", payload)
     plant.Finalize()
     return np.diag(plant.CalcMassMatrix(plant.CreateDefaultContext())).copy()
+
+
+def _with_factors(config: DriveModelConfig, position: float, integral: float) -> DriveModelConfig:
+    return replace(config, position=position * config.position, integral=integral * config.integral)
+
+
+def _filter_steps(kp: np.ndarray, ki: np.ndarray, kd: np.ndarray, period: float) -> np.ndarray:
+    """Of six joints, (6, 2, 4)."""
+    return np.array([_filter_step(*gains, period) for gains in zip(kp, ki, kd, strict=True)])
 
 
 def _filter_step(kp: float, ki: float, kd: float, period: float) -> np.ndarray:

@@ -111,11 +111,10 @@ class Drives(NamedTuple):
     slack: np.ndarray  # (6,) rad, of a following error, that friction makes where it is not as believed
     slow: float  # rad/s, at which what friction has more at low speeds has fallen to a third
     kp: np.ndarray  # (6,) N m/rad, gains of a following error, of its integral and of its rate
-    ki: np.ndarray  # (6,)
+    ki: np.ndarray  # (4, 6), and of three other sets of gains
     kd: np.ndarray  # (6,)
-    step: (
-        np.ndarray
-    )  # (6, 2, 4), a period's step from integral, error, torque and its change to the first two
+    # A period's step from integral, error, torque and its change to the first two, of each set of gains
+    step: np.ndarray  # (4, 6, 2, 4)
     period: float  # s
     payload: float  # kg, with which the drives hold the arm
     takes_torque: bool
@@ -126,10 +125,11 @@ class DriveMemory(NamedTuple):
     """What one command hands on to the next."""
 
     started: np.ndarray  # (1,)
-    z: np.ndarray  # (11, 6, 2), integral of a following error, and the error, of each of eleven torques
+    # Integral of a following error, and the error, of each of eleven torques with each set of gains
+    z: np.ndarray  # (4, 11, 6, 2)
     w: np.ndarray  # (11, 6), those torques; if torques are taken, of the first what changes evenly
-    beta: np.ndarray  # (66,), parameters of the regression
-    led: np.ndarray  # (2, 66), the same as they are used, which follow those, and their rates
+    beta: np.ndarray  # (69,), parameters of the regression
+    led: np.ndarray  # (2, 69), the same as they are used, which follow those, and their rates
     correction: np.ndarray  # (6,) rad
     smoothed: np.ndarray  # (6,) rad/s, accelerations through 1 / (s + following)
     hung: np.ndarray  # (2, 6) rad, by which motors were off when they were slow, fading, and are if they are

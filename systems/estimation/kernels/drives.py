@@ -18,7 +18,7 @@ _MOST_PERIODS = 1.5  # by which torques are sent ahead or held back
 
 @compiled
 def features(v, a, filtered, Phi):
-    """Rows of the regression, (6, 66), which are zero before; see `DriveModel.features`."""
+    """Rows of the regression, (6, 69), which are zero before; see `DriveModel.features`."""
     for i in range(6):
         Phi[i, 0] = Phi[i, 1 + i] = v[i] + filtered[60 + i]
         Phi[i, 7 + i] = 1e-2 * a[i]
@@ -31,6 +31,8 @@ def features(v, a, filtered, Phi):
         Phi[i, 48 + i] = filtered[66 + i]
         Phi[i, 54 + i] = filtered[48 + i]
         Phi[i, 60 + i] = filtered[72 + i]
+        for k in range(3):
+            Phi[i, 66 + k] = filtered[78 + 6 * k + i]
 
 
 @inner
@@ -42,6 +44,8 @@ def _behind(v, a, filtered, beta, i):
         total += filtered[6 * k + i] * beta[13 + 4 * i + k]
     for k in range(4):
         total += filtered[24 + 6 * k + i] * beta[43 + k]
+    for k in range(3):
+        total += filtered[78 + 6 * k + i] * beta[66 + k]
     total += filtered[54 + i] * beta[47] + filtered[66 + i] * beta[48 + i]
     return total + beta[37 + i] + filtered[48 + i] * beta[54 + i] + filtered[72 + i] * beta[60 + i]
 
@@ -151,7 +155,7 @@ def _unwound(drives, v, a, off, sticks, wound, i):
         wound: integral and error that are left, and for how long it has hung, (3, 6); are renewed.
         i: which joint.
     """
-    step, most = drives.step[i], drives.coulomb[i] / drives.ki[i]
+    step, most = drives.step[0, i], drives.coulomb[i] / drives.ki[0, i]
     if abs(v) < _SHARP_WIDTH * drives.width[i] + 0.5 * drives.period * abs(a):
         wound[2, i] = min(wound[2, i] + drives.period, _WINDS)
     elif wound[2, i] > 0.0:
@@ -160,7 +164,7 @@ def _unwound(drives, v, a, off, sticks, wound, i):
     integral, e = wound[0, i], wound[1, i]
     wound[0, i] = step[0, 0] * integral + step[0, 1] * e
     wound[1, i] = step[1, 0] * integral + step[1, 1] * e
-    return e, -(drives.ki[i] * integral + drives.kp[i] * e) / drives.kd[i]
+    return e, -(drives.ki[0, i] * integral + drives.kp[i] * e) / drives.kd[i]
 
 
 @inner
@@ -171,6 +175,12 @@ def _filter(step, z, last, w):
         for i in range(2):
             row = step[i]
             z[k, i] = row[0] * integral + row[1] * e + row[2] * before + row[3] * change
+
+
+@inner
+def _missing(z, beta, i):
+    """The following error of a joint by all torques that nobody gives it, of those by their parameters."""
+    return z[0, 1] + z[9, 1] * beta[54 + i]
 
 
 @inner
@@ -200,11 +210,11 @@ def command(drives, arm, masses, memory, motion, loads, mass, limits, out, filte
         mass: of the payload, kg.
         limits: the frequency in rad/s with which commands follow what was learnt, and what the correction
             may add to the speed of a joint in rad/s.
-        out: (3, 6), position, velocity and torque; filtered: (78,), what `features` takes, of rotor, viscous
+        out: (3, 6), position, velocity and torque; filtered: (96,), what `features` takes, of rotor, viscous
             and Coulomb friction and its hump, of a kilogram and of a kg m along each axis, of a kilogram
             that is not held; the accelerations that a planner smooths, how fast the command runs away from
             the plan in rad/s, of what friction turns over more sharply, and of all that the motion needs
-            and is not given as a torque; are written.
+            and is not given as a torque, with the gains and by how much more with three others; are written.
     """
     theta, v, a = motion
     X_WE, frames, w = np.empty((4, 4)), np.empty((7, 4, 4)), np.empty(11)
@@ -233,7 +243,7 @@ def command(drives, arm, masses, memory, motion, loads, mass, limits, out, filte
             w[5 + k] = loads[1 + k, i]
         w[9] = with_more[i] - held[i]
         w[0] = needed = w[1] + w[2] + w[3] + loads[0, i] + mass * loads[1, i] - held[i]
-        z, last = memory.z[:, i], memory.w[:, i]
+        z, last = memory.z[0, :, i], memory.w[:, i]
         filtered[60 + i] = 0.0
         out[0, i], out[1, i], out[2, i] = theta[i], v[i], 0.0
         even = needed - w[3]  # what changes evenly
@@ -242,20 +252,23 @@ def command(drives, arm, masses, memory, motion, loads, mass, limits, out, filte
             out[2, i] = needed if is_first else even + ahead * (even - last[0]) + turned
             last[0] = w[0] = 0.0  # nothing is missing
         if is_first:
-            for k in range(11):
-                z[k, 0] = w[k] / drives.ki[i]
+            for gains in range(4):
+                memory.z[gains, :, i, 0] = w / drives.ki[gains, i]
         else:
-            _filter(drives.step[i], z, last, w)
+            for gains in range(4):
+                _filter(drives.step[gains, i], memory.z[gains, :, i], last, w)
         if not drives.takes_torque:
             integral, e = z[0, 0], z[0, 1]
-            filtered[60 + i] = (needed - drives.kp[i] * e - drives.ki[i] * integral) / drives.kd[i]
+            filtered[60 + i] = (needed - drives.kp[i] * e - drives.ki[0, i] * integral) / drives.kd[i]
             out[0, i] += e
             out[1, i] += filtered[60 + i]
         last[0] = even if drives.takes_torque else needed
         for k in range(1, 10):
             last[k], filtered[6 * (k - 1) + i] = w[k], z[k, 1]
         last[10], filtered[66 + i] = w[10], z[10, 1]
-        filtered[72 + i] = z[0, 1]
+        filtered[72 + i] = missing = _missing(z, led, i)
+        for k in range(3):
+            filtered[78 + 6 * k + i] = _missing(memory.z[1 + k, :, i], led, i) - missing
         if not drives.takes_torque:
             settled = a[i] / drives.following
             memory.smoothed[i] = settled + fading * (memory.smoothed[i] - settled)

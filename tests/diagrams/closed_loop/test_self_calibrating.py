@@ -308,17 +308,18 @@ def test_a_dead_time_that_changes_on_the_path_is_learnt_while_the_tip_stays_on_i
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("seed", [1001, 1004])
-def test_a_camera_clock_that_drifts_is_learnt_before_it_matters(seed):
+@pytest.mark.parametrize(("seed", "drift"), [(1001, 500), (1004, 500), (3001, 50), (3001, 100)])
+def test_a_camera_clock_that_drifts_is_learnt_before_it_matters(seed, drift):
+    """Crystals differ by tens of ppm: a millisecond within a lap, and half a millimetre at 0.5 m/s."""
     drawn = [f"{name}={seed}" for name in ("seed", "station.errors.random.seed", "station.variation.seed")]
-    scenario = load_scenario("everything", ["station.camera.clock_drift_ppm=500", *drawn])
+    scenario = load_scenario("everything", [f"station.camera.clock_drift_ppm={drift}", *drawn])
     experiment = Experiment(scenario, "self_calibrating")
     experiment.advance(until=8.0)
     log = experiment.log()
     assert tip_errors(log)[0].max() < 0.06e-3
     assert log.learnt is not None
-    assert [event["kind"] for event in log.learnt["events"]] == ["clock drifts"]
-    assert log.learnt["clock_drift_ppm"] == pytest.approx(-500.0, abs=50.0)  # of what corrects the stamps
+    assert not log.learnt["events"]
+    assert log.learnt["clock_drift_ppm"] == pytest.approx(-drift, abs=20.0)  # of what corrects the stamps
 
 
 @pytest.mark.slow

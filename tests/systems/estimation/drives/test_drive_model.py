@@ -89,7 +89,29 @@ def test_drives_that_give_way_unlike_belief_are_learnt_where_they_take_no_torque
     assert (np.abs(memory.beta[GIVING]) > 0.05).all()
     torques, memory = drives()  # what they are given as torques nobody has to make up for
     columns = torques.command(memory, motion(1.0), LOADS, 7.0).columns
-    assert not torques.features(*motion(1.0)[1:], columns)[:, GIVING].any()
+    assert not torques.features(*motion(1.0)[1:], columns)[:, GIVING.start :].any()
+
+
+@pytest.mark.parametrize(("position", "integral"), [(25.0, 5.0), (25.0, 16.0), (17.0, 10.0), (35.0, 7.0)])
+def test_gains_that_nobody_told_are_learnt_where_drives_take_no_torques(position, integral):
+    """Drives are e = G w with G = s / (k_d (s + position) (s + integral)), see `DriveModel`."""
+    model, memory = drives(takes_torque=False)
+    kd, times = model._drives.kd, PERIOD * np.arange(1500)
+    planned, needed, known = [motion(time) for time in times], np.empty((1500, 6)), np.empty((1500, 6))
+    for k, instant in enumerate(planned):
+        model.command(memory, instant, LOADS, 7.0)
+        needed[k], known[k] = memory.w[0], memory.z[0, 0, :, 1]
+    model, memory = drives(takes_torque=False)
+    filters = [([1.0, 0.0], kd[i] * np.polymul([1.0, position], [1.0, integral])) for i in range(6)]
+    # From rest, where the drives hold the torque of the first instant
+    steps = (needed - needed[0]).T
+    behind = np.transpose([lsim(each, w, times)[1] for each, w in zip(filters, steps, strict=True)]) - known
+    left = np.empty_like(behind)
+    for k, instant in enumerate(planned):
+        columns = model.command(memory, instant, LOADS, 7.0).columns
+        left[k] = behind[k] - memory.correction
+        model.learn(memory, model.features(*instant[1:], columns), behind[k])
+    assert (left[-500:].std(axis=0) < 0.15 * behind[-500:].std(axis=0)).all()
 
 
 @pytest.mark.parametrize(
@@ -101,7 +123,7 @@ def test_a_drive_that_follows_one_thing_alone_is_behind_by_its_own_gain(kind, be
     model = DriveModel(belief, DriveModelConfig(), kind)
     drives = model._drives
     # 100 N m of the motor that nobody gives, after a second
-    step, torque = drives.step[1], 100.0 * abs(robot.gear_ratio[1])
+    step, torque = drives.step[0, 1], 100.0 * abs(robot.gear_ratio[1])
     z = np.zeros(2)
     for _ in range(round(1.0 / PERIOD)):
         z = step @ [*z, torque, 0.0]
@@ -194,7 +216,7 @@ def test_what_the_planner_of_egm_is_behind_is_a_multiple_of_its_column_at_any_fr
 
 def test_the_position_command_makes_up_for_a_torque_that_nobody_gives():
     model, memory = drives(takes_torque=False)
-    kd, kp, ki = model._drives.kd[1], model._drives.kp[1], model._drives.ki[1]
+    kd, kp, ki = model._drives.kd[1], model._drives.kp[1], model._drives.ki[0, 1]
     times, errors, torques = [], [], []
     for k in range(500):
         theta, v, a = motion(k * PERIOD)
@@ -250,7 +272,7 @@ def test_friction_that_is_larger_at_low_speeds_is_made_up_for(velocity):
     times = PERIOD * np.arange(1500)
     v = 0.3 * motion(times[:, None])[1]
     hump = 0.3 * model._drives.coulomb * 2.0 * v * velocity / (v**2 + velocity**2)
-    gains = zip(model._drives.kd, model._drives.kp, model._drives.ki, strict=True)
+    gains = zip(model._drives.kd, model._drives.kp, model._drives.ki[0], strict=True)
     behind = np.transpose(
         [lsim(([1.0, 0.0], gain), torque, times)[1] for gain, torque in zip(gains, hump.T, strict=True)]
     )

@@ -15,7 +15,7 @@ def test_friction_that_sticks_is_learnt_once_it_may_turn_over_more_sharply():
     v = 0.05 * motion(times[:, None])[1]
     width = model._drives.width
     sharper = model._drives.coulomb * (np.sign(v) - np.tanh(v / width))
-    gains = zip(model._drives.kd, model._drives.kp, model._drives.ki, strict=True)
+    gains = zip(model._drives.kd, model._drives.kp, model._drives.ki[0], strict=True)
     behind = np.transpose(
         [lsim(([1.0, 0.0], gain), torque, times)[1] for gain, torque in zip(gains, sharper.T, strict=True)]
     )
@@ -53,7 +53,7 @@ def moved_with_sticking_friction(model, memory, is_hanging_known: bool = True) -
     motors, without inertia: k_d (v_command - v) + k_p e + k_i int e dt and the torque that was sent for
     friction are the friction that there is.
     """
-    coulomb, width, kp, ki, kd = (
+    coulomb, width, kp, (ki, *_), kd = (
         getattr(model._drives, name) for name in ("coulomb", "width", "kp", "ki", "kd")
     )
     theta = command = begin = sum_of_e = np.zeros(6)
