@@ -1,7 +1,7 @@
 """Mixtures: each seed draws a type of robot and, of all that may differ from cell to cell, a value of each.
 
-Nobody chooses what comes together. All of it is in the sizes that cells have; some dead times and loads are told
-to no controller.
+Nobody chooses what comes together. All of it is in the sizes that cells have; of some dead times and loads no
+controller is told.
 """
 
 from collections.abc import Iterator

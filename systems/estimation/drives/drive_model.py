@@ -105,9 +105,9 @@ class DriveModel:
     told, and holds against gravity, may be another one than the robot carries and than anybody believes: a
     kilogram that is not held is a column of its own, of each joint, as the gains of drives follow that load.
     For the same reason they may give way more or less to all that a motion needs, where no torque is sent.
-    Nor are the gains of a robot's controller known. Those of a cascade make G = s / (k_d (s + p) (s + i)) with
-    the gain p of the position loop and the inverse i of the integral action time: columns of their own say
-    what is different about e where that is i / 2, 2 i or 0.6 p, for the torques that nobody gives.
+    Nor are the gains of a robot's controller known. A cascade makes G = s / (k_d (s + p) (s + i)) with the
+    gain p of its position loop and the inverse i of its integral action time: columns of their own say by
+    what e differs where that is i / 2, 2 i or 0.6 p, for the torques that nobody gives.
 
     Where drives take torques, these are sent ahead by the dead time that was learnt, as positions are; of
     Coulomb friction, which turns over in an instant, its mean over the period that they will last. Where they
