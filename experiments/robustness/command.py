@@ -125,6 +125,11 @@ def _print(console: Console, scenario: str, results: list[dict[str, Any]], title
             table.add_row(label(result) if number == 1 else "", *cells)
     console.print(table)
     for result in results:
+        if not is_single and "worst_seed" in result:
+            robot = f" ({result['worst_robot']})" if "worst_robot" in result else ""
+            console.print(
+                f"{label(result)}: worst with seed {result['worst_seed']}{robot} on {result['worst_path']}"
+            )
         if "coverage" in result:
             smallest, of_all = result["coverage"]
             worst = "" if is_single else f", worst run {smallest:.3f}"

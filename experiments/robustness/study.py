@@ -177,7 +177,7 @@ def judged(rows: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
         ``recovered_mm``: largest distance after what happens, where something does, likewise;
         ``coverage``: share of samples in which the true tip was within the ellipsoid of 95 % of a law that
         predicts it, as (smallest of a run, of all samples);
-        ``worst_seed`` and ``worst_path`` of the largest distance; ``guard``: interventions of all runs;
+        ``worst_seed`` and ``worst_path`` of the largest distance, and ``worst_robot`` where seeds draw it; ``guard``: interventions of all runs;
         ``failures``: runs that broke off.
     """
     done = [row for row in rows if row["failure"] is None]
@@ -204,6 +204,8 @@ def judged(rows: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
         samples = sum(each["samples"] for each in said)
         inside = sum(each["share"] * each["samples"] for each in said)
         result["coverage"] = min(each["share"] for each in said), inside / samples
+    if "robot" in worst:
+        result["worst_robot"] = worst["robot"]
     return result | {
         "laps": laps,
         "static_mm": _worst_and_median([row["static_mm"] for row in done]),
