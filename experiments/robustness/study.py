@@ -177,7 +177,8 @@ def judged(rows: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
         ``recovered_mm``: largest distance after what happens, where something does, likewise;
         ``coverage``: share of samples in which the true tip was within the ellipsoid of 95 % of a law that
         predicts it, as (smallest of a run, of all samples);
-        ``worst_seed`` and ``worst_path`` of the largest distance, and ``worst_robot`` where seeds draw it; ``guard``: interventions of all runs;
+        ``worst_seed`` and ``worst_path`` of the largest distance, and ``worst_robot`` where seeds draw it;
+        ``guard``: interventions of all runs;
         ``failures``: runs that broke off.
     """
     done = [row for row in rows if row["failure"] is None]

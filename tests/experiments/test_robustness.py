@@ -76,6 +76,8 @@ def test_worst_and_median_are_taken_over_the_runs_that_came_to_their_end():
     assert [lap["max_norm_mm"] for lap in result["laps"]] == [(5.0, 4.0), (3.0, 2.0)]
     assert result["static_mm"] == pytest.approx((0.3, 0.2))
     assert (result["worst_seed"], result["guard"]) == (2, 6)
+    assert "worst_robot" not in result
+    assert judged([row(1, [3.0]) | {"robot": "ur10"}])["worst_robot"] == "ur10"
     assert result["failures"] == ["seed 4, circle: ran away"]
 
 
