@@ -14,6 +14,7 @@ _STILL = 0.1  # of that width, below which a motor may hang in its friction
 _FORGOTTEN = 0.1  # s, in which what it was off by then has fallen to a third
 _WINDS = 0.5  # s, longer at rest than that, steps of an encoder may be taken for it
 _MOST_PERIODS = 1.5  # by which torques are sent ahead or held back
+_NOT_GIVEN = (0, 9)  # torques that nobody gives: what a plan needs, and loads that drives do not hold
 
 
 @compiled
@@ -179,7 +180,7 @@ def _filter(step, z, last, w):
 
 @inner
 def _missing(z, beta, i):
-    """The following error of a joint by all torques that nobody gives it, of those by their parameters."""
+    """The following error of a joint by the torques that nobody gives, `_NOT_GIVEN`."""
     return z[0, 1] + z[9, 1] * beta[54 + i]
 
 
@@ -255,8 +256,11 @@ def command(drives, arm, masses, memory, motion, loads, mass, limits, out, filte
             for gains in range(4):
                 memory.z[gains, :, i, 0] = w / drives.ki[gains, i]
         else:
-            for gains in range(4):
-                _filter(drives.step[gains, i], memory.z[gains, :, i], last, w)
+            _filter(drives.step[0, i], z, last, w)
+            for gains in range(1, 4):
+                for k in _NOT_GIVEN:
+                    own = slice(k, k + 1)
+                    _filter(drives.step[gains, i], memory.z[gains, own, i], last[own], w[own])
         if not drives.takes_torque:
             integral, e = z[0, 0], z[0, 1]
             filtered[60 + i] = (needed - drives.kp[i] * e - drives.ki[0, i] * integral) / drives.kd[i]
