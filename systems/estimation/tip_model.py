@@ -41,8 +41,8 @@ class Spread:
     bearing: float = 0.5  # the same of a bearing
     payload: float = 0.5  # kg, of a robot that carries 7 kg; of a larger one in proportion
     payload_centre: float = 0.015  # m
-    clock: float = 2e-2  # s, between the stamps of the camera and those of the joints
-    clock_drift: float = 3e-4  # s/s, by which that changes
+    clock: float = 5e-3  # s, between the stamps of the camera and those of the joints
+    clock_drift: float = 1e-4  # s/s, by which that changes: crystals differ by tens of ppm
     gear_error: float = (
         0.0  # rad, of a gear's waves, gap and hysteresis; 5e-5 is a good guess where there are
     )

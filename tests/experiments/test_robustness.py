@@ -39,12 +39,10 @@ def test_a_mixture_is_a_scenario_and_the_same_whenever_its_seed_is_drawn():
     for name in ("dead_time", "command_delay"):
         assert len({getattr(each.station.drive, name) for each in loaded}) >= 4
     # Some controllers are told of their dead time to 3 ms, some not at all.
-    late = [
-        scenario.station.drive.command_delay
-        + scenario.station.drive.dead_time
-        - scenario.servo.model.command_delay
-        for scenario in loaded
-    ]
+    late = []
+    for station, model in ((each.station, each.servo.model) for each in loaded):
+        assert model.command_delay is not None
+        late.append(station.drive.command_delay + station.drive.dead_time - model.command_delay)
     assert min(late) == pytest.approx(3e-3)
     assert max(late) > 0.1
 
