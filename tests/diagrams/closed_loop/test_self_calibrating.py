@@ -319,7 +319,8 @@ def test_a_camera_clock_that_drifts_is_learnt_before_it_matters(seed, drift):
     assert tip_errors(log)[0].max() < 0.06e-3
     assert log.learnt is not None
     assert not log.learnt["events"]
-    assert log.learnt["clock_drift_ppm"] == pytest.approx(-drift, rel=0.1, abs=15.0)  # of what corrects the stamps
+    # Of what corrects the stamps
+    assert log.learnt["clock_drift_ppm"] == pytest.approx(-drift, rel=0.1, abs=15.0)
 
 
 @pytest.mark.slow
