@@ -25,7 +25,7 @@ from systems.estimation.memory import Layout
 _FILTERED = 11
 # Factors of the gains of position and of the integral that are believed, and of others that drives may have
 _GAINS = ((1.0, 1.0), (1.0, 0.5), (1.0, 2.0), (0.6, 1.0))
-# Of each torque, of a planner, of what is late beside the plan, and of the first torque with other gains
+# Of each torque, of a planner, of what is late beside the plan, and of what nobody gives with other gains
 COLUMNS = 6 * (_FILTERED + 1 + len(_GAINS))
 _VISCOUS, _COULOMB, _HUMPS, _CONSTANTS = slice(14, 37, 4), slice(15, 37, 4), slice(16, 37, 4), slice(37, 43)
 DEAD_TIME, MASS, MOMENT, SMOOTHED = 0, 43, slice(44, 47), 47

@@ -13,6 +13,7 @@ from systems.estimation.drives.drive_model import (
     MASS,
     MOMENT,
     NOT_HELD,
+    OTHER_GAINS,
     SHARP,
     SIZE,
     SMOOTHED,
@@ -112,6 +113,15 @@ def test_gains_that_nobody_told_are_learnt_where_drives_take_no_torques(position
         left[k] = behind[k] - memory.correction
         model.learn(memory, model.features(*instant[1:], columns), behind[k])
     assert (left[-500:].std(axis=0) < 0.15 * behind[-500:].std(axis=0)).all()
+
+
+def test_with_torques_other_gains_show_by_a_load_alone_that_drives_do_not_hold():
+    model, memory = drives()
+    memory.beta[NOT_HELD] = memory.led[0, NOT_HELD] = 7.0
+    shown = [model.command(memory, motion(k * PERIOD), LOADS, 7.0).columns for k in range(50)]
+    last = model.features(*motion(49 * PERIOD)[1:], shown[-1])
+    weighed = slice(1, 5)  # joints that a load turns
+    assert np.abs(last[weighed, OTHER_GAINS]).min() > 0.0
 
 
 @pytest.mark.parametrize(
