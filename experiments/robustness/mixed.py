@@ -26,6 +26,8 @@ ROBOTS = (
     "puma560",
 )
 _LOAD, _MODEL = "station.payload", "servo.model.payload"
+# Where a robot of 2.7 m is off by half as much again as others, its tip is beyond the 0.1 m of the guard
+_OF_LARGE_ROBOTS = "servo.laws.self_calibrating.correction_limit=0.3"
 
 
 @dataclass(frozen=True)
@@ -40,12 +42,9 @@ def mixture(seed: int) -> Mixture:
     """What a seed draws, always the same."""
     draw = _Draw(seed)
     robot = draw.one_of(*ROBOTS)
-    return Mixture(
-        robot,
-        tuple(
-            setting for part in (_timing, _camera, _robot, _drives, _load, _path) for setting in part(draw)
-        ),
-    )
+    parts = _timing, _camera, _robot, _drives, _load, _path
+    settings = [setting for part in parts for setting in part(draw)]
+    return Mixture(robot, (*settings, *[_OF_LARGE_ROBOTS] * (robot == "kr210")))
 
 
 class _Draw:

@@ -36,6 +36,7 @@ DEAD_TIME_CHANGED = "dead time changed"
 FOREIGN_FRAME = "camera frame is another"
 CAMERA_MOVED = "camera moved"
 LOAD_UNLIKE_BELIEF = "load unlike belief"  # from the start, by about so much
+GAINS_UNLIKE_BELIEF = "drive gains unlike belief"  # so many times as far motors give way to a torque
 JOINTS_SHIFTED = "joints shifted"  # against their encoders
 TOOL_OR_CAMERA = "tool or camera displaced"  # until the robot has turned the tool far enough to tell
 PATH_UNSEEN = "path needs more than was shown"
@@ -47,6 +48,7 @@ _UNITS = {  # others: m
     FOREIGN_FRAME: "rad",
     JOINTS_SHIFTED: "rad",
     IMPLAUSIBLE: "parameters",
+    GAINS_UNLIKE_BELIEF: "times",
 }
 
 
@@ -64,7 +66,7 @@ class Event(NamedTuple):
     """What happened to the robot."""
 
     kind: str  # one of those above
-    size: float  # m, kg, s or rad, or a number of parameters
+    size: float  # m, kg, s or rad, a number of parameters, or a factor
     error: float  # m, of the tip where it is known
 
 
@@ -83,6 +85,7 @@ class EventLog:
         IMPLAUSIBLE,
         JOINTS_SHIFTED,
         LOAD_UNLIKE_BELIEF,
+        GAINS_UNLIKE_BELIEF,
     )
 
     def __init__(self) -> None:

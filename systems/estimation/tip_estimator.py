@@ -207,7 +207,7 @@ class TipEstimator:
         r, H, gears = model.innovation(self._constants_at(memory, x), x, seen, shapes, since_first)
         weight = 1.0 / (1.0 + (pair.unrest / config.calm) ** 2)
         event, innovations = None, memory.innovations
-        if memory.count[0] <= config.test_after:
+        if memory.count[0] <= config.test_after and since_first <= config.test_at_latest:
             if self._innovations.is_false_start(innovations, r, H, lambda: memory.P @ H.T):
                 return self._look_for_foreign(memory, H)
         else:

@@ -17,4 +17,6 @@ class TipEstimatorConfig:
     relinearise: float = 3e-4  # m or rad, a change of a parameter after which the past is read anew
     geometry_step: float = 1e-4  # m or rad, within which poses are linear in the parameters
     calm: float = 0.05  # m/s^2, of the tip by parameters that are led in: more makes samples count less
-    test_after: int = 250  # samples before events are looked for
+    # Events are looked for after so many samples, and where a camera is slow after so many seconds
+    test_after: int = 250
+    test_at_latest: float = 3.0

@@ -92,7 +92,7 @@ class SelfCalibrating(LeafSystem):
             "planned": (1,),  # the last instant of the plan
             "amplitude": (2, NUM_JOINTS),  # of the probe: knock, oscillations
             "by_knowledge": (1,),  # share of the planned speed, see `Pace.look`
-            "waited": (1,),  # s, by its oscillations for the dead time to be found and followed
+            "waited": (1,),  # s, by its oscillations for dead time and gains to be found and followed
             **learning.arrays,
         }
         self._next = NextCommand(Layout(**arrays))
@@ -253,7 +253,7 @@ class SelfCalibrating(LeafSystem):
         path_start: float,
     ) -> None:
         """Takes note of the samples of a tick at a time in s."""
-        self._learning.hear(memory, time, samples, path_start)
+        self._learning.hear(memory, time, samples, path_start + float(memory.waited[0]))
         seen = (memory.heard.accepted[0], 0.0, memory.heard.newest[0])
         discrete_state.set_value(int(self._outputs[4]), seen)
 
@@ -347,7 +347,7 @@ class SelfCalibrating(LeafSystem):
         """
         instant = time + self._learning.delay.step(memory.delay, float(memory.planned[0]))
         path_start = reference.path.path_start
-        delay, coming = memory.delay, memory.next
+        delay, coming, drives = memory.delay, memory.next, memory.drives
         is_steady = delay.delay[0] == delay.target[0]
         moment = reference.moment(instant, float(delay.delay[0]) if is_steady else 0.0)
         if position is not None and not memory.planner.started[0]:
@@ -357,23 +357,19 @@ class SelfCalibrating(LeafSystem):
             memory.planned[0] = instant - self.period
             memory.first[0] = instant
             memory.amplitude[:] = self._probe.amplitude(position, J, path_start - instant)
-            if not memory.amplitude.any():
-                memory.delay.known[0] = 1.0  # nothing will show it
+            self._learning.begin(memory, self._probe.shown(path_start - instant))
         lead, since_start = memory.lead, time - memory.start_time[0]
         found = self.estimator.x_robot(memory.estimator)
         x = self.tip_model.plausible(found)
         self._lead.step(lead, x, memory.columns, self.period)
         self._learning.note_implausible(memory, time, int(np.count_nonzero(x != found)))
         first, last = memory.first[0], memory.planned[0]
-        if not self._learning.delay.is_settled(delay, instant):
-            memory.waited[0] = self._probe.waited(instant - first, float(memory.waited[0]))
-        waited = float(memory.waited[0])
+        waited = self._learning.wait(memory, instant, self._probe, path_start)
         aside = self._probe.at(instant - first, path_start - first, memory.amplitude, waited)
         wanted = Wanted(moment.X_WE, moment.V_WE, aside)
         plan = self._planner.step(memory.planner, (lead.x, lead.rate), wanted, since_start, instant - last)
         memory.columns[:] = plan.columns[:, 18:]
         motion = plan.theta, plan.velocity, plan.acceleration
-        drives = memory.drives
         command = self._drives.command(drives, motion, plan.on_motors, self._model.payload)
         is_starting = since_start < _STARTING and np.abs(memory.planner.start_error).max() > 1e-3
         unrest = 0.0 if self._learning.delay.is_settled(memory.delay, instant) and not is_starting else UNREST
@@ -385,6 +381,8 @@ class SelfCalibrating(LeafSystem):
             lead.unrest + unrest,
             command.columns,
             drives.correction,
+            command.torques.ravel(),
+            command.position - plan.theta,
             plan.states,
         )
         np.concatenate(row, out=coming.row.all)

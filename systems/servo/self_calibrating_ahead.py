@@ -35,6 +35,8 @@ def _renewed(memory: SimpleNamespace) -> list[np.ndarray]:
         drives.correction,
         drives.led.ravel(),
         drives.smoothed,
+        drives.gains.all,
+        drives.coming.all,
         delay.delay,
         delay.rate,
         delay.settled,
@@ -110,6 +112,7 @@ class Pace:
         if path_time < path_start - _BEFORE_PATH:
             return 1.0
         is_probing = path_time + memory.waited[0] > instant + self._period
+        is_probing |= bool(memory.drives.coming.factors.any())  # it will begin anew
         if path_time < path_start and (is_probing or not memory.delay.known[0]):
             return 0.0
         if self._awaits_camera(memory, path_time, time):

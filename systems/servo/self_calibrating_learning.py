@@ -8,10 +8,12 @@ from robots.description.model import NUM_JOINTS
 from systems.controller_model import ControllerModel
 from systems.estimation import kernels
 from systems.estimation.drives.dead_time import CommandDelay
-from systems.estimation.drives.drive_model import COLUMNS, DriveModel
+from systems.estimation.drives.drive_model import COLUMNS, LATE, DriveModel
 from systems.estimation.drives.encoder_steps import EncoderSteps
+from systems.estimation.drives.gain_search import TORQUES
 from systems.estimation.events import (
     DEAD_TIME_CHANGED,
+    GAINS_UNLIKE_BELIEF,
     IMPLAUSIBLE,
     LOAD_CHANGED,
     LOAD_UNLIKE_BELIEF,
@@ -21,6 +23,7 @@ from systems.estimation.events import (
 from systems.estimation.gear_errors import NUM_STATES
 from systems.estimation.kernels.arrays import Ring
 from systems.estimation.memory import History, Layout
+from systems.estimation.probing.probe import Probe
 from systems.estimation.tip_estimator import TipEstimator
 from systems.estimation.tip_model import Pair, TipModel
 from systems.samples import JointSample, PoseSample
@@ -33,14 +36,15 @@ _UPSET_PAUSE = 0.3  # s without learning after it, so that the drives come to re
 _LONGEST_PAUSE = 0.6  # s, after which what is left has to be learnt
 _CALM_AGAIN = 1.0  # s after an upset before there can be another one
 _LOOKED_AT, _LEAST_CHANGE = 250, 0.3  # samples since an upset, until a mass (kg) is compared with that before
+_MOST_GAINS = 2  # times that the probe begins anew because drives have other gains
 _SETTLING = 0.2  # s that the drives take to come to rest after a dead time was corrected
 _ASTRAY = 3e-3  # rad, by which motors may miss their plan before its loads are not those of the robot
 UNREST = 0.5  # m/s^2, while the robot is led onto its plan, or the plan is not where motors are
 _LOOK_EVERY = 5  # ticks, between two searches for the dead time
 _GIVE_UP = 1.6  # s after the start: what is believed of the dead time has to do
 
-# A row of the plan: motors, loads, links, tip, unrest, columns and correction of the drive model,
-# states of the gears.
+# A row of the plan: motors, loads, links, tip, unrest, columns and correction of the drive model, torques of
+# its search for gains, by how much the command is ahead of the plan, states of the gears.
 PLAN = Layout(
     theta=(6,),
     velocity=(6,),
@@ -51,6 +55,8 @@ PLAN = Layout(
     unrest=(1,),
     columns=(COLUMNS,),
     correction=(6,),
+    torques=(len(TORQUES), 6),
+    ahead=(6,),
     states=(NUM_STATES,),
 )
 
@@ -78,6 +84,9 @@ class Learning:
         self.arrays = {
             "estimator": self.estimator.layout,
             "drives": self.drives.layout,
+            "gains": self._gains_layout(),
+            "shown_at": (1,),  # the planned instant at which a probe that does not wait has shown gains
+            "learn_from": (1,),  # s, the planned instant from which on motors show what their drives are
             "plan": self.plan.layout,
             "encoders": self.encoders.layout,
             "steps": self.steps.layout,  # of the encoders
@@ -103,12 +112,17 @@ class Learning:
             "implausible": (1,),  # the most parameters that were beyond all bounds so far
         }
 
+    def _gains_layout(self) -> Layout:
+        """Of the search for gains: how often was looked, and others were taken."""
+        drives = self.drives
+        return Layout(search=drives.search.layout, looks=(1,), taken=(1,)) if drives.finds_gains else Layout()
+
     def start(self, memory: SimpleNamespace) -> None:
         """Writes what is known before the first sample."""
         self.estimator.start(memory.estimator)
         self.drives.start(memory.drives)
         self.steps.start(memory.steps)
-        memory.upset_at[0] = memory.paused_until[0] = -np.inf
+        memory.upset_at[0] = memory.paused_until[0] = memory.learn_from[0] = -np.inf
         memory.heard.newest[0] = memory.heard.accepted[0] = memory.heard.joints[0] = -np.inf
         self.delay.start(memory.delay, self._model.command_delay)
 
@@ -155,7 +169,8 @@ class Learning:
                 if event is not None:
                     self.events.note(memory.events, time, event)
                     if event.kind == LOAD_UNLIKE_BELIEF:
-                        self.drives.widen(memory.drives, is_told_otherwise=True)
+                        is_on_path = time > heard.path_start[0]
+                        self.drives.widen(memory.drives, is_told_otherwise=True, is_on_path=is_on_path)
                 self._note_load(memory)
                 heard.accepted[0] = time
         self.estimator.work(memory.estimator)
@@ -225,11 +240,64 @@ class Learning:
             if instant > newest + 1e-9:
                 break
             memory.compared[0] = k + 1
+            memory.passed.all[:] = plan.rows[k % self.plan.length]
+            if self._asks_for_gains(memory):
+                self.drives.search.follow(memory.gains.search, memory.passed.torques)
             if instant < first or not self.delay.is_settled(memory.delay, instant):
                 continue
             actual = self.encoders_at(memory, instant)
-            if actual is not None:
-                self._learn_drives(memory, instant, plan.rows[k % self.plan.length], actual)
+            if actual is None:
+                continue
+            if self._asks_for_gains(memory):
+                self._look_for_gains(memory, instant, actual)
+            if instant > memory.learn_from[0]:
+                self._learn_drives(memory, instant, actual)
+
+    def _look_for_gains(self, memory: SimpleNamespace, instant: float, actual: np.ndarray) -> None:
+        """Holds the instant that has just passed against drives with other gains; after a probe, decides."""
+        row, gains, search = memory.passed, memory.gains, self.drives.search
+        smoothed, rate = row.columns.reshape(-1, NUM_JOINTS)[LATE]
+        search.add(gains.search, np.array([row.velocity + rate, smoothed]), row.theta + row.ahead - actual)
+        if instant < memory.shown_at[0] + memory.waited[0]:
+            return
+        gains.looks[0] += 1.0
+        found = search.find(gains.search, *memory.drives.gains.factors)
+        if found and gains.looks[0] <= _MOST_GAINS:
+            self.drives.prepare_gains(memory.drives, found)
+
+    def begin(self, memory: SimpleNamespace, shown: float) -> None:
+        """The robot begins to move; in ``shown`` s most of the probe will be over, if there is one."""
+        memory.shown_at[0], memory.drives.coming.factors[:] = memory.first[0] + shown, 0.0
+        if not memory.amplitude.any():
+            memory.delay.known[0], memory.shown_at[0] = 1.0, np.inf  # nothing will show them
+
+    def wait(self, memory: SimpleNamespace, instant: float, probe: Probe, path_start: float) -> float:
+        """Lets the probe wait for the dead time, and begin anew where drives have other gains.
+
+        Args:
+            memory: of the law.
+            instant: that is planned, s.
+            probe: of the law.
+            path_start: s.
+
+        Returns:
+            How long it has waited, s.
+        """
+        since, until = instant - float(memory.first[0]), path_start - float(memory.first[0])
+        if not self.delay.is_settled(memory.delay, instant):
+            memory.waited[0] = probe.waited(since, float(memory.waited[0]))
+        elif memory.drives.coming.factors.any() and probe.is_over(since - memory.waited[0], until):
+            memory.waited[0] += probe.window(until)[1]
+            size = self.drives.take_gains(memory.drives)
+            self.events.note(
+                memory.events, float(memory.heard.time[0]), Event(GAINS_UNLIKE_BELIEF, size, 0.0)
+            )
+            memory.gains.search.all[:], memory.gains.taken[0] = 0.0, memory.gains.looks[0]
+            memory.learn_from[0] = instant
+        return float(memory.waited[0])
+
+    def _asks_for_gains(self, memory: SimpleNamespace) -> bool:
+        return self.drives.finds_gains and memory.gains.looks[0] == memory.gains.taken[0]
 
     def _open_load(self, memory: SimpleNamespace) -> None:
         """Motors that do what no drive does may carry another load; the camera will say which."""
@@ -259,11 +327,9 @@ class Learning:
     def _mass(self, memory: SimpleNamespace) -> float:
         return float(self.estimator.x(memory.estimator)[self.tip_model.M][0])
 
-    def _learn_drives(
-        self, memory: SimpleNamespace, instant: float, planned: np.ndarray, actual: np.ndarray
-    ) -> None:
+    def _learn_drives(self, memory: SimpleNamespace, instant: float, actual: np.ndarray) -> None:
+        """Learns from the instant that has just passed."""
         drives, row = memory.drives, memory.passed
-        row.all[:] = planned
         motion = row.theta, row.velocity, row.acceleration
         planned_then = motion, row.columns, row.correction
         is_watched, is_paused = instant > memory.heard.path_start[0], np.isfinite(memory.paused_until[0])

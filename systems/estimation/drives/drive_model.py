@@ -1,21 +1,19 @@
 """What the motors make of commands: known up to factors, which their encoders show."""
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from types import SimpleNamespace
 from typing import NamedTuple
 
 import numpy as np
-from pydrake.multibody.plant import MultibodyPlant
-from scipy.linalg import expm
 
 from robots.description.error_parameters import NUM_PARAMETERS
-from robots.description.model import RobotModel
 from robots.dynamics.friction_line import friction_line
-from robots.dynamics.plant import add_robot
 from systems.controller_model import ControllerModel
 from systems.estimation import kernels
 from systems.estimation.arm_geometry import ArmGeometry
 from systems.estimation.arm_loads import ArmLoads
+from systems.estimation.drives.drive_gains import FACTORS, believed_gains, cascade_gains
+from systems.estimation.drives.gain_search import TORQUES, Gains, GainSearch
 from systems.estimation.kernels.arrays import DriveMemory, Drives
 from systems.estimation.memory import Layout
 
@@ -23,15 +21,14 @@ from systems.estimation.memory import Layout
 # the load of a kilogram, and of a kg m of its first moment along x, y, z; a kilogram that is not held; what
 # friction is more than believed where it turns over sharply.
 _FILTERED = 11
-# Factors of the gains of position and of the integral that are believed, and of others that drives may have
-_GAINS = ((1.0, 1.0), (1.0, 0.5), (1.0, 2.0), (0.6, 1.0))
 # Of each torque, of a planner, of what is late beside the plan, and of what nobody gives with other gains
-COLUMNS = 6 * (_FILTERED + 1 + len(_GAINS))
+COLUMNS = 6 * (_FILTERED + 1 + len(FACTORS))
 _VISCOUS, _COULOMB, _HUMPS, _CONSTANTS = slice(14, 37, 4), slice(15, 37, 4), slice(16, 37, 4), slice(37, 43)
 DEAD_TIME, MASS, MOMENT, SMOOTHED = 0, 43, slice(44, 47), 47
 SHARP, NOT_HELD, GIVING = slice(48, 54), slice(54, 60), slice(60, 66)
 OTHER_GAINS = slice(66, 69)
 SIZE = 69
+LATE = slice(9, 11)  # of the columns, six by six: how a planner smooths, and how fast commands leave the plan
 # Of Coulomb's friction, the spread of what there may be more of it; less where it is learnt early, or the
 # first lap of robots without a hump is twisted more
 _HUMP, _EARLY_HUMP = 0.3, 0.1
@@ -50,7 +47,6 @@ _HIDING = 1e-3  # rad, slack of a joint whose following errors have other reason
 _SLACK = 0.3  # of Coulomb's friction, by which it may be off while little is known of it
 _STEEPEST = 0.5  # rad/s, what learning may add to the speed of a joint
 _RESTS = {"cascade": 1e-5, "velocity": 1e-5, "position": 3e-5}  # rad, where a motor rests beside its command
-_AT_ONCE = 0.1  # of a period, in which a drive without a loop of speed gives way
 _LED_IN = 40.0  # rad/s, with which commands follow what was learnt, critically damped
 
 
@@ -89,6 +85,7 @@ class DriveCommand(NamedTuple):
     velocity: np.ndarray  # (6,) rad/s
     torque: np.ndarray  # (6,) N m, joint side, on top of what the drives do for gravity
     columns: np.ndarray  # (96,), what `DriveModel.features` needs of this instant
+    torques: np.ndarray  # (4, 6) N m, what `GainSearch.follow` takes
 
 
 class DriveModel:
@@ -107,7 +104,9 @@ class DriveModel:
     For the same reason they may give way more or less to all that a motion needs, where no torque is sent.
     Nor are the gains of a robot's controller known. A cascade makes G = s / (k_d (s + p) (s + i)) with the
     gain p of its position loop and the inverse i of its integral action time: columns of their own say by
-    what e differs where that is i / 2, 2 i or 0.6 p, for the torques that nobody gives.
+    what e differs where that is i / 2, 2 i or 0.6 p, for the torques that nobody gives; where torques are
+    taken also for what was learnt of rotors and friction. Where they are not and gains are far from what is
+    believed, `GainSearch` finds others, see `prepare_gains` and `take_gains`.
 
     Where drives take torques, these are sent ahead by the dead time that was learnt, as positions are; of
     Coulomb friction, which turns over in an instant, its mean over the period that they will last. Where they
@@ -129,25 +128,24 @@ class DriveModel:
         kind = kind if model.takes_torque else "cascade"
         self._config = config
         payload = min(model.payload, robot.payload.largest_mass)
-        sets = [_gains(robot, payload, _with_factors(config, *each), kind, period) for each in _GAINS]
-        kp, _, kd = sets[0]
+        gains = believed_gains(robot, payload, config, kind, period)
         coulomb, viscous = friction_line(robot)
         self._drives = Drives(
             robot.reflected_inertia,
             viscous,
             coulomb,
             robot.coulomb_velocity,
-            _SLACK * coulomb / kp,
+            _SLACK * coulomb / gains.kp,
             _SLOW,
-            kp,
-            np.array([gains[1] for gains in sets]),
-            kd,
-            np.array([_filter_steps(*gains, period) for gains in sets]),
+            *gains,
             period,
             payload,
             model.takes_torque,
             config.following,
         )
+        self._gains = config.position, config.integral
+        self.finds_gains = not model.takes_torque  # where torques are sent, gains matter little
+        self.search = GainSearch(gains, *self._gains, model.load_scale, period)
         self._hides_sticking = bool((self._drives.slack > _HIDING).any())
         # The arm as the drives know it, which hold it against gravity.
         drawn = ArmGeometry(robot, np.array([], dtype=int))
@@ -159,9 +157,11 @@ class DriveModel:
         spread += [0.0] * 12 + [0.0 if model.takes_torque else _GIVES] * 6 + [_OTHERWISE] * 3
         self._prior = np.diag(np.array(spread) ** 2)
         self._prior[NOT_HELD, NOT_HELD] = self._scale**2 * (_UNTOLD**2 + _UNTOLD_ALONE**2 * np.eye(6))
+        sets = len(FACTORS)
+        gains_layout = Layout(slack=(6,), kp=(6,), ki=(sets, 6), kd=(6,), step=(sets, 6, 2, 4), factors=(2,))
         self.layout = Layout(
             started=(1,),
-            z=(len(_GAINS), _FILTERED, 6, 2),  # integral of e, and e
+            z=(len(FACTORS), _FILTERED, 6, 2),  # integral of e, and e
             w=(_FILTERED, 6),
             beta=(SIZE,),
             led=(2, SIZE),  # beta as commands use it, and its rate
@@ -170,11 +170,16 @@ class DriveModel:
             smoothed=(6,),
             hung=(2, 6),  # rad, by which motors were off when they were slow, fading, and are if they are
             wound=(3, 6),  # of what drives wound up meanwhile: integral and error; for how long, s
+            gains=gains_layout,
+            coming=gains_layout,  # gains that were found and not taken yet; factors of 0: there are none
         )
 
     def start(self, memory: SimpleNamespace) -> None:
         """Writes what is believed before anything moves."""
         memory.P[:] = self._prior
+        gains, drives = memory.gains, self._drives
+        gains.slack[:], gains.kp[:], gains.ki[:], gains.kd[:] = drives.slack, drives.kp, drives.ki, drives.kd
+        gains.step[:], gains.factors[:] = drives.step, 1.0
 
     def command(
         self,
@@ -204,9 +209,10 @@ class DriveModel:
         )
         out, columns = np.empty((3, 6)), np.empty(COLUMNS)
         limits = _LED_IN, _STEEPEST
-        kernels.drives.command(self._drives, *self._held, known, motion, loads, mass, limits, out, columns)
+        drives = self._as_found(memory)
+        kernels.drives.command(drives, *self._held, known, motion, loads, mass, limits, out, columns)
         position, velocity, torque = out
-        return DriveCommand(position, velocity, torque, columns)
+        return DriveCommand(position, velocity, torque, columns, memory.w[_SEARCHED])
 
     def features(self, v: np.ndarray, a: np.ndarray, columns: np.ndarray) -> np.ndarray:
         """Rows of the regression, shape (6, 69), from motion and the filtered torques (96,)."""
@@ -238,7 +244,8 @@ class DriveModel:
         """
         doubt = 0.0 if self._hides_sticking else _DOUBT
         known = memory.hung, memory.P, memory.beta, self._config.following_sigma**2, doubt, most
-        return kernels.drives.look_back(self._drives, planned, correction, columns, actual, *known)
+        drives = self._as_found(memory)
+        return kernels.drives.look_back(drives, planned, correction, columns, actual, *known)
 
     def learn(self, memory: SimpleNamespace, Phi: np.ndarray, y: np.ndarray) -> None:
         """One step of recursive least squares: the motors were y behind a plan without correction, (6,)."""
@@ -270,65 +277,66 @@ class DriveModel:
             P[_DIAGONAL[_VISCOUS], _DIAGONAL[_VISCOUS]] += _VISCOUS_SPREAD**2
             P[_DIAGONAL[_COULOMB], _DIAGONAL[_COULOMB]] += _COULOMB_SPREAD**2
 
-    def widen(self, memory: SimpleNamespace, is_told_otherwise: bool = False) -> None:
+    def widen(
+        self, memory: SimpleNamespace, is_told_otherwise: bool = False, is_on_path: bool = True
+    ) -> None:
         """Load or dead time have changed: constants, payload and dead time are open again.
 
         Args:
             memory: of the layout.
             is_told_otherwise: whether the load that the drives hold may not be as believed either.
+            is_on_path: whether commands must not leap: then they go on as they were learnt meanwhile.
         """
-        P, beta = memory.P, memory.beta
+        P = memory.P
         if is_told_otherwise:
             # Motors were off their plan by that load, which stood in for gains, and friction turned over when
-            # nobody thought it did: but for the dead time all that was learnt until now is forgotten.
-            late, variance = beta[DEAD_TIME], P[DEAD_TIME, DEAD_TIME]
-            beta[:], P[:] = 0.0, self._prior
-            beta[DEAD_TIME], P[DEAD_TIME, DEAD_TIME] = late, variance
+            # nobody thought it did: but for the dead time all that was learnt until now is in doubt.
+            self._doubt(memory, keeps_beta=is_on_path)
         extra = np.zeros(SIZE)
         extra[_CONSTANTS], extra[MASS], extra[DEAD_TIME] = 3e-5, 5.0 * self._scale, 1e-3
         extra[MOMENT] = 5.0 * self._moment  # of 7 kg that are gripped 50 mm away
         P[_DIAGONAL, _DIAGONAL] += extra**2
 
+    def prepare_gains(self, memory: SimpleNamespace, found: Gains) -> None:
+        """Works out what `take_gains` takes."""
+        coming, believed = memory.coming, self._drives
+        position, integral = self._gains[0] * found.position, self._gains[1] * found.integral
+        gains = cascade_gains(believed.kd / found.give, position, integral, believed.period)
+        coming.kp[:], coming.ki[:], coming.kd[:], coming.step[:] = gains
+        coming.slack[:] = believed.slack * believed.kp / gains.kp
+        coming.factors[:] = found.position, found.integral
 
-_DIAGONAL = np.arange(SIZE)
+    def take_gains(self, memory: SimpleNamespace) -> float:
+        """Goes on with other gains, and learns the rest anew. The robot is at rest, as motors then are.
+
+        Returns:
+            How many times as far as believed motors give way to a torque that changes slowly, their mean.
+        """
+        gains = memory.gains
+        gains.all[:] = memory.coming.all
+        memory.coming.factors[:] = 0.0
+        memory.z[..., 0], memory.z[..., 1] = memory.w / gains.ki[:, None], 0.0
+        self._doubt(memory, keeps_beta=False)
+        self.open_low_speeds(memory, is_early=True)
+        return float((self._drives.ki[0] / gains.ki[0]).mean())
+
+    def _doubt(self, memory: SimpleNamespace, keeps_beta: bool) -> None:
+        """Takes back what was learnt but for the dead time, or only how well that is known."""
+        late, variance = memory.beta[DEAD_TIME], memory.P[DEAD_TIME, DEAD_TIME]
+        memory.P[:] = self._prior
+        memory.P[DEAD_TIME, DEAD_TIME] = variance
+        if not keeps_beta:
+            memory.beta[:] = 0.0
+            memory.beta[DEAD_TIME] = late
+
+    def _as_found(self, memory: SimpleNamespace) -> Drives:
+        """What is believed of the drives, with gains as they were found."""
+        if not self.finds_gains:
+            return self._drives
+        gains = memory.gains
+        return self._drives._replace(
+            slack=gains.slack, kp=gains.kp, ki=gains.ki, kd=gains.kd, step=gains.step
+        )
 
 
-def _gains(
-    robot: RobotModel, payload: float, config: DriveModelConfig, kind: str, period: float
-) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Of a following error, its integral and its rate, joint side, (6,) each."""
-    ratio = np.abs(robot.gear_ratio)
-    if kind == "position":
-        kp, ki = config.stiffness * ratio, config.restoring * ratio
-        return kp, ki, _AT_ONCE * period * kp
-    if kind == "velocity":
-        kd = config.braking * ratio
-        return config.held_to_plan * kd, 1e-3 * config.held_to_plan * kd, kd
-    kd = config.velocity * _inertia(robot, payload)
-    return kd * (config.position + config.integral), kd * config.position * config.integral, kd
-
-
-def _inertia(robot: RobotModel, payload: float) -> np.ndarray:
-    """What each motor turns in the straight arm, in kg m^2, (6,)."""
-    plant = MultibodyPlant(0.0)
-    add_robot(plant, robot, "rigid", payload)
-    plant.Finalize()
-    return np.diag(plant.CalcMassMatrix(plant.CreateDefaultContext())).copy()
-
-
-def _with_factors(config: DriveModelConfig, position: float, integral: float) -> DriveModelConfig:
-    return replace(config, position=position * config.position, integral=integral * config.integral)
-
-
-def _filter_steps(kp: np.ndarray, ki: np.ndarray, kd: np.ndarray, period: float) -> np.ndarray:
-    """Of six joints, (6, 2, 4)."""
-    return np.array([_filter_step(*gains, period) for gains in zip(kp, ki, kd, strict=True)])
-
-
-def _filter_step(kp: float, ki: float, kd: float, period: float) -> np.ndarray:
-    """From (integral of e, e, torque, its change in a period) to the first two a period later, (2, 4)."""
-    A = np.zeros((4, 4))
-    A[0, 1] = 1.0
-    A[1] = [-ki / kd, -kp / kd, 1.0 / kd, 0.0]
-    A[2, 3] = 1.0 / period
-    return expm(A * period)[:2]
+_DIAGONAL, _SEARCHED = np.arange(SIZE), list(TORQUES)

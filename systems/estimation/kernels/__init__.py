@@ -11,6 +11,7 @@ from types import ModuleType
 _COMPILED = (
     "dead_time",
     "drives",
+    "gain_search",
     "gears",
     "geometry",
     "history",

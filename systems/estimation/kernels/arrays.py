@@ -125,7 +125,7 @@ class DriveMemory(NamedTuple):
     """What one command hands on to the next."""
 
     started: np.ndarray  # (1,)
-    # Integral of a following error, and the error, of each of eleven torques; of two of them with other gains
+    # Integral of a following error, and the error, of each of eleven torques, with each set of gains
     z: np.ndarray  # (4, 11, 6, 2)
     w: np.ndarray  # (11, 6), those torques; if torques are taken, of the first what changes evenly
     beta: np.ndarray  # (69,), parameters of the regression

@@ -14,7 +14,6 @@ _STILL = 0.1  # of that width, below which a motor may hang in its friction
 _FORGOTTEN = 0.1  # s, in which what it was off by then has fallen to a third
 _WINDS = 0.5  # s, longer at rest than that, steps of an encoder may be taken for it
 _MOST_PERIODS = 1.5  # by which torques are sent ahead or held back
-_NOT_GIVEN = (0, 9)  # torques that nobody gives: what a plan needs, and loads that drives do not hold
 
 
 @compiled
@@ -180,8 +179,17 @@ def _filter(step, z, last, w):
 
 @inner
 def _missing(z, beta, i):
-    """The following error of a joint by the torques that nobody gives, `_NOT_GIVEN`."""
+    """The following error of a joint by the torques that nobody gives."""
     return z[0, 1] + z[9, 1] * beta[54 + i]
+
+
+@inner
+def _learnt(z, beta, i):
+    """The following error of a joint by what has been learnt of its rotor and friction."""
+    total = z[10, 1] * beta[48 + i]
+    for k in range(4):
+        total += z[1 + k, 1] * beta[13 + 4 * i + k]
+    return total
 
 
 @inner
@@ -258,9 +266,7 @@ def command(drives, arm, masses, memory, motion, loads, mass, limits, out, filte
         else:
             _filter(drives.step[0, i], z, last, w)
             for gains in range(1, 4):
-                for k in _NOT_GIVEN:
-                    own = slice(k, k + 1)
-                    _filter(drives.step[gains, i], memory.z[gains, own, i], last[own], w[own])
+                _filter(drives.step[gains, i], memory.z[gains, :, i], last, w)
         if not drives.takes_torque:
             integral, e = z[0, 0], z[0, 1]
             filtered[60 + i] = (needed - drives.kp[i] * e - drives.ki[0, i] * integral) / drives.kd[i]
@@ -272,7 +278,10 @@ def command(drives, arm, masses, memory, motion, loads, mass, limits, out, filte
         last[10], filtered[66 + i] = w[10], z[10, 1]
         filtered[72 + i] = missing = _missing(z, led, i)
         for k in range(3):
-            filtered[78 + 6 * k + i] = _missing(memory.z[1 + k, :, i], led, i) - missing
+            other = memory.z[1 + k, :, i]
+            filtered[78 + 6 * k + i] = _missing(other, led, i) - missing
+            if drives.takes_torque:
+                filtered[78 + 6 * k + i] += _learnt(other, led, i) - _learnt(z, led, i)
         if not drives.takes_torque:
             settled = a[i] / drives.following
             memory.smoothed[i] = settled + fading * (memory.smoothed[i] - settled)

@@ -14,6 +14,7 @@ _KNOCK_BEGIN, _KNOCK_LENGTH = 0.15, 0.4  # s
 _KNOCK_SIZE = np.array([0.01, 0.01, 0.01, 0.03, 0.03, 0.03])  # rad
 _INSTANTS = np.linspace(0.0, 1.0, 59)  # of the window, at which limits are looked at
 _NOT_YET = 0.02  # s before they begin, where oscillations wait: no tick passes over that
+_MOSTLY = 0.8  # of the window, after which oscillations are small and those that were are seen
 _SHORTEST = 0.5  # s, a window in which it is worth while to move
 _AMPLITUDE = np.array([0.19, 0.19, 0.19, 0.5, 0.5, 0.5])  # rad
 _EXCURSION = 0.125  # m
@@ -159,6 +160,15 @@ class Probe:
         """How long oscillations that may not begin yet have waited at a time in s; once begun they go on."""
         until = self._config.begin - _NOT_YET
         return max(waited, time - until) if time - waited <= self._config.begin else waited
+
+    def shown(self, path_start: float) -> float:
+        """When most of the oscillations is over if they do not wait, s."""
+        begin, length = self.window(path_start)
+        return begin + _MOSTLY * length
+
+    def is_over(self, time: float, path_start: float) -> bool:
+        """Whether oscillations are, at a time in s that they have not waited."""
+        return time >= sum(self.window(path_start))
 
     def at(self, time: float, path_start: float, amplitude: np.ndarray, waited: float = 0.0) -> np.ndarray:
         """Displacement of the joints in rad and its two derivatives at a time in s, (3, 6).

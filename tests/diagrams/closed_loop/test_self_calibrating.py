@@ -6,6 +6,8 @@ import pytest
 from diagrams.runs.simulation import Experiment, run
 from diagrams.scenario.scenario import load_scenario
 from experiments.cli.prepare import prepare
+from experiments.metrics.laps import lap_metrics
+from experiments.metrics.run_metrics import pose_errors
 from robots.pose import pose_error
 from systems.estimation.drives.drive_model import DEAD_TIME
 
@@ -278,6 +280,37 @@ def test_a_load_of_which_the_robot_alone_was_not_told_is_made_up_for(interface, 
     assert on_path.max() < allowed  # 0.3 mm and more if the drives are believed to hold it
     assert at_rest.max() < 0.005e-3
     assert not any(log.guard_counts.values())
+
+
+@pytest.mark.slow
+def test_gains_of_drives_that_nobody_knows_are_found_where_no_torques_are_taken():
+    """A robot's own controller gives way five times as far as believed; else the tip is 0.9 mm off."""
+    cascade = zip(("velocity", "position", "integral"), (60, 15, 5), strict=True)
+    soft = [f"station.drive.cascade.{name}={value}" for name, value in cascade]
+    drawn = [f"{name}=3000" for name in ("seed", "station.errors.random.seed", "station.variation.seed")]
+    log = run(load_scenario("everything", ["station.interface=egm", *soft, *drawn]), "self_calibrating")
+    laps = lap_metrics(log, pose_errors(log, "true"))
+    assert log.learnt is not None
+    (event,) = log.learnt["events"]
+    assert event["kind"] == "drive gains unlike belief"
+    assert event["size"] == pytest.approx(100 / 60 * 25 / 15 * 10 / 5, rel=0.2)  # times as far
+    assert log.path_start > 6.5  # s: the probe has begun anew, and the path has waited for it
+    assert laps[0]["max_norm_mm"] < 0.08
+    assert tip_errors(log)[1].max() < 0.005e-3
+    assert not any(log.guard_counts.values())
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", [3000, 3001])
+def test_a_tool_that_is_displaced_before_a_slow_camera_is_no_load(seed):
+    drawn = [f"{name}={seed}" for name in ("seed", "station.errors.random.seed", "station.variation.seed")]
+    knocked = "station.events=[!ToolShift {at: 6, shift_mm: [0.29, 0.29, 0.29]}]"
+    settings = [*drawn, knocked, "station.camera.period=0.0333"]
+    log = run(load_scenario("everything", settings), "self_calibrating")
+    errors = np.linalg.norm(pose_error(log.X_WE_desired, log.X_WE_true)[:, 3:], axis=1)
+    assert errors[log.time > 7.0].max() < 0.1e-3  # 0.7 mm for seconds if it is taken for a load
+    assert log.learnt is not None
+    assert not [event for event in log.learnt["events"] if "load" in event["kind"]]
 
 
 @pytest.mark.slow

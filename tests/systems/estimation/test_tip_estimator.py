@@ -143,6 +143,25 @@ def test_a_displaced_tool_is_seen_and_learnt(shift):
     assert np.linalg.norm(left[3:]) < 40e-6
 
 
+def test_of_a_slow_camera_samples_are_judged_after_some_seconds_not_after_so_many_samples():
+    """Thirty samples a second: after 250 of them a robot would have been at work for long."""
+    session = Session(3, test_after=250)
+    while session.time < 4.0:
+        session.time += 1.0 / 30.0
+        pair = session.arm.pair(session.time, size=0.1)._replace(time=session.time)
+        session.estimator.add(session.memory, pair)
+        session.estimator.work(session.memory)
+    assert session.memory.count[0] < 120
+    # Where it has been all the time a millimetre is no error of the estimate.
+    count, pair = session.memory.count[0], pair._replace(time=session.time + 1.0 / 30.0)
+    reflected = pair.X_WE.copy()
+    reflected[:3, 3] += 1e-3
+    session.estimator.add(session.memory, pair._replace(X_WE=reflected))
+    assert session.memory.count[0] == count  # an outlier
+    session.estimator.add(session.memory, pair)
+    assert session.memory.count[0] == count + 1
+
+
 def test_a_step_is_seen_though_what_its_first_samples_said_is_being_led_in():
     session = Session(3)
     session.learn(3.0)

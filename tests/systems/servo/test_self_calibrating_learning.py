@@ -7,7 +7,7 @@ from systems.controller_model import ControllerModel
 from systems.estimation.drives.drive_model import MASS
 from systems.estimation.memory import Layout
 from systems.servo.self_calibrating_config import SelfCalibratingConfig
-from systems.servo.self_calibrating_learning import PLAN, Learning
+from systems.servo.self_calibrating_learning import Learning
 
 PERIOD = 4e-3
 FAR = np.full(6, 1e-2)  # rad, further behind the plan than drives get on their own
@@ -21,7 +21,7 @@ def test_what_is_believed_is_opened_once_by_a_change_that_lasts():
     learning.start(memory)
     variance = []
     for k in range(round(0.9 / PERIOD)):
-        learning._learn_drives(memory, 1.0 + k * PERIOD, np.zeros(PLAN.size), FAR)
+        learning._learn_drives(memory, 1.0 + k * PERIOD, FAR)
         variance.append(memory.drives.P[MASS, MASS])
     steps = np.diff(variance)
     assert np.count_nonzero(steps > 1.0) == 1  # kg^2; motors that stand show nothing of the mass

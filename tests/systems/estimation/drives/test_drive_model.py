@@ -324,6 +324,8 @@ def test_friction_is_learnt_anew_where_the_load_was_another_one():
     model.widen(memory)
     assert memory.beta[friction].all()
     model.widen(memory, is_told_otherwise=True)
+    assert memory.beta[friction].all()  # on the path commands must not leap
+    model.widen(memory, is_told_otherwise=True, is_on_path=False)
     assert not memory.beta[friction].any()
     assert not memory.P[SHARP].any()
     assert not memory.P[friction, 0].any()

@@ -42,6 +42,19 @@ def test_oscillations_that_have_to_wait_begin_later_and_are_the_same():
     )
 
 
+def test_oscillations_can_begin_anew_once_they_are_over():
+    probe = Probe(load_robot("irb1200"), ProbeConfig())
+    size, (begin, length) = probe.amplitude(HOME, JACOBIAN, PATH_START), probe.window(PATH_START)
+    assert begin < probe.shown(PATH_START) < begin + length
+    assert not probe.is_over(begin + length - 1e-3, PATH_START)
+    assert probe.is_over(begin + length, PATH_START)
+    again, first = (
+        probe.at(begin + length + 0.7 - (length - waited), PATH_START, size, waited)
+        for waited in (length, 0.0)
+    )
+    np.testing.assert_array_equal(again, first)
+
+
 def test_it_keeps_to_joint_limits_and_to_the_excursion_of_the_tip():
     robot = load_robot("irb1200")
     probe = Probe(robot, ProbeConfig(largest_excursion=0.05))
