@@ -176,6 +176,8 @@ class SelfCalibrating(LeafSystem):
             self.estimator.add(memory.estimator, pair._replace(X_WE=X_WE))
         self._learning.steps.hear(memory.steps, q)
         self._learning.delay.search.rehearse(memory.delay.search)
+        if self._drives.finds_gains:
+            self._drives.search.rehearse(memory.gains.search)
         for time in (0.0, 1.0):
             self._learning.encoders.append(memory.encoders, time, np.concatenate((q, still)))
             self._learning.plan.append(memory.plan, time, memory.passed.all)

@@ -32,6 +32,14 @@ def main() -> None:
     parser.add_argument("--seeds", type=int, default=3, help="robots of each name")
     parser.add_argument("--first-seed", type=int, default=1)
     parser.add_argument("--egm", action="store_true", help="behind a planner as that of EGM, without torques")
+    parser.add_argument(
+        "--gains",
+        type=float,
+        nargs=3,
+        default=(Drives.position, Drives.speed, Drives.integral),
+        metavar=("POSITION", "SPEED", "INTEGRAL"),
+        help="of the drives, 1/s, which the law takes for 25, 100 and 10",
+    )
     parser.add_argument("--bending", type=float, default=0.0, help="of links, over that of their bearings")
     parser.add_argument(
         "--friction-time",
@@ -45,7 +53,9 @@ def main() -> None:
     if options.friction_time < 2.0 * STEP:
         parser.error(f"--friction-time must be two steps of {STEP} s or more, got {options.friction_time}")
     wrong = Wrong(bending=options.bending, friction_time=options.friction_time)
-    drives = Drives(planner=20.0 if options.egm else 0.0)
+    if min(options.gains) <= 0.0:
+        parser.error(f"--gains must be positive, got {' '.join(f'{gain:g}' for gain in options.gains)}")
+    drives = Drives(*options.gains, planner=20.0 if options.egm else 0.0)
     jobs = [
         CellRun(robot, seed, path, wrong, drives)
         for robot in options.robots.split(",")

@@ -77,6 +77,13 @@ class GainSearch:
         memory.samples[0] += 1.0
         kernels.gain_search.add(memory.z, late, left, behind, memory.A, memory.b, memory.square)
 
+    def rehearse(self, memory: SimpleNamespace) -> None:
+        """Has everything compiled that ticks need, on memory that nobody uses."""
+        nothing = np.zeros((len(TORQUES), 6))
+        for _ in range(2):
+            self.follow(memory, nothing)
+        self.add(memory, nothing[:2], nothing[0])
+
     def find(self, memory: SimpleNamespace, position: float, integral: float) -> Gains | None:
         """The gains, if others fit far better than the present ones, whose factors are given."""
         A = memory.A + np.tril(memory.A, -1).swapaxes(-1, -2)

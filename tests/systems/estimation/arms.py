@@ -1,9 +1,12 @@
-"""A robot of which everything is wrong, and what a camera and encoders say of it."""
+"""A robot of which everything is wrong, what camera and encoders say of it, and who hears that."""
 
 import numpy as np
 
 from robots.description.model import load_robot
+from robots.pose import pose_error
 from systems.controller_model import ControllerModel
+from systems.estimation.tip_estimator import TipEstimator
+from systems.estimation.tip_estimator_config import TipEstimatorConfig
 from systems.estimation.tip_model import Pair, Spread, TipModel, moved
 
 PERIOD = 1e-2  # s, between two pairs
@@ -58,3 +61,41 @@ class MovingArm:
             found = model.predict_anew(self._constants, x, (theta[None], found.gears), *rest)
         X_WE = moved(found.X_WE, (noise * CAMERA * self._noise.normal(size=6))[None])[0]
         return Pair(theta, loads[0], np.concatenate((v, a)), twist[0], X_WE, states=states)
+
+
+class Session:
+    """An estimator with its memory, fed by an arm."""
+
+    def __init__(self, seed: int, **config) -> None:
+        self.model = tip_model()
+        self.arm = MovingArm(self.model, true_unknowns(self.model, seed), seed)
+        self.estimator = TipEstimator(self.model, TipEstimatorConfig(**{"test_after": 100, **config}))
+        self.memory = self.estimator.layout.view(np.zeros(self.estimator.layout.size))
+        self.estimator.start(self.memory)
+        self.time, self.events = 0.0, []
+
+    def learn(self, duration: float, size: float = 0.6, change=None, noise: float = 1.0) -> None:
+        for _ in range(round(duration / PERIOD)):
+            self.time += PERIOD
+            pair = self.arm.pair(self.time, size, noise)
+            event = self.estimator.add(self.memory, change(pair) if change else pair)
+            self.events += [event] if event else []
+            self.estimator.work(self.memory)
+
+    def error(self, seen: bool = False) -> float:
+        """The largest error of the tip in m: at 40 new configurations, or at those of the last second."""
+        errors = []
+        times = np.linspace(self.time - 1.0, self.time, 20) if seen else np.linspace(20.0, 60.0, 40)
+        for time in times:
+            pair = self.arm.pair(time, noise=0.0)
+            errors.append(pose_error(pair.X_WE, self.estimator.predict(self.memory, pair).X_WE[0])[3:])
+        return float(np.linalg.norm(errors, axis=1).max())
+
+    def squares(self, times: np.ndarray) -> np.ndarray:
+        """The squares of the tip's errors in units of what they are said to be, (n,)."""
+        found = []
+        for time in times:
+            pair = self.arm.pair(time, noise=0.0)
+            error = pose_error(pair.X_WE, self.estimator.predict(self.memory, pair).X_WE[0])
+            found.append(error @ np.linalg.solve(self.estimator.tip_covariance(self.memory, pair), error))
+        return np.array(found)

@@ -4,48 +4,8 @@ import numpy as np
 import pytest
 
 from robots.pose import pose_error
-from systems.estimation.tip_estimator import TipEstimator
-from systems.estimation.tip_estimator_config import TipEstimatorConfig
 from systems.estimation.tip_model import moved
-from tests.systems.estimation.arms import PERIOD, MovingArm, tip_model, true_unknowns
-
-
-class Session:
-    """An estimator with its memory, fed by an arm."""
-
-    def __init__(self, seed: int, **config) -> None:
-        self.model = tip_model()
-        self.arm = MovingArm(self.model, true_unknowns(self.model, seed), seed)
-        self.estimator = TipEstimator(self.model, TipEstimatorConfig(**{"test_after": 100, **config}))
-        self.memory = self.estimator.layout.view(np.zeros(self.estimator.layout.size))
-        self.estimator.start(self.memory)
-        self.time, self.events = 0.0, []
-
-    def learn(self, duration: float, size: float = 0.6, change=None, noise: float = 1.0) -> None:
-        for _ in range(round(duration / PERIOD)):
-            self.time += PERIOD
-            pair = self.arm.pair(self.time, size, noise)
-            event = self.estimator.add(self.memory, change(pair) if change else pair)
-            self.events += [event] if event else []
-            self.estimator.work(self.memory)
-
-    def error(self, seen: bool = False) -> float:
-        """The largest error of the tip in m: at 40 new configurations, or at those of the last second."""
-        errors = []
-        times = np.linspace(self.time - 1.0, self.time, 20) if seen else np.linspace(20.0, 60.0, 40)
-        for time in times:
-            pair = self.arm.pair(time, noise=0.0)
-            errors.append(pose_error(pair.X_WE, self.estimator.predict(self.memory, pair).X_WE[0])[3:])
-        return float(np.linalg.norm(errors, axis=1).max())
-
-    def squares(self, times: np.ndarray) -> np.ndarray:
-        """The squares of the tip's errors in units of what they are said to be, (n,)."""
-        found = []
-        for time in times:
-            pair = self.arm.pair(time, noise=0.0)
-            error = pose_error(pair.X_WE, self.estimator.predict(self.memory, pair).X_WE[0])
-            found.append(error @ np.linalg.solve(self.estimator.tip_covariance(self.memory, pair), error))
-        return np.array(found)
+from tests.systems.estimation.arms import Session
 
 
 def test_four_seconds_of_motion_are_enough():
@@ -119,61 +79,6 @@ def test_what_comes_as_slowly_as_the_robot_moves_is_no_event(seed: int):
     session.learn(4.0)
     assert not session.events
     assert session.error(seen=True) < 50e-6
-
-
-@pytest.mark.parametrize("shift", [0.5e-3, 3e-3])
-def test_a_displaced_tool_is_seen_and_learnt(shift):
-    session = Session(3)
-    session.learn(3.0)
-
-    def displaced(pair):
-        X_WE = pair.X_WE.copy()
-        X_WE[:3, 3] += X_WE[:3, :3] @ np.array([shift, 0.0, 0.0])
-        return pair._replace(X_WE=X_WE)
-
-    session.learn(12 * PERIOD, change=displaced)
-    assert [event.kind for event in session.events] == ["tool or camera displaced"]
-    # The first samples are learnt from before it is clear what they are.
-    assert 0.6 * shift < session.events[0].size < 1.2 * shift
-    session.learn(0.6, change=displaced)
-    assert [event.kind for event in session.events[1:]] == ["tool displaced"]
-    assert session.events[1].size == pytest.approx(shift, rel=0.2)  # twelve sessions gave 0.40 to 0.53 mm
-    pair = displaced(session.arm.pair(session.time, noise=0.0))
-    left = pose_error(pair.X_WE, session.estimator.predict(session.memory, pair).X_WE[0])
-    assert np.linalg.norm(left[3:]) < 40e-6
-
-
-def test_of_a_slow_camera_samples_are_judged_after_some_seconds_not_after_so_many_samples():
-    """Thirty samples a second: after 250 of them a robot would have been at work for long."""
-    session = Session(3, test_after=250)
-    while session.time < 4.0:
-        session.time += 1.0 / 30.0
-        pair = session.arm.pair(session.time, size=0.1)._replace(time=session.time)
-        session.estimator.add(session.memory, pair)
-        session.estimator.work(session.memory)
-    assert session.memory.count[0] < 120
-    # Where it has been all the time a millimetre is no error of the estimate.
-    count, pair = session.memory.count[0], pair._replace(time=session.time + 1.0 / 30.0)
-    reflected = pair.X_WE.copy()
-    reflected[:3, 3] += 1e-3
-    session.estimator.add(session.memory, pair._replace(X_WE=reflected))
-    assert session.memory.count[0] == count  # an outlier
-    session.estimator.add(session.memory, pair)
-    assert session.memory.count[0] == count + 1
-
-
-def test_a_step_is_seen_though_what_its_first_samples_said_is_being_led_in():
-    session = Session(3)
-    session.learn(3.0)
-
-    def displaced(pair):
-        X_WE = pair.X_WE.copy()
-        X_WE[:3, 3] += X_WE[:3, :3] @ np.array([0.5e-3, 0.0, 0.0])
-        return pair._replace(X_WE=X_WE, unrest=0.3)
-
-    session.learn(3 * PERIOD, change=lambda pair: displaced(pair)._replace(unrest=0.0))
-    session.learn(12 * PERIOD, change=displaced)
-    assert [event.kind for event in session.events] == ["tool or camera displaced"]
 
 
 @pytest.mark.parametrize(
