@@ -126,6 +126,9 @@ holder.addEventListener("wheel", event => {
 /* Distances of all laws over time, on a logarithmic scale, above the slider. */
 const canvas = element("course"), pen = canvas.getContext("2d"), cursor = element("cursor");
 let courseKey = "";
+// 120 and not 1.2e+2
+const rounded = (mm, digits) => Number(mm.toPrecision(digits));
+
 function drawCourse() {
   const width = canvas.clientWidth, height = 68, caption = 14, key = [width, isDark.matches, ...laws.map(law => law.isOn)].join();
   const x = i => 8 + (width - 16) * i / Math.max(count - 1, 1);
@@ -147,7 +150,7 @@ function drawCourse() {
     pen.fillStyle = getComputedStyle(document.documentElement).getPropertyValue("--soft");
     pen.font = "11px system-ui, sans-serif";
     pen.textBaseline = "bottom";
-    const ends = `${(10 ** top).toPrecision(2)} mm at the top, ${(10 ** floor).toPrecision(1)} mm at the bottom`;
+    const ends = `${rounded(10 ** top, 2)} mm at the top, ${rounded(10 ** floor, 1)} mm at the bottom`;
     pen.fillText(width < 480 ? `distance: ${ends}` : `distance from the wanted point, ${ends}`, 8, height);
     courseKey = key;
   }
