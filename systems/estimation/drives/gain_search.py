@@ -6,8 +6,9 @@ from typing import NamedTuple
 
 import numpy as np
 
+from robots.description.model import NUM_JOINTS
 from systems.estimation import kernels
-from systems.estimation.drives.drive_gains import DriveGains, cascade_gains
+from systems.estimation.drives.drive_gains import DriveGains, filter_steps
 from systems.estimation.memory import Layout
 
 # What a motion needs; of it what the rotor needs and Coulomb friction; and that of a kilogram
@@ -46,13 +47,14 @@ class GainSearch:
 
     def __init__(self, gains: DriveGains, p: float, i: float, load_scale: float, period: float) -> None:
         """Takes the gains that are believed, p and i of them in 1/s, and the scale of loads."""
-        sets = [cascade_gains(gains.kd, p * factors[0], i * factors[1], period) for factors in _GRID]
-        self._steps = np.array([each.step[0] for each in sets])
-        self._ki = np.array([each.ki[0] for each in sets])
-        self._slowest, self._period = (_GRID * (p, i)).min(axis=1), period
+        poles, n, k = _GRID * (p, i), len(_GRID), len(TORQUES)
+        kd = np.tile(gains.kd, (n, 1))
+        kp, self._ki = kd * poles.sum(axis=1, keepdims=True), kd * poles.prod(axis=1, keepdims=True)
+        steps = filter_steps(kp.ravel(), self._ki.ravel(), kd.ravel(), period)
+        self._steps = steps.reshape(n, NUM_JOINTS, *steps.shape[1:])
+        self._slowest, self._period = poles.min(axis=1), period
         shared = [spread * (load_scale if k == _KILOGRAM else 1.0) for k, spread in _SHARED.items()]
         self._spreads = np.array([*shared, *[*_OWN.values()] * 6])
-        n, k = len(_GRID), len(TORQUES)
         self.layout = Layout(
             samples=(1,),
             started=(1,),
