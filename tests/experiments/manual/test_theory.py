@@ -4,6 +4,7 @@ import importlib
 import re
 from pathlib import Path
 
+import markdown
 import pytest
 
 from experiments.manual.formulas import with_mathml
@@ -68,6 +69,17 @@ def test_what_the_text_names_exists(page: str):
         assert named(path) is not None
     for place in re.findall(r"`(tests/[\w/]+\.py)`", text):
         assert (ROOT / place).is_file(), place
+
+
+@pytest.mark.parametrize("page", [*PAGES, "index"])
+def test_every_formula_can_be_set(page: str):
+    text = (THEORY / f"{page}.md").read_text(encoding="utf-8")
+    assert not re.findall(r"[^\n\x20-\x7e\xa0-\uffff]", text)  # a tab where \tau was meant
+    arithmatex = "pymdownx.arithmatex"
+    html = markdown.markdown(text, extensions=[arithmatex], extension_configs={arithmatex: {"generic": True}})
+    drawn = with_mathml(html)
+    assert "arithmatex" not in drawn
+    assert drawn.count("<math") >= len(formulas(page))
 
 
 def test_the_contents_name_every_page_of_the_theory():
