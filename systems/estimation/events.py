@@ -36,6 +36,7 @@ DEAD_TIME_CHANGED = "dead time changed"
 FOREIGN_FRAME = "camera frame is another"
 CAMERA_MOVED = "camera moved"
 LOAD_UNLIKE_BELIEF = "load unlike belief"  # from the start, by about so much
+PROBE_REPEATED = "probe repeated"  # the tip was known no better than so where the path begins
 GAINS_UNLIKE_BELIEF = "drive gains unlike belief"  # so many times as far motors give way to a torque
 JOINTS_SHIFTED = "joints shifted"  # against their encoders
 TOOL_OR_CAMERA = "tool or camera displaced"  # until the robot has turned the tool far enough to tell
@@ -86,6 +87,7 @@ class EventLog:
         JOINTS_SHIFTED,
         LOAD_UNLIKE_BELIEF,
         GAINS_UNLIKE_BELIEF,
+        PROBE_REPEATED,
     )
 
     def __init__(self) -> None:

@@ -382,7 +382,7 @@ class SelfCalibrating(LeafSystem):
             plan.twist,
             lead.unrest + unrest,
             command.columns,
-            drives.correction,
+            command.beside,
             command.torques.ravel(),
             command.position - plan.theta,
             plan.states,

@@ -17,6 +17,8 @@ _MISSED = 5.0  # samples one after the other that no camera loses by chance: it 
 _LOOK_EVERY = 0.2  # s, between two looks at how well the path ahead is known
 _STEP = 0.85  # from one speed to the next slower one; larger ones make the arm ring
 _CLEARLY = 0.8  # of what a speed allows, before it is gone back to
+_BEGIN = 0.5  # s of the path that have to be known well enough for it to begin
+_PLENTY = 150.0  # samples a second without more noise than believed: what they leave is not for want of more
 _NEXT = 0.3  # s of the path that are looked at while it is; about what is still run while it is slowed
 
 
@@ -29,6 +31,7 @@ def _renewed(memory: SimpleNamespace) -> list[np.ndarray]:
         memory.columns.ravel(),
         memory.planned,
         memory.waited,
+        memory.repeats.all,
         drives.started,
         drives.z.ravel(),
         drives.w.ravel(),
@@ -97,6 +100,7 @@ class Pace:
         """Takes what it asks."""
         self._period, self._config, self._learning = model.period, config, learning
         self._looked_at = max(1, round(_LOOK_EVERY / model.period))
+        self._rate = 1.0 / max(model.period, model.camera_period)  # of a tick one sample is taken
         self._blind_after = _MISSED * max(model.period, model.camera_period)  # s
 
     def share(self, memory: SimpleNamespace, reference: PathAhead, time: float) -> float:
@@ -112,7 +116,8 @@ class Pace:
         if path_time < path_start - _BEFORE_PATH:
             return 1.0
         is_probing = path_time + memory.waited[0] > instant + self._period
-        is_probing |= bool(memory.drives.coming.factors.any())  # it will begin anew
+        # It will begin anew.
+        is_probing |= bool(memory.drives.coming.factors.any() or memory.repeats.sigma[0])
         if path_time < path_start and (is_probing or not memory.delay.known[0]):
             return 0.0
         if self._awaits_camera(memory, path_time, time):
@@ -133,7 +138,10 @@ class Pace:
             reference: the path.
             time: of the tick, s.
         """
-        if self.needs is None or round(time / self._period) % self._looked_at:
+        if self.needs is None:
+            return
+        self._look_at_begin(memory, self.needs, reference.path.path_start)
+        if round(time / self._period) % self._looked_at:
             return
         path_time = reference.path_time(float(memory.planned[0]))
         if path_time < reference.path.path_start - _NEXT:
@@ -147,6 +155,25 @@ class Pace:
             share[0] *= _STEP
         elif beyond * faster < _CLEARLY:
             share[0] = min(1.0, faster)
+
+    def _look_at_begin(self, memory: SimpleNamespace, needs: PathNeeds, path_start: float) -> None:
+        """Once after each probe: whether the first part of the path is known well enough, or it is repeated.
+
+        That helps against noise, with cameras that show little. Where samples are plenty the path shows in no
+        time what they have not shown yet, as after a load that was not told; more of the same motion would
+        only make the estimate surer of what the model is wrong by.
+        """
+        repeats, probe = memory.repeats, self._config.probe
+        is_due = memory.planned[0] >= memory.shown_at[0] + memory.waited[0]
+        if not is_due or repeats.looks[0] > repeats.count[0]:
+            return
+        repeats.looks[0] += 1.0
+        estimator = self._learning.estimator
+        rows = needs.rows_between(path_start, path_start + _BEGIN)
+        sigma = estimator.sigma(memory.estimator, rows)
+        is_wanted = sigma > probe.enough and repeats.count[0] < probe.repeats
+        is_wanted &= self._rate < _PLENTY * estimator.variance_factor(memory.estimator)
+        repeats.sigma[0] = sigma if is_wanted else 0.0
 
     def _awaits_camera(self, memory: SimpleNamespace, path_time: float, time: float) -> bool:
         """Whether the camera has gone blind before it has shown what the path needs next; not for ever."""

@@ -17,6 +17,7 @@ from systems.estimation.events import (
     IMPLAUSIBLE,
     LOAD_CHANGED,
     LOAD_UNLIKE_BELIEF,
+    PROBE_REPEATED,
     Event,
     EventLog,
 )
@@ -40,6 +41,7 @@ _MOST_GAINS = 2  # times that the probe begins anew because drives have other ga
 _SETTLING = 0.2  # s that the drives take to come to rest after a dead time was corrected
 _ASTRAY = 3e-3  # rad, by which motors may miss their plan before its loads are not those of the robot
 UNREST = 0.5  # m/s^2, while the robot is led onto its plan, or the plan is not where motors are
+_DIFFERENCE = 8e-3  # s, between positions from which it is known how motors moved
 _LOOK_EVERY = 5  # ticks, between two searches for the dead time
 _GIVE_UP = 1.6  # s after the start: what is believed of the dead time has to do
 
@@ -54,7 +56,7 @@ PLAN = Layout(
     twist=(6,),
     unrest=(1,),
     columns=(COLUMNS,),
-    correction=(6,),
+    beside=(6,),
     torques=(len(TORQUES), 6),
     ahead=(6,),
     states=(NUM_STATES,),
@@ -71,6 +73,7 @@ class Learning:
     def __init__(self, model: ControllerModel, config: SelfCalibratingConfig) -> None:
         """Builds the parts. Raises what they raise."""
         self._model, self._period = model, model.period
+        self._half = max(1, round(_DIFFERENCE / model.period))
         self.tip_model = TipModel(model, config.estimator.spread)
         self.estimator = TipEstimator(self.tip_model, config.estimator)
         self.drives = DriveModel(model, config.drives, config.drive)
@@ -85,6 +88,7 @@ class Learning:
             "estimator": self.estimator.layout,
             "drives": self.drives.layout,
             "gains": self._gains_layout(),
+            "repeats": Layout(count=(1,), looks=(1,), sigma=(1,)),  # of the probe, see `Pace.look`
             "shown_at": (1,),  # the planned instant at which a probe that does not wait has shown gains
             "learn_from": (1,),  # s, the planned instant from which on motors show what their drives are
             "plan": self.plan.layout,
@@ -105,6 +109,7 @@ class Learning:
             "pair": Layout(theta=(6,), then=PLAN, now=PLAN, X_WE=(4, 4)),  # room for that of an exposure
             "passed": PLAN,  # room for the plan of an instant that has passed
             "first": (1,),  # the first planned instant
+            "off": (2 * self._half + 1, 6),  # rad, by which motors were behind the plan at the last instants
             "compared": (1,),  # how many planned instants encoders have been compared at
             "upset_at": (1,),
             "load": Layout(mass=(1,), time=(1,), samples=(1,)),  # kg and s at an upset, and how many since
@@ -122,6 +127,7 @@ class Learning:
         self.estimator.start(memory.estimator)
         self.drives.start(memory.drives)
         self.steps.start(memory.steps)
+        memory.off[:] = np.nan
         memory.upset_at[0] = memory.paused_until[0] = memory.learn_from[0] = -np.inf
         memory.heard.newest[0] = memory.heard.accepted[0] = memory.heard.joints[0] = -np.inf
         self.delay.start(memory.delay, self._model.command_delay)
@@ -232,26 +238,43 @@ class Learning:
 
     def _compare_drives(self, memory: SimpleNamespace) -> None:
         """Learns from where the motors were at planned instants that have passed."""
-        plan, count = memory.plan, int(memory.plan.count[0])
+        plan, count, off = memory.plan, int(memory.plan.count[0]), memory.off
         newest = memory.encoders.times[(int(memory.encoders.count[0]) - 1) % self.encoders.length]
-        first = memory.first[0] + _FIRST_LEARNT
-        for k in range(max(int(memory.compared[0]), count - self.plan.length), count):
+        for k in range(max(int(memory.compared[0]), count - self.plan.length + self._half), count):
             instant = plan.times[k % self.plan.length]
             if instant > newest + 1e-9:
                 break
             memory.compared[0] = k + 1
-            memory.passed.all[:] = plan.rows[k % self.plan.length]
-            if self._asks_for_gains(memory):
-                self.drives.search.follow(memory.gains.search, memory.passed.torques)
-            if instant < first or not self.delay.is_settled(memory.delay, instant):
-                continue
             actual = self.encoders_at(memory, instant)
-            if actual is None:
-                continue
-            if self._asks_for_gains(memory):
-                self._look_for_gains(memory, instant, actual)
-            if instant > memory.learn_from[0]:
-                self._learn_drives(memory, instant, actual)
+            off[:-1], off[-1] = off[1:], np.nan
+            if actual is not None:
+                off[-1] = plan.rows[k % self.plan.length, :NUM_JOINTS] - actual
+            if k >= self._half:  # how motors moved at an instant is known when the next ones have passed
+                then = (k - self._half) % self.plan.length
+                memory.passed.all[:] = plan.rows[then]
+                self._learn_instant(memory, plan.times[then], off[self._half])
+
+    def _learn_instant(self, memory: SimpleNamespace, instant: float, off: np.ndarray) -> None:
+        """Learns from the instant that has just passed, at which motors were so far behind, rad, (6,)."""
+        needed = self._deviate(memory)
+        if self._asks_for_gains(memory):
+            self.drives.search.follow(memory.gains.search, memory.passed.torques + needed)
+        is_early = instant < memory.first[0] + _FIRST_LEARNT
+        if is_early or not self.delay.is_settled(memory.delay, instant) or np.isnan(off[0]):
+            return
+        actual = memory.passed.theta - off
+        if self._asks_for_gains(memory):
+            self._look_for_gains(memory, instant, actual)
+        if instant > memory.learn_from[0]:
+            self._learn_drives(memory, instant, actual)
+
+    def _deviate(self, memory: SimpleNamespace) -> np.ndarray:
+        """What motors needed beyond their plan, as they moved otherwise, `DriveModel.deviate`."""
+        before, off, behind = memory.off[[0, self._half, -1]]
+        span = self._half * self._period
+        dv = np.nan_to_num((before - behind) / (2.0 * span))
+        da = np.nan_to_num((2.0 * off - before - behind) / span**2)
+        return self.drives.deviate(memory.drives, memory.passed.velocity, dv, da)
 
     def _look_for_gains(self, memory: SimpleNamespace, instant: float, actual: np.ndarray) -> None:
         """Holds the instant that has just passed against drives with other gains; after a probe, decides."""
@@ -286,15 +309,25 @@ class Learning:
         since, until = instant - float(memory.first[0]), path_start - float(memory.first[0])
         if not self.delay.is_settled(memory.delay, instant):
             memory.waited[0] = probe.waited(since, float(memory.waited[0]))
-        elif memory.drives.coming.factors.any() and probe.is_over(since - memory.waited[0], until):
-            memory.waited[0] += probe.window(until)[1]
+        elif probe.is_over(since - memory.waited[0], until):
+            self._repeat_probe(memory, instant, probe.window(until)[1])
+        return float(memory.waited[0])
+
+    def _repeat_probe(self, memory: SimpleNamespace, instant: float, length: float) -> None:
+        """Begins the probe anew, which takes so many s, if it has shown other gains or not enough."""
+        time, sigma = float(memory.heard.time[0]), float(memory.repeats.sigma[0])
+        has_gains = memory.drives.coming.factors.any()
+        if has_gains:
             size = self.drives.take_gains(memory.drives)
-            self.events.note(
-                memory.events, float(memory.heard.time[0]), Event(GAINS_UNLIKE_BELIEF, size, 0.0)
-            )
+            self.events.note(memory.events, time, Event(GAINS_UNLIKE_BELIEF, size, 0.0))
             memory.gains.search.all[:], memory.gains.taken[0] = 0.0, memory.gains.looks[0]
             memory.learn_from[0] = instant
-        return float(memory.waited[0])
+        elif sigma:
+            self.events.note(memory.events, time, Event(PROBE_REPEATED, sigma, sigma))
+        if has_gains or sigma:
+            memory.waited[0] += length
+            memory.repeats.count[0] += 1.0
+            memory.repeats.sigma[0] = 0.0
 
     def _asks_for_gains(self, memory: SimpleNamespace) -> bool:
         return self.drives.finds_gains and memory.gains.looks[0] == memory.gains.taken[0]
@@ -331,7 +364,7 @@ class Learning:
         """Learns from the instant that has just passed."""
         drives, row = memory.drives, memory.passed
         motion = row.theta, row.velocity, row.acceleration
-        planned_then = motion, row.columns, row.correction
+        planned_then = motion, row.columns, row.beside
         is_watched, is_paused = instant > memory.heard.path_start[0], np.isfinite(memory.paused_until[0])
         most = -1.0 if is_paused else _UPSET if is_watched else np.inf
         left = self.drives.look_back(drives, *planned_then, actual, most)

@@ -75,11 +75,11 @@ def _gains(
     if kind == "velocity":
         kd = config.braking * ratio
         return config.held_to_plan * kd, 1e-3 * config.held_to_plan * kd, kd
-    kd = config.velocity * _inertia(robot, payload)
+    kd = config.velocity * straight_inertia(robot, payload)
     return kd * (config.position + config.integral), kd * config.position * config.integral, kd
 
 
-def _inertia(robot: RobotModel, payload: float) -> np.ndarray:
+def straight_inertia(robot: RobotModel, payload: float) -> np.ndarray:
     """What each motor turns in the straight arm, in kg m^2, (6,)."""
     plant = MultibodyPlant(0.0)
     add_robot(plant, robot, "rigid", payload)

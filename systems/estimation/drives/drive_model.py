@@ -12,7 +12,7 @@ from systems.controller_model import ControllerModel
 from systems.estimation import kernels
 from systems.estimation.arm_geometry import ArmGeometry
 from systems.estimation.arm_loads import ArmLoads
-from systems.estimation.drives.drive_gains import FACTORS, believed_gains, cascade_gains
+from systems.estimation.drives.drive_gains import FACTORS, believed_gains, cascade_gains, straight_inertia
 from systems.estimation.drives.gain_search import TORQUES, Gains, GainSearch
 from systems.estimation.kernels.arrays import DriveMemory, Drives
 from systems.estimation.memory import Layout
@@ -84,6 +84,7 @@ class DriveCommand(NamedTuple):
     position: np.ndarray  # (6,) rad
     velocity: np.ndarray  # (6,) rad/s
     torque: np.ndarray  # (6,) N m, joint side, on top of what the drives do for gravity
+    beside: np.ndarray  # (6,) rad, of the position what is beside the plan because of what was learnt
     columns: np.ndarray  # (96,), what `DriveModel.features` needs of this instant
     torques: np.ndarray  # (4, 6) N m, what `GainSearch.follow` takes
 
@@ -132,6 +133,7 @@ class DriveModel:
         coulomb, viscous = friction_line(robot)
         self._drives = Drives(
             robot.reflected_inertia,
+            straight_inertia(robot, payload),
             viscous,
             coulomb,
             robot.coulomb_velocity,
@@ -169,6 +171,7 @@ class DriveModel:
             correction=(6,),
             smoothed=(6,),
             hung=(2, 6),  # rad, by which motors were off when they were slow, fading, and are if they are
+            deviation=Layout(last=(6, 6), z=(6, 6, 2), out=(6, 6)),  # of `deviate`
             wound=(3, 6),  # of what drives wound up meanwhile: integral and error; for how long, s
             gains=gains_layout,
             coming=gains_layout,  # gains that were found and not taken yet; factors of 0: there are none
@@ -207,12 +210,12 @@ class DriveModel:
             memory.hung,
             memory.wound,
         )
-        out, columns = np.empty((3, 6)), np.empty(COLUMNS)
+        out, columns = np.empty((4, 6)), np.empty(COLUMNS)
         limits = _LED_IN, _STEEPEST
         drives = self._as_found(memory)
         kernels.drives.command(drives, *self._held, known, motion, loads, mass, limits, out, columns)
-        position, velocity, torque = out
-        return DriveCommand(position, velocity, torque, columns, memory.w[_SEARCHED])
+        position, velocity, torque, beside = out
+        return DriveCommand(position, velocity, torque, beside, columns, memory.w[_SEARCHED])
 
     def features(self, v: np.ndarray, a: np.ndarray, columns: np.ndarray) -> np.ndarray:
         """Rows of the regression, shape (6, 69), from motion and the filtered torques (96,)."""
@@ -220,12 +223,29 @@ class DriveModel:
         kernels.drives.features(v, a, columns, Phi)
         return Phi
 
+    def deviate(self, memory: SimpleNamespace, v: np.ndarray, dv: np.ndarray, da: np.ndarray) -> np.ndarray:
+        """Goes on by a period to an instant at which motors moved otherwise than planned.
+
+        Args:
+            memory: of the layout.
+            v: planned speeds, rad/s, (6,).
+            dv, da: by how much speeds and accelerations were more, rad/s and rad/s^2, (6,).
+
+        Returns:
+            Torques in N m that this needed beyond those planned, in the order of `TORQUES`, (4, 6).
+        """
+        parts = memory.deviation
+        kernels.drives.deviate(self._as_found(memory), v, dv, da, parts.last, parts.z, parts.out)
+        needed = np.zeros((len(TORQUES), 6))
+        needed[:3] = parts.last[[0, 1, 3]]
+        return needed
+
     def look_back(
         self,
         memory: SimpleNamespace,
         planned: tuple[np.ndarray, np.ndarray, np.ndarray],
         columns: np.ndarray,
-        correction: np.ndarray,
+        beside: np.ndarray,
         actual: np.ndarray,
         most: float = np.inf,
     ) -> float:
@@ -234,7 +254,7 @@ class DriveModel:
         Args:
             memory: of the layout.
             planned: position, velocity and acceleration, (6,) each.
-            columns, correction: of the command of that instant, (96,) and (6,) in rad.
+            columns, beside: of the command of that instant, (96,) and (6,) in rad.
             actual: where the motors were, rad, (6,).
             most: nothing is learnt if more than this is not explained yet, rad; of a joint with much friction
                 for the stiffness of its drive that much more.
@@ -244,8 +264,8 @@ class DriveModel:
         """
         doubt = 0.0 if self._hides_sticking else _DOUBT
         known = memory.hung, memory.P, memory.beta, self._config.following_sigma**2, doubt, most
-        drives = self._as_found(memory)
-        return kernels.drives.look_back(drives, planned, correction, columns, actual, *known)
+        then = planned, beside, columns, actual, memory.deviation.out
+        return kernels.drives.look_back(self._as_found(memory), *then, *known)
 
     def learn(self, memory: SimpleNamespace, Phi: np.ndarray, y: np.ndarray) -> None:
         """One step of recursive least squares: the motors were y behind a plan without correction, (6,)."""
@@ -316,6 +336,7 @@ class DriveModel:
         gains.all[:] = memory.coming.all
         memory.coming.factors[:] = 0.0
         memory.z[..., 0], memory.z[..., 1] = memory.w / gains.ki[:, None], 0.0
+        memory.deviation.z[..., 0], memory.deviation.z[..., 1] = memory.deviation.last / gains.ki[0], 0.0
         self._doubt(memory, keeps_beta=False)
         self.open_low_speeds(memory, is_early=True)
         return float((self._drives.ki[0] / gains.ki[0]).mean())

@@ -13,6 +13,7 @@ _SHARP_WIDTH = 0.02  # of the believed width over which friction turns over, whe
 _STILL = 0.1  # of that width, below which a motor may hang in its friction
 _FORGOTTEN = 0.1  # s, in which what it was off by then has fallen to a third
 _WINDS = 0.5  # s, longer at rest than that, steps of an encoder may be taken for it
+_BLUR = 0.3  # of the believed width, in which the sign of a measured speed is not known
 _MOST_PERIODS = 1.5  # by which torques are sent ahead or held back
 
 
@@ -33,6 +34,33 @@ def features(v, a, filtered, Phi):
         Phi[i, 60 + i] = filtered[72 + i]
         for k in range(3):
             Phi[i, 66 + k] = filtered[78 + 6 * k + i]
+
+
+@compiled
+def deviate(drives, v, dv, da, last, z, out):
+    """Goes on by a period with what motors needed otherwise than planned, as they moved otherwise.
+
+    Args:
+        drives: `Drives`.
+        v: planned speeds, rad/s, (6,).
+        dv, da: by how much speeds and accelerations were more, rad/s and rad/s^2, (6,).
+        last: (6, 6), torques a period ago: in all, of rotor, viscous and Coulomb friction, its hump, and
+            what it turns over more sharply; is renewed.
+        z: (6, 6, 2), integral of the following error and error of each; is renewed.
+        out: (6, 6) rad, those errors; is written.
+    """
+    w = np.empty(6)
+    for i in range(6):
+        coulomb, width, u = drives.coulomb[i], drives.width[i], v[i] + dv[i]
+        blur, sign, before = _BLUR * width, math.tanh(u / width), math.tanh(v[i] / width)
+        w[1], w[2], w[3] = drives.rotor[i] * da[i], drives.viscous[i] * dv[i], coulomb * (sign - before)
+        hump = sign * math.exp(-abs(u) / drives.slow) - before * math.exp(-abs(v[i]) / drives.slow)
+        w[4] = coulomb * hump
+        w[5] = coulomb * (math.tanh(u / blur) - math.tanh(v[i] / blur)) - w[3]
+        w[0] = drives.inertia[i] * da[i] + w[2] + w[3]
+        _filter(drives.step[0, i], z[:, i], last[:, i], w)
+        for k in range(6):
+            last[k, i], out[k, i] = w[k], z[k, i, 1]
 
 
 @inner
@@ -107,15 +135,16 @@ def learn(P, beta, Phi, y, variances):
 
 
 @compiled
-def look_back(drives, planned, correction, filtered, actual, hung, P, beta, variance, doubt, most):
+def look_back(drives, planned, beside, filtered, actual, deviation, hung, P, beta, variance, doubt, most):
     """Learns from one planned instant that has passed; see `DriveModel.look_back`.
 
     Args:
         drives: `Drives`.
         planned: position, velocity and acceleration of the motors, (6,) each.
-        correction: that was commanded beside the plan, rad, (6,).
+        beside: what was commanded beside the plan because of what was learnt, rad, (6,).
         filtered: as of `features`.
         actual: positions of the motors, rad, (6,).
+        deviation: (6, 6) rad, of `deviate`.
         hung: rad, (2, 6), by which motors were off when they were slow, fading, and are if they are; is
             renewed.
         P, beta: as of `learn`.
@@ -137,8 +166,15 @@ def look_back(drives, planned, correction, filtered, actual, hung, P, beta, vari
             hung[1, i] = theta[i] - actual[i]
             hung[0, i] = max(hung[0, i], abs(hung[1, i]))
         variances[i] = variance + (doubt * hung[0, i]) ** 2
-        y[i] = theta[i] - actual[i] + correction[i]
-        largest = max(largest, abs(y[i] - _behind(v[i], a[i], filtered, beta, i)) - drives.slack[i])
+        # Rotors and friction go by how motors move, not by how they should.
+        for k in range(4):
+            Phi[i, 13 + 4 * i + k] += deviation[1 + k, i]
+        Phi[i, 48 + i] += deviation[5, i]
+        y[i] = theta[i] - actual[i] + beside[i] - deviation[0, i]
+        unexplained = y[i]
+        for j in range(len(beta)):
+            unexplained -= Phi[i, j] * beta[j]
+        largest = max(largest, abs(unexplained) - drives.slack[i])
     if largest <= most:
         learn(P, beta, Phi, y, variances)
     return largest
@@ -219,7 +255,8 @@ def command(drives, arm, masses, memory, motion, loads, mass, limits, out, filte
         mass: of the payload, kg.
         limits: the frequency in rad/s with which commands follow what was learnt, and what the correction
             may add to the speed of a joint in rad/s.
-        out: (3, 6), position, velocity and torque; filtered: (96,), what `features` takes, of rotor, viscous
+        out: (4, 6), position, velocity, torque, and what of the position is beside the plan because of what
+            was learnt; filtered: (96,), what `features` takes, of rotor, viscous
             and Coulomb friction and its hump, of a kilogram and of a kg m along each axis, of a kilogram
             that is not held; the accelerations that a planner smooths, how fast the command runs away from
             the plan in rad/s, of what friction turns over more sharply, and of all that the motion needs
@@ -292,6 +329,7 @@ def command(drives, arm, masses, memory, motion, loads, mass, limits, out, filte
         memory.correction[i] = correction
         off, sticks = memory.hung[1, i], led[48 + i]
         unwound, speed = _unwound(drives, v[i], a[i], off, sticks, memory.wound, i)
-        out[0, i] += correction + unwound
+        out[3, i] = correction + unwound
+        out[0, i] += out[3, i]
         out[1, i] += (correction - before) / drives.period + speed
     memory.started[0] = 1.0

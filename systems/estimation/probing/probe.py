@@ -40,6 +40,11 @@ class ProbeConfig:
     # self_calibrating --cases drop-outs --first-seed 5001 --seeds 3`).
     blind: float = 0.5
     sharp: float = 3e-5  # m: a tip that will be known so well all along the path needs no oscillations
+    # m, standard deviation: where a camera that shows little, as it is slow or noisy, leaves the tip at the
+    # begin of the path known less well than this, the oscillations are repeated and the path waits for them,
+    # at most so often.
+    enough: float = 6e-5
+    repeats: int = 3
     vague: float = 2.5e-4  # m: a tip that is known less well than this somewhere on the path is an event
 
 

@@ -16,9 +16,12 @@ class Known:
     """A law whose path is known ahead as well as is said."""
 
     def __init__(self, sigma: float) -> None:
-        self.sigma = sigma
+        self.sigma, self.noise = sigma, 4.0  # times the variance that is believed
         model: Any = SimpleNamespace(period=PERIOD, camera_period=PERIOD)
-        learning: Any = SimpleNamespace(estimator=SimpleNamespace(sigma=lambda memory, rows: self.sigma))
+        estimator = SimpleNamespace(
+            sigma=lambda memory, rows: self.sigma, variance_factor=lambda memory: self.noise
+        )
+        learning: Any = SimpleNamespace(estimator=estimator)
         self.pace, self.time = Pace(model, SelfCalibratingConfig(known_on_path=3e-5), learning), PATH_START
         needs: Any = SimpleNamespace(rows_between=lambda begin, end: np.zeros((1, 6, 1)))
         self.pace.needs = needs
@@ -27,6 +30,9 @@ class Known:
         self.memory = SimpleNamespace(
             by_knowledge=np.ones(1),
             planned=np.zeros(1),
+            shown_at=np.array([PATH_START]),
+            waited=np.zeros(1),
+            repeats=SimpleNamespace(looks=np.zeros(1), count=np.zeros(1), sigma=np.zeros(1)),
             estimator=SimpleNamespace(is_foreign=self.foreign),
             heard=SimpleNamespace(accepted=self.seen),
         )
@@ -88,3 +94,32 @@ def test_a_camera_that_shows_nothing_is_not_waited_for_by_going_slowly():
         assert law.after(2.0)[-1] < 0.3
         law.is_seeing, law.foreign[0] = not blind, foreign
         assert law.after(5.0)[-1] == 1.0  # two seconds of patience, then step by step
+
+
+def test_a_probe_that_did_not_show_enough_is_repeated_and_not_for_ever():
+    law = Known(1e-4)
+    law.memory.shown_at[0] = law.time = 3.4
+    repeats, length = law.memory.repeats, 3.15
+    for k in range(5):
+        law.after(0.1)
+        assert repeats.sigma[0] == (1e-4 if k < 3 else 0.0)
+        repeats.count[0] += repeats.sigma[0] > 0.0
+        repeats.sigma[0], law.memory.waited[0] = 0.0, length * repeats.count[0]
+        law.after(length - 0.1)
+        assert repeats.sigma[0] == 0.0  # until most of it is over again
+
+
+def test_a_probe_that_has_shown_enough_is_not_repeated_though_later_less_is_known():
+    law = Known(5e-5)
+    law.after(0.1)
+    law.sigma = 1e-3
+    law.after(1.0)
+    assert law.memory.repeats.sigma[0] == 0.0
+
+
+def test_no_probe_is_repeated_where_samples_are_plenty():
+    """What is left then is no noise, and the path itself shows it in no time."""
+    law = Known(1e-4)
+    law.noise = 1.0
+    law.after(1.0)
+    assert law.memory.repeats.sigma[0] == 0.0
