@@ -163,6 +163,7 @@ class SelfCalibrating(LeafSystem):
             plan = self._planner.step(memory.planner, parameters, wanted, 0.0, self.period)
             motion = plan.theta, plan.velocity, plan.acceleration
             command = self._drives.command(memory.drives, motion, plan.on_motors, self._model.payload)
+        self._drives.deviate(memory.drives, still, still, still)
         self._drives.look_back(memory.drives, motion, command.columns, still, q)
         pair = Pair(q, plan.loads, plan.motion, plan.twist, X_WE)
         self._lead.step(memory.lead, model.mean, memory.columns, self.period)

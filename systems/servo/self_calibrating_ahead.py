@@ -115,9 +115,8 @@ class Pace:
         path_time, path_start = reference.path_time(instant), reference.path.path_start
         if path_time < path_start - _BEFORE_PATH:
             return 1.0
-        is_probing = path_time + memory.waited[0] > instant + self._period
-        # It will begin anew.
-        is_probing |= bool(memory.drives.coming.factors.any() or memory.repeats.sigma[0])
+        begins_anew = memory.drives.coming.factors.any() or memory.repeats.sigma[0]
+        is_probing = begins_anew or path_time + memory.waited[0] > instant + self._period
         if path_time < path_start and (is_probing or not memory.delay.known[0]):
             return 0.0
         if self._awaits_camera(memory, path_time, time):
@@ -140,14 +139,17 @@ class Pace:
         """
         if self.needs is None:
             return
-        self._look_at_begin(memory, self.needs, reference.path.path_start)
+        is_shown = time - memory.heard.accepted[0] < self._config.longest_wait
+        is_shown = is_shown and not memory.estimator.is_foreign[0]
+        if is_shown:
+            self._look_at_begin(memory, self.needs, reference.path.path_start)
         if round(time / self._period) % self._looked_at:
             return
         path_time = reference.path_time(float(memory.planned[0]))
         if path_time < reference.path.path_start - _NEXT:
             return
-        beyond, is_shown = 0.0, time - memory.heard.accepted[0] < self._config.longest_wait
-        if is_shown and not memory.estimator.is_foreign[0]:
+        beyond = 0.0
+        if is_shown:
             rows = self.needs.rows_between(path_time, path_time + _NEXT)
             beyond = self._learning.estimator.sigma(memory.estimator, rows) / self._config.known_on_path
         share, faster = memory.by_knowledge, memory.by_knowledge[0] / _STEP

@@ -256,11 +256,12 @@ def command(drives, arm, masses, memory, motion, loads, mass, limits, out, filte
         limits: the frequency in rad/s with which commands follow what was learnt, and what the correction
             may add to the speed of a joint in rad/s.
         out: (4, 6), position, velocity, torque, and what of the position is beside the plan because of what
-            was learnt; filtered: (96,), what `features` takes, of rotor, viscous
-            and Coulomb friction and its hump, of a kilogram and of a kg m along each axis, of a kilogram
+            was learnt; is written.
+        filtered: (96,), what `features` takes, of rotor, viscous and Coulomb friction and its hump, of a
+            kilogram and of a kg m along each axis, of a kilogram
             that is not held; the accelerations that a planner smooths, how fast the command runs away from
             the plan in rad/s, of what friction turns over more sharply, and of all that the motion needs
-            and is not given as a torque, with the gains and by how much more with three others; are written.
+            and is not given as a torque, with the gains and by how much more with three others; is written.
     """
     theta, v, a = motion
     X_WE, frames, w = np.empty((4, 4)), np.empty((7, 4, 4)), np.empty(11)
