@@ -76,7 +76,7 @@ class Learning:
         self._half = max(1, round(_DIFFERENCE / model.period))
         self.tip_model = TipModel(model, config.estimator.spread)
         self.estimator = TipEstimator(self.tip_model, config.estimator)
-        self.drives = DriveModel(model, config.drives, config.drive)
+        self.drives = DriveModel(model, config.drives, config.drive, self.tip_model.has_gear_errors)
         self.delay = CommandDelay(model.period, config.dead_time)
         self.events, self.steps = EventLog(), EncoderSteps()
         reach = _REACH + max(model.command_delay, config.dead_time.longest) + model.camera_delay

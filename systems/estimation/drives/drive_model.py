@@ -116,7 +116,13 @@ class DriveModel:
     gain and may smooth their speeds, by a time T, as that of EGM does: it is behind by T a / (s + gain).
     """
 
-    def __init__(self, model: ControllerModel, config: DriveModelConfig, kind: str = "cascade") -> None:
+    def __init__(
+        self,
+        model: ControllerModel,
+        config: DriveModelConfig,
+        kind: str = "cascade",
+        has_play: bool = False,
+    ) -> None:
         """Works out the gains of the drives and the filter G for one period.
 
         Args:
@@ -124,6 +130,7 @@ class DriveModel:
             config: gains and spreads.
             kind: of the drives, ``"cascade"``, ``"position"`` or ``"velocity"``. Where they take no torques,
                 a robot's own controller is between, and has a cascade.
+            has_play: whether gears may have gaps: then links do not follow small motions of their motors.
         """
         robot, period = model.robot, model.period
         kind = kind if model.takes_torque else "cascade"
@@ -133,7 +140,7 @@ class DriveModel:
         coulomb, viscous = friction_line(robot)
         self._drives = Drives(
             robot.reflected_inertia,
-            straight_inertia(robot, payload),
+            robot.reflected_inertia if has_play else straight_inertia(robot, payload),
             viscous,
             coulomb,
             robot.coulomb_velocity,

@@ -105,7 +105,7 @@ class Drives(NamedTuple):
     """What is believed of motors and of the cascades that control them."""
 
     rotor: np.ndarray  # (6,) kg m^2, joint side
-    inertia: np.ndarray  # (6,) kg m^2, of rotor and what is turned beyond it
+    inertia: np.ndarray  # (6,) kg m^2, of what turns as a motor does: rotor, and links without a gap between
     viscous: np.ndarray  # (6,) N m s/rad
     coulomb: np.ndarray  # (6,) N m
     width: np.ndarray  # (6,) rad/s, of the speeds in which friction turns over
