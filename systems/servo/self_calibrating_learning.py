@@ -261,6 +261,7 @@ class Learning:
             self.drives.search.follow(memory.gains.search, memory.passed.torques + needed)
         is_early = instant < memory.first[0] + _FIRST_LEARNT
         if is_early or not self.delay.is_settled(memory.delay, instant) or np.isnan(off[0]):
+            memory.drives.deviation.all[:] = 0.0  # that motors were elsewhere then was no friction's doing
             return
         actual = memory.passed.theta - off
         if self._asks_for_gains(memory):

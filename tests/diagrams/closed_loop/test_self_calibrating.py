@@ -176,7 +176,7 @@ def test_a_camera_five_times_as_noisy_as_the_law_is_told_sets_nothing_off(noise)
     log = run(load_scenario("everything", settings), "self_calibrating")
     on_path, at_rest = tip_errors(log)
     assert log.learnt is not None
-    assert not log.learnt["events"]
+    assert not [event for event in log.learnt["events"] if event["kind"] != "probe repeated"]
     assert not any(log.guard_counts.values())
     assert on_path.max() < 0.2e-3
     assert at_rest.mean() < 0.03e-3
@@ -322,7 +322,8 @@ def test_a_camera_that_shows_little_has_the_probe_repeated_while_the_path_waits(
 def test_a_tool_that_is_displaced_before_a_slow_camera_is_no_load(seed):
     drawn = [f"{name}={seed}" for name in ("seed", "station.errors.random.seed", "station.variation.seed")]
     knocked = "station.events=[!ToolShift {at: 6, shift_mm: [0.29, 0.29, 0.29]}]"
-    settings = [*drawn, knocked, "station.camera.period=0.0333"]
+    once = "servo.laws.self_calibrating.probe.repeats=0"  # it is on the path when that happens
+    settings = [*drawn, knocked, once, "station.camera.period=0.0333"]
     log = run(load_scenario("everything", settings), "self_calibrating")
     errors = np.linalg.norm(pose_error(log.X_WE_desired, log.X_WE_true)[:, 3:], axis=1)
     assert errors[log.time > 7.0].max() < 0.1e-3  # 0.7 mm for seconds if it is taken for a load
