@@ -152,6 +152,7 @@ class DriveModel:
             model.takes_torque,
             config.following,
         )
+        self._rings = kind == "position"
         self._gains = config.position, config.integral
         self.finds_gains = not model.takes_torque  # where torques are sent, gains matter little
         self.search = GainSearch(gains, *self._gains, model.load_scale, period)
@@ -239,11 +240,13 @@ class DriveModel:
             dv, da: by how much speeds and accelerations were more, rad/s and rad/s^2, (6,).
 
         Returns:
-            Torques in N m that this needed beyond those planned, in the order of `TORQUES`, (4, 6).
+            Torques in N m that this needed beyond those planned, in the order of `TORQUES`, (4, 6); none of
+            drives that follow positions alone, which ring faster than differences of positions show.
         """
-        parts = memory.deviation
+        parts, needed = memory.deviation, np.zeros((len(TORQUES), 6))
+        if self._rings:
+            return needed
         kernels.drives.deviate(self._as_found(memory), v, dv, da, parts.last, parts.z, parts.out)
-        needed = np.zeros((len(TORQUES), 6))
         needed[:3] = parts.last[[0, 1, 3]]
         return needed
 
