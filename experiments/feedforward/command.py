@@ -115,8 +115,8 @@ def realistic_robot(name: str) -> RobotModel:
 
 def _table(study: FeedforwardStudy) -> Table:
     title = (
-        f"{study.robot.name}, {study.payload:g} kg, {study.plant} plant: deviation from a rectangle, "
-        "relative to rigid"
+        f"{study.robot.name}, {study.payload:g} kg, {study.plant} plant: deviation from a rectangle "
+        f"of {study.edges[0]:.2f} by {study.edges[1]:.2f} m, relative to rigid"
     )
     table = Table(box=box.SIMPLE_HEAD, title=escape(title), title_justify="left", title_style="italic")
     for name in TABLE_HEAD:

@@ -26,6 +26,7 @@ _FASTEST = 0.95  # share of the largest joint speeds: a robot that is too slow f
 _RISE = 0.1  # s, the least from rest to the largest speed of a joint
 _SAMPLES = 400  # of the path, for that
 DEPTH, WIDTH = 0.2, 0.4  # of the reach, the edges away from the robot and across
+_SIZES = (1.0, 0.8, 0.6, 0.45, 0.3)  # of that, where an arm has not as much room with the tool down
 SETTLE, DWELL = 1.0, 0.5  # s at rest: the arm is first wound up, at the end it rings
 _ALONG = 0.9  # cosine of an axis that points nearly along a direction
 _LEANING = np.deg2rad(30.0)  # of the upper arm from the vertical
@@ -100,8 +101,9 @@ def rectangle_scenario(trial: RectangleTrial) -> Scenario:
     )
     home = working_position(trial.robot)
     drive = scenario.station.drive
+    size = reached_size(trial.robot, home) * (FAST_SIZE if trial.is_fast else 1.0)
     reference = ReferenceConfig(
-        Rectangle(rectangle(trial.robot, home, FAST_SIZE if trial.is_fast else 1.0)),
+        Rectangle(rectangle(trial.robot, home, size)),
         acceleration=FAST_PACE if trial.is_fast else PACE,
         timing=trial.timing,
         settle=SETTLE,
@@ -133,6 +135,24 @@ def feasible_pace(robot: RobotModel, home: np.ndarray, reference: ReferenceConfi
     return reference.acceleration * min(1.0, (_FASTEST / speed) ** 2, 1.0 / acceleration)
 
 
+def reached_size(robot: RobotModel, home: np.ndarray) -> float:
+    """The largest size of a `rectangle` around a configuration (rad, (6,)) that the robot can follow.
+
+    Returns:
+        One of a few shares; 1 too if it reaches none of them, for the simulation to refuse.
+    """
+    inverse = inverse_kinematics(robot)
+    for size in _SIZES:
+        path = make_path(ReferenceConfig(Rectangle(rectangle(robot, home, size)), acceleration=PACE))
+        times = np.linspace(path.path_start, path.dwell_start, _SAMPLES)
+        try:
+            inverse.along(path.sample(times)[0], home)
+        except ValueError:
+            continue
+        return size
+    return 1.0
+
+
 def working_position(robot: RobotModel) -> np.ndarray:
     """Upper arm leaning forward, forearm level, tool down; rad, shape (6,).
 
@@ -151,6 +171,12 @@ def working_position(robot: RobotModel) -> np.ndarray:
     q[2] = sign_3 * (0.5 * np.pi - forearm - (_LEANING - upper_arm))
     q[4] = sign_5 * forearm  # the tool points along the forearm at zero
     return np.clip(q, robot.lower, robot.upper)
+
+
+def rectangle_edges(robot: RobotModel) -> tuple[float, float]:
+    """How long the edges away from the robot and across are in m, of the rectangle that is not small."""
+    length = reached_size(robot, working_position(robot)) * reach(robot)
+    return DEPTH * length, WIDTH * length
 
 
 def rectangle(robot: RobotModel, home: np.ndarray, size: float = 1.0) -> list[Waypoint]:

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from experiments.cli.workers import Progress, SimulationError, in_processes
-from experiments.feedforward.rectangle import Deviation, RectangleTrial
+from experiments.feedforward.rectangle import Deviation, RectangleTrial, rectangle_edges
 from experiments.feedforward.tick import tick_time
 from experiments.feedforward.trial import Trial
 from robots.description.model import RobotModel
@@ -31,6 +31,7 @@ class FeedforwardStudy:
     axis_2: np.ndarray  # (n,) rad, where the motions begin
     axis_3: np.ndarray  # (n,) rad
     criterion: Mapping[int, Mapping[str, np.ndarray]]  # by angle in degrees and feedforward, (n, n) in m/s
+    edges: tuple[float, float]  # m, of the rectangle, those away from the robot and across
     path: Mapping[str, Deviation]  # of the rectangle, by feedforward
     fast: Mapping[str, Deviation]  # of the small one with fast edges
     tick: Mapping[str, float]  # s, the median time of a tick with inverse kinematics, by feedforward
@@ -101,8 +102,9 @@ def study_feedforward(
     # Alone on a core, after the rest is done.
     tick = {kind: tick_time(RectangleTrial(robot, payload, configs[kind], timing=timing)) for kind in KINDS}
     plant = "realistic" if realistic else "exact"
+    edges = rectangle_edges(robot)
     return FeedforwardStudy(
-        robot, payload, plant, config, timing, axis_2, axis_3, criterion, path, fast, tick
+        robot, payload, plant, config, timing, axis_2, axis_3, criterion, edges, path, fast, tick
     )
 
 
@@ -121,6 +123,7 @@ def study_json(study: FeedforwardStudy) -> dict[str, Any]:
         "plant": study.plant,
         "timing": study.timing,
         "stiffness_error": study.config.stiffness_error,
+        "rectangle_m": list(study.edges),
         "path": _deviations(study.path),
         "sag": _part(study.path, "sag"),
         "dynamic": _part(study.path, "dynamic"),

@@ -5,6 +5,7 @@ from types import SimpleNamespace
 
 import numpy as np
 
+from robots.kinematics.forward import robust_inverse
 from systems.estimation import kernels
 from systems.estimation.arm_geometry import Constants
 from systems.estimation.camera.camera_moves import CameraMoves
@@ -341,7 +342,7 @@ class TipEstimator:
         if not self.model.has_gear_errors:
             return Doubts(noise, by_model, np.zeros((6, 6)), np.empty((0, 6)))
         J, by_gears = self._by_gears(memory, self.x(memory), pair)
-        return Doubts(noise, by_model, (J * by_gears) @ J.T, np.linalg.pinv(J))
+        return Doubts(noise, by_model, (J * by_gears) @ J.T, robust_inverse(J))
 
     def _doubt(self, memory: SimpleNamespace) -> None:
         """What was learnt does not hold where the robot is now: it weighs less, but no less than priors."""

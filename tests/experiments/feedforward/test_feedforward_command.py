@@ -11,6 +11,7 @@ from typer.testing import Result
 from experiments.feedforward.rectangle import (
     RectangleTrial,
     rectangle,
+    rectangle_edges,
     rectangle_scenario,
     working_position,
 )
@@ -26,6 +27,7 @@ from robots.description.model import load_robot, shipped_robots
 from robots.dynamics.newton_inverse import inverse_kinematics
 from robots.kinematics.forward import Kinematics
 from systems.feedforward import FeedforwardConfig
+from systems.feedforward.arm_correction import reach
 from systems.reference.paths import make_path
 from tests.experiments.browser import open_page
 from tests.experiments.commands import files, refusal, truetip
@@ -189,6 +191,19 @@ def test_every_robot_reaches_its_rectangle_with_the_tool_down(name: str):
         X_WE[:3, 3] = 1e-3 * corner.translation_mm
         q = inverse_kinematics(robot).nearest(X_WE, home)
         assert np.linalg.norm(q - home) < 2.0
+
+
+@pytest.mark.parametrize("name", shipped_robots())
+def test_every_robot_follows_the_rectangle_of_its_trial(name: str):
+    """Where an arm has not as much room with the tool down, a smaller one."""
+    robot = load_robot(name)
+    scenario = rectangle_scenario(RectangleTrial(robot, 0.0, FeedforwardConfig("rigid")))
+    path = make_path(scenario.reference)
+    poses = path.sample(np.linspace(path.path_start, path.dwell_start, 300))[0]
+    q = inverse_kinematics(robot).along(poses, working_position(robot))
+    np.testing.assert_allclose(Kinematics(robot).forward(q), poses, atol=1e-6)
+    assert np.ptp(poses[:, :3, 3], axis=0).max() == pytest.approx(max(rectangle_edges(robot)))
+    assert max(rectangle_edges(robot)) >= 0.3 * reach(robot)
 
 
 REFUSED = {
