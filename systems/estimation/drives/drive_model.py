@@ -73,6 +73,7 @@ class DriveModelConfig:
     dead_time_sigma: float = 3e-3  # s, of all joints alike
     lag_sigma: float = 3e-4  # s, of each joint
     smoothing_sigma: float = 5e-4  # s, by which a controller's planner smooths speeds
+    speed_lag_sigma: float = 1e-3  # s, by which drives that take torques know their speed late
     # Of a robot that carries 7 kg; of a larger one in proportion
     payload_sigma: float = 0.5  # kg
     moment_sigma: float = 0.07  # kg m, first moment of the payload: 7 kg whose centre is off by 10 mm
@@ -114,6 +115,8 @@ class DriveModel:
     are not taken, commands run ahead of the plan by G w, which is late, too: to the speed of the plan belongs
     the rate of G w. And the planner of the robot's controller is between, which follows references with a
     gain and may smooth their speeds, by a time T, as that of EGM does: it is behind by T a / (s + gain).
+    Cascades that take torques have the same column, with the gain p of their position loop: they may know
+    their speed late, by a time -T, as encoders' steps are filtered, and push until p holds against it.
     """
 
     def __init__(
@@ -150,7 +153,7 @@ class DriveModel:
             period,
             payload,
             model.takes_torque,
-            config.following,
+            config.position if model.takes_torque else config.following,
         )
         self._rings = kind == "position"
         self._gains = config.position, config.integral
@@ -163,7 +166,9 @@ class DriveModel:
         spread = [config.dead_time_sigma, *[config.lag_sigma] * 6, *[1e-4] * 6]
         self._scale, self._moment = model.load_scale, config.moment_sigma * model.load_scale
         spread += [0.3, _VISCOUS_SPREAD, _COULOMB_SPREAD, 0.0] * 6 + [_RESTS[kind]] * 6
-        spread += [config.payload_sigma * self._scale] + [self._moment] * 3 + [config.smoothing_sigma]
+        late = config.smoothing_sigma if kind == "cascade" else 0.0
+        late = config.speed_lag_sigma if model.takes_torque and late else late
+        spread += [config.payload_sigma * self._scale] + [self._moment] * 3 + [late]
         spread += [0.0] * 12 + [0.0 if model.takes_torque else _GIVES] * 6 + [_OTHERWISE] * 3
         self._prior = np.diag(np.array(spread) ** 2)
         self._prior[NOT_HELD, NOT_HELD] = self._scale**2 * (_UNTOLD**2 + _UNTOLD_ALONE**2 * np.eye(6))

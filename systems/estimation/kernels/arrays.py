@@ -119,7 +119,8 @@ class Drives(NamedTuple):
     period: float  # s
     payload: float  # kg, with which the drives hold the arm
     takes_torque: bool
-    following: float  # 1/s, gain with which a controller's planner follows references
+    # 1/s, gain with which a controller's planner follows references, or position loops where torques are taken
+    following: float
 
 
 class DriveMemory(NamedTuple):

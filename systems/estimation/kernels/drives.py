@@ -320,9 +320,8 @@ def command(drives, arm, masses, memory, motion, loads, mass, limits, out, filte
             filtered[78 + 6 * k + i] = _missing(other, led, i) - missing
             if drives.takes_torque:
                 filtered[78 + 6 * k + i] += _learnt(other, led, i) - _learnt(z, led, i)
-        if not drives.takes_torque:
-            settled = a[i] / drives.following
-            memory.smoothed[i] = settled + fading * (memory.smoothed[i] - settled)
+        settled = a[i] / drives.following
+        memory.smoothed[i] = settled + fading * (memory.smoothed[i] - settled)
         filtered[54 + i] = memory.smoothed[i]
         correction = _behind(v[i], a[i], filtered, led, i)
         before = correction if is_first else memory.correction[i]

@@ -224,6 +224,34 @@ def test_what_the_planner_of_egm_is_behind_is_a_multiple_of_its_column_at_any_fr
     assert np.std(y - smoothed * x) < 0.05 * np.std(y)
 
 
+def test_what_drives_are_ahead_that_know_their_speed_late_is_a_multiple_of_the_same_column():
+    """A filter of T makes a speed loop push, until the position loop with its gain p holds against it."""
+    model, memory = drives()
+    p, i, gain, late, joint = 25.0, 10.0, 100.0, 1e-3, 1
+    times = PERIOD * np.arange(1000)
+    planned = np.array([motion(time) for time in times])[:, :, joint]
+
+    def rates(t, state):
+        theta, v, seen, integral = state
+        wanted, speed, acceleration = (np.interp(t, times, planned[:, k]) for k in range(3))
+        error = speed - seen + p * (wanted - theta)
+        # The torque that the plan needs is given; of what moves, the inertia is one.
+        return [v, acceleration + gain * (error + i * integral), (v - seen) / late, error]
+
+    start = [*planned[0, :2], planned[0, 1], 0.0]
+    theta = solve_ivp(rates, (0.0, times[-1]), start, t_eval=times, rtol=1e-9, max_step=PERIOD).y[0]
+    behind = planned[:, 0] - theta
+    column = []
+    for time in times:
+        instant = motion(time)
+        columns = model.command(memory, instant, LOADS, 7.0).columns
+        column.append(model.features(*instant[1:], columns)[joint, SMOOTHED])
+    y, x = behind[200:], np.array(column[200:])
+    lag = -(x @ y) / (x @ x)  # s
+    assert np.std(y + lag * x) < 0.1 * np.std(y)
+    assert lag == pytest.approx(late, rel=0.1)
+
+
 def test_the_position_command_makes_up_for_a_torque_that_nobody_gives():
     model, memory = drives(takes_torque=False)
     kd, kp, ki = model._drives.kd[1], model._drives.kp[1], model._drives.ki[0, 1]
