@@ -119,7 +119,7 @@ class Drives(NamedTuple):
     period: float  # s
     payload: float  # kg, with which the drives hold the arm
     takes_torque: bool
-    # 1/s, gain with which a controller's planner follows references, or position loops where torques are taken
+    # 1/s, gain of a planner that follows references, or of position loops where drives take torques
     following: float
 
 
