@@ -3,7 +3,7 @@
 from dataclasses import dataclass, field
 
 from systems.estimation.drives.dead_time import DeadTimeConfig
-from systems.estimation.drives.drive_model import DriveModelConfig
+from systems.estimation.drives.drive_config import DriveModelConfig
 from systems.estimation.probing.probe import ProbeConfig
 from systems.estimation.tip_estimator_config import TipEstimatorConfig
 from systems.servo.law_config import LawConfig

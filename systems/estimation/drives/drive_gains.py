@@ -1,7 +1,7 @@
 """How drives give way to torques that nobody gives them: gains as believed, and others they may have."""
 
 from dataclasses import replace
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from pydrake.multibody.plant import MultibodyPlant
@@ -9,6 +9,7 @@ from scipy.linalg import expm
 
 from robots.description.model import RobotModel
 from robots.dynamics.plant import add_robot
+from systems.estimation.drives.drive_config import DriveModelConfig
 
 # Factors of the gains of position and of the integral that are believed, and of others that drives may have
 FACTORS = ((1.0, 1.0), (1.0, 0.5), (1.0, 2.0), (0.6, 1.0))
@@ -25,13 +26,15 @@ class DriveGains(NamedTuple):
     step: np.ndarray  # (4, 6, 2, 4)
 
 
-def believed_gains(robot: RobotModel, payload: float, config: Any, kind: str, period: float) -> DriveGains:
+def believed_gains(
+    robot: RobotModel, payload: float, config: DriveModelConfig, kind: str, period: float
+) -> DriveGains:
     """The gains of drives of a kind.
 
     Args:
         robot: that they drive.
         payload: kg, that they are tuned for.
-        config: `DriveModelConfig`.
+        config: what is believed of them.
         kind: of the drives, ``"cascade"``, ``"position"`` or ``"velocity"``.
         period: s.
     """
@@ -65,7 +68,7 @@ def filter_steps(kp: np.ndarray, ki: np.ndarray, kd: np.ndarray, period: float) 
 
 
 def _gains(
-    robot: RobotModel, payload: float, config: Any, kind: str, period: float
+    robot: RobotModel, payload: float, config: DriveModelConfig, kind: str, period: float
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Of a following error, its integral and its rate, joint side, (6,) each."""
     ratio = np.abs(robot.gear_ratio)
@@ -87,5 +90,5 @@ def straight_inertia(robot: RobotModel, payload: float) -> np.ndarray:
     return np.diag(plant.CalcMassMatrix(plant.CreateDefaultContext())).copy()
 
 
-def _with_factors(config: Any, position: float, integral: float) -> Any:
+def _with_factors(config: DriveModelConfig, position: float, integral: float) -> DriveModelConfig:
     return replace(config, position=position * config.position, integral=integral * config.integral)

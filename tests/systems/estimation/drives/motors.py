@@ -4,7 +4,8 @@ import numpy as np
 
 from robots.description.model import load_robot
 from systems.controller_model import ControllerModel
-from systems.estimation.drives.drive_model import DriveModel, DriveModelConfig
+from systems.estimation.drives.drive_config import DriveModelConfig
+from systems.estimation.drives.drive_model import DriveModel
 
 PERIOD = 4e-3
 LOADS = np.zeros((5, 18))

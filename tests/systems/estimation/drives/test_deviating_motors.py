@@ -5,7 +5,8 @@ import pytest
 
 from robots.description.model import load_robot
 from systems.controller_model import ControllerModel
-from systems.estimation.drives.drive_model import DriveModel, DriveModelConfig
+from systems.estimation.drives.drive_config import DriveModelConfig
+from systems.estimation.drives.drive_model import DriveModel
 from tests.systems.estimation.drives.motors import LOADS, PERIOD, drives, motion
 
 SLOWLY = 0.01  # times the usual motion: friction turns over all the time, and motors are pulled off by it

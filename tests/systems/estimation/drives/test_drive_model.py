@@ -7,6 +7,7 @@ from scipy.signal import lsim
 
 from robots.description.model import load_robot
 from systems.controller_model import ControllerModel
+from systems.estimation.drives.drive_config import DriveModelConfig
 from systems.estimation.drives.drive_model import (
     DEAD_TIME,
     GIVING,
@@ -18,7 +19,6 @@ from systems.estimation.drives.drive_model import (
     SIZE,
     SMOOTHED,
     DriveModel,
-    DriveModelConfig,
 )
 from systems.link.abb.motion import EgmMotion, EgmMotionConfig
 from tests.systems.estimation.drives.motors import LOADS, PERIOD, drives, motion
