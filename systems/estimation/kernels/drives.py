@@ -273,7 +273,8 @@ def command(drives, arm, masses, memory, motion, loads, mass, limits, out, filte
     is_first, most = memory.started[0] == 0.0, drives.period * limits[1]
     led, rate = memory.led
     if is_first:
-        led[:], rate[:] = memory.beta, 0.0
+        for k in range(len(led)):
+            led[k], rate[k] = memory.beta[k], 0.0
     follow(memory.beta, limits[0], drives.period, led, rate)
     # Periods that a torque has to be sent ahead: it arrives late by what was learnt, and is held for a period
     # in whose middle it should be right. A dead time that is wrong by more is corrected by the plan.
@@ -300,7 +301,8 @@ def command(drives, arm, masses, memory, motion, loads, mass, limits, out, filte
             last[0] = w[0] = 0.0  # nothing is missing
         if is_first:
             for gains in range(4):
-                memory.z[gains, :, i, 0] = w / drives.ki[gains, i]
+                for k in range(len(w)):
+                    memory.z[gains, k, i, 0] = w[k] / drives.ki[gains, i]
         else:
             _filter(drives.step[0, i], z, last, w)
             for gains in range(1, 4):

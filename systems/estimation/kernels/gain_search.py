@@ -22,7 +22,9 @@ def follow(steps, torques, last, z):
                 change = torques[k, i] - before
                 z[s, k, i, 0] = one[0] * integral + one[1] * e + one[2] * before + one[3] * change
                 z[s, k, i, 1] = two[0] * integral + two[1] * e + two[2] * before + two[3] * change
-    last[:] = torques
+    for k in range(torques.shape[0]):
+        for i in range(6):
+            last[k, i] = torques[k, i]
 
 
 @compiled

@@ -141,14 +141,17 @@ def invert(L, P):
             for j in range(k + 1):
                 row[j] -= factor * above[j]
         row[i] = scale
-    P[:] = 0.0
     ones, zeros, unused = np.ones(6), np.zeros(6), np.zeros(n)
     rows = np.zeros((6, n))
+    # Number by number: numba takes seconds to compile the assignment of a slice.
+    for i in range(n):
+        for k in range(n):
+            P[i, k] = 0.0
     for first in range(0, n, 6):
         end = min(first + 6, n)
-        rows[:] = 0.0
-        for i in range(first, end):
-            rows[i - first] = inverse[i]
+        for i in range(6):
+            for k in range(n):
+                rows[i, k] = inverse[first + i, k] if first + i < end else 0.0
         add_squares(rows[:, :end], ones, zeros, P[:end, :end], unused[:end])
     complete(P)
 

@@ -172,7 +172,8 @@ def plan(c, masses, unknowns, gears, wanted, state, planned):
         planned: `Planned`; is written.
     """
     yields, g = np.empty(6), len(c.chosen)
-    planned.ratios[:] = 1.0
+    for j in range(6):
+        planned.ratios[j] = 1.0
     _follow(c, masses, unknowns, wanted, state, planned.moving, planned.columns, planned.loads, yields)
     if len(unknowns.x) > g + 24:
         _add_gear_errors(gears, unknowns, g, wanted.step, planned, state, yields)
