@@ -10,6 +10,7 @@ from systems.estimation.memory import Layout
 from systems.estimation.tip_model import TipModel
 
 _LOAD_CHI_SQUARED = 30.0  # of four: what nothing describes, as errors of gears, makes up to 13
+_LEAST_LOAD = 0.15  # of what robots carry: gears with play may seem to be less than that
 _SETTLED = 2  # looks: a sum that was read anew just now has been right once by chance, never twice
 
 
@@ -77,12 +78,14 @@ class Suppositions:
     def _may_be_carried(self, more: float, sigma: float) -> bool:
         """Whether robots carry so much more than believed, in units of the spread.
 
-        What gears with play do beyond all models looks like a load, too: of a KR 16, twice what it can carry.
+        What gears with play do beyond all models looks like a load, too: of a KR 16, twice what it can carry,
+        or a little. A little is no reason to take back what is known of the drives.
         """
         model = self._model
         of_belief, spread = model.mean[model.M][0], model.sigma[model.M][0]
         return not model.has_gear_errors or (
-            of_belief + spread * (more + sigma) >= 0.0
+            abs(spread * more) >= _LEAST_LOAD * model.most_carried
+            and of_belief + spread * (more + sigma) >= 0.0
             and of_belief + spread * (more - sigma) <= model.most_carried
         )
 
