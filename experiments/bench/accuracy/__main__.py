@@ -1,8 +1,8 @@
 """``python -m experiments.bench.accuracy``: measures what the manual says of accuracy, and writes its tables.
 
 Each row is a command of its own, `experiments.bench.accuracy.rows`. Its numbers stay in a folder, and a row
-that is there already is not measured again, so that an interrupted measurement goes on where it was. All rows
-take about two hours on two cores.
+that is there already is not measured again, so that an interrupted measurement goes on where it was; another
+law wants another folder. All rows take an hour and a half on two cores.
 """
 
 import argparse
@@ -48,18 +48,21 @@ def main() -> None:
     options.folder.mkdir(parents=True, exist_ok=True)
     files = {name: options.folder / f"{name}.json" for name in rows}
     missing = [name for name in (only or rows) if not files[name].exists()]
-    with progress_bar(f"{len(missing)} rows") as progress:
-        for number, name in enumerate(missing):
-            measure(rows[name], files[name], options.jobs)
-            progress((number + 1) / len(missing))
-    if only:
-        print(table([(rows[name], read_results(files[name])) for name in only]))
-        return
-    tables = {
-        section: table([(row, read_results(files[row.name])) for row in of_section])
-        for section, of_section in SECTIONS.items()
-    }
-    write_tables(options.page, tables)
+    try:
+        with progress_bar(f"{len(missing)} rows") as progress:
+            for number, name in enumerate(missing):
+                measure(rows[name], files[name], options.jobs)
+                progress((number + 1) / len(missing))
+        if only:
+            print(table([(rows[name], read_results(files[name])) for name in only]))
+            return
+        tables = {
+            section: table([(row, read_results(files[row.name])) for row in of_section])
+            for section, of_section in SECTIONS.items()
+        }
+        write_tables(options.page, tables)
+    except (RuntimeError, ValueError, OSError) as error:
+        sys.exit(f"accuracy: {error}")
     print(options.page)
 
 

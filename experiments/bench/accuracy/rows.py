@@ -3,7 +3,6 @@
 from dataclasses import dataclass
 
 COMMAND = "robustness --laws self_calibrating --laps 2"  # what every row begins with
-MUJOCO = "experiments.bench.mujoco_cell"
 
 
 @dataclass(frozen=True)

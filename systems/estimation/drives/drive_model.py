@@ -137,8 +137,9 @@ class DriveModel:
         spread = [config.dead_time_sigma, *[config.lag_sigma] * 6, *[1e-4] * 6]
         self._scale, self._moment = model.load_scale, config.moment_sigma * model.load_scale
         spread += [0.3, _VISCOUS_SPREAD, _COULOMB_SPREAD, 0.0] * 6 + [_RESTS[kind]] * 6
-        late = config.smoothing_sigma if kind == "cascade" else 0.0
-        late = config.speed_lag_sigma if model.takes_torque and late else late
+        # Drives that take torques without a cascade are not known by such a time.
+        of_cascade = config.speed_lag_sigma if model.takes_torque else config.smoothing_sigma
+        late = of_cascade if kind == "cascade" else 0.0
         spread += [config.payload_sigma * self._scale] + [self._moment] * 3 + [late]
         spread += [0.0] * 12 + [0.0 if model.takes_torque else _GIVES] * 6 + [_OTHERWISE] * 3
         self._prior = np.diag(np.array(spread) ** 2)
