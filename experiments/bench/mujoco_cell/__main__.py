@@ -17,6 +17,7 @@ from rich.table import Table
 
 from experiments.bench.mujoco_cell.arm import STEP, Wrong
 from experiments.bench.mujoco_cell.cell import Drives
+from experiments.bench.mujoco_cell.gears import Wear
 from experiments.bench.mujoco_cell.run import CellRun, run
 from experiments.cli.console import progress_bar
 from experiments.cli.workers import in_processes
@@ -47,6 +48,11 @@ def main() -> None:
         default=Wrong.friction_time,
         help="s, in which friction that holds brakes a motor: 0.0005, two steps, is as hard as it can stick",
     )
+    parser.add_argument(
+        "--play",
+        type=float,
+        help="arc minutes, of gears that have hysteresis, uneven ratios and a hump of friction, too",
+    )
     parser.add_argument("--jobs", type=int, default=None, help="parallel processes; one per core")
     parser.add_argument("--json", metavar="FILE", default="")
     options = parser.parse_args()
@@ -56,8 +62,9 @@ def main() -> None:
     if min(options.gains) <= 0.0:
         parser.error(f"--gains must be positive, got {' '.join(f'{gain:g}' for gain in options.gains)}")
     drives = Drives(*options.gains, planner=20.0 if options.egm else 0.0)
+    wear = None if options.play is None else Wear(play=options.play)
     jobs = [
-        CellRun(robot, seed, path, wrong, drives)
+        CellRun(robot, seed, path, wrong, drives, wear=wear)
         for robot in options.robots.split(",")
         for path in options.paths.split(",")
         for seed in range(options.first_seed, options.first_seed + options.seeds)

@@ -19,6 +19,7 @@ from pydrake.systems.framework import Context, LeafSystem, State
 from scipy.spatial.transform import Rotation
 
 from experiments.bench.mujoco_cell.arm import STEP, Arm
+from experiments.bench.mujoco_cell.gears import WornGears
 from systems.samples import JointSample, PoseSample
 
 _BEFORE = 1e-6  # s before a tick, when all until the tick has happened
@@ -88,6 +89,7 @@ class MujocoCell(LeafSystem):
         period: float,
         theta: np.ndarray,
         seed: int,
+        gears: WornGears | None = None,
     ) -> None:
         """Puts the robot at rest.
 
@@ -98,8 +100,10 @@ class MujocoCell(LeafSystem):
             period: between commands in s, whole steps of the physics.
             theta: where the motors are in the beginning, rad, (6,).
             seed: of the camera's noise.
+            gears: of the true robot, if they are more than springs and dampers.
         """
         super().__init__()
+        self._gears = gears
         self._true, self._drawn, self._drives, self._camera = true, drawn, drives, camera
         self._period, self._steps = period, round(period / STEP)
         self._weight = mujoco.MjData(drawn.model)
@@ -109,6 +113,8 @@ class MujocoCell(LeafSystem):
         self._inertia = np.diag(M)[drawn.motors]
         self._rng = np.random.default_rng(seed)
         begin = _Now(true.data_at_rest(theta), seen=self._read(theta))
+        if gears is not None:
+            gears.rest(begin.data)
         begin.commands = [np.concatenate([theta, np.zeros(12)])] * (math.ceil(drives.delay / period) + 2)
         begin.torque = self._gravity(begin.seen)
         self._inputs = [
@@ -173,6 +179,8 @@ class MujocoCell(LeafSystem):
                 self._expose(now, start + step * STEP)
             self._drive(now, start + step * STEP, gravity)
             now.data.qfrc_applied[self._true.motors] = now.torque
+            if self._gears is not None:
+                self._gears.step(now.data)
             mujoco.mj_step(self._true.model, now.data)
         now.ticks += 1
         mujoco.mj_kinematics(self._true.model, now.data)

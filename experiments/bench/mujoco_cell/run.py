@@ -11,6 +11,7 @@ from diagrams.runs.simulation import start_position
 from diagrams.servo import Servo, learnt
 from experiments.bench.mujoco_cell.arm import Wrong, drawn_arm, true_arm
 from experiments.bench.mujoco_cell.cell import Camera, Drives, MujocoCell
+from experiments.bench.mujoco_cell.gears import Wear, WornGears
 from experiments.cli.workers import Progress
 from experiments.robustness.cases import Case
 from experiments.robustness.contenders import Contender
@@ -20,6 +21,7 @@ from robots.pose import rotation_vector
 
 LAW = "self_calibrating"
 LAPS = 2
+_GEARS_ERR = "servo.laws.self_calibrating.estimator.spread.gear_error"  # rad
 _SETTLED = 0.5  # s of the dwell, after which the tip is at rest
 _LONGEST = 5.0  # times the planned duration, after which a run is over
 
@@ -34,11 +36,13 @@ class CellRun:
     wrong: Wrong = field(default_factory=Wrong)
     drives: Drives = field(default_factory=Drives)
     camera: Camera = field(default_factory=Camera)
+    wear: Wear | None = None  # of the gears, which are springs and dampers else
 
     @property
     def settings(self) -> tuple[str, ...]:
-        """Of the scenario: what is believed of the interface is right."""
-        return ("station.interface=egm",) if self.drives.planner else ()
+        """Of the scenario: what is believed of the interface is right, and that gears err is known."""
+        interface = ("station.interface=egm",) if self.drives.planner else ()
+        return interface if self.wear is None else (*interface, f"{_GEARS_ERR}=5e-5")
 
 
 def run(job: CellRun, progress: Progress) -> dict[str, Any]:
@@ -60,9 +64,9 @@ def run(job: CellRun, progress: Progress) -> dict[str, Any]:
     drawn = drawn_arm(robot, station.payload)
     builder = DiagramBuilder()
     builder.AddNamedSystem("servo", servo)
-    cell = builder.AddNamedSystem(
-        "cell", MujocoCell(true, drawn, job.drives, job.camera, station.period, theta, job.seed)
-    )
+    gears = None if job.wear is None else WornGears(true, robot, job.wear, job.seed)
+    parts = job.drives, job.camera, station.period, theta, job.seed
+    cell = builder.AddNamedSystem("cell", MujocoCell(true, drawn, *parts, gears))
     for name in ("position_command", "velocity_command", "torque_feedforward")[: cell.taken]:
         builder.Connect(servo.GetOutputPort(name), cell.GetInputPort(name))
     for name in ("joint_sample", "pose_sample"):
