@@ -17,10 +17,16 @@ NUM_SHAPES = len(SHAPE_NAMES)
 NUM_STATES = 3 * NUM_JOINTS  # the last three shapes of each joint
 # All assumed, as what gears have: a sixth of an arc minute of play at least; grease of 40 N m s/rad in it,
 # and where the robot's is a quarter or four times as much, the tip is as near to its path to a hundredth of a
-# millimetre; and beside the teeth a hysteresis of a tenth of the gear's stiffness, which turns over within
-# 0.35 mrad: where a gear shakes, elements that need 0.5 mrad at rest turn over within less.
-# Where there is no hysteresis the other column fits, where there is half of it the mean of both.
-_GAP = Gap(half=2.5e-5, least=0.2, grease=40.0, held=0.1, width=3.5e-4)
+# millimetre; and beside the teeth a hysteresis of a tenth of the gear's stiffness. Where there is none the
+# other column fits, where there is half of it the mean of both. Within how many rad it turns over differs:
+# one of three is near, the least where gears shake, whose elements turn over sooner than those at rest.
+_GAP = Gap(half=2.5e-5, least=0.2, grease=40.0, held=0.1, widths=np.array([3.5e-4, 7e-4, 1.4e-3]))
+NUM_MODELS = len(_GAP.widths)
+# How likely each model of each joint is before anything is seen, (3, 6), assumed.
+BEFORE = np.tile([[0.6], [0.2], [0.2]], NUM_JOINTS)
+# Of what a sample says about models: those of a crossing, some dozens, are off together when it comes early.
+_ONE_IN = 10.0
+_KEPT = 1.0 - 1.0 / 5000.0  # of what speaks against models, from one sample to the next
 # Of the spread, how large an open gap may be. Until a load has turned over slowly nothing tells it from one
 # that is held, and then a held one is the better guess.
 OPEN = 0.3
@@ -37,13 +43,17 @@ class GearErrors:
     what makes the hysteresis stands beside the teeth and carries in the gap, too: where a load turns over
     slowly it decides when they cross, tenths of a second before or after an open gap. How much it carries is
     in the mixture of both.
+
+    The turn within which hysteresis turns over is no linear parameter. So several models of each gear, each
+    with a turn of its own, are carried along and count by how likely they are after what a camera has shown.
     """
 
     def __init__(self, robot: RobotModel) -> None:
         """Reads gear ratios and springs."""
         self._ratio = np.asarray(robot.gear_ratio, dtype=float)
         self._compliance = 1.0 / np.asarray(robot.joint_stiffness, dtype=float)
-        self.layout = Layout(started=(1,), state=(4, NUM_JOINTS))
+        models = (NUM_MODELS, NUM_JOINTS)
+        self.layout = Layout(started=(1,), state=(1 + 3 * NUM_MODELS, NUM_JOINTS), shares=models)
 
     def parts(self, lag: np.ndarray) -> Gears:
         """Gears as compiled functions take them; ``lag`` is that of their damping in s, (6,)."""
@@ -66,15 +76,40 @@ class GearErrors:
         At first the teeth lie where the load has them, and the hysteresis is relaxed.
 
         Args:
-            memory: of the layout.
+            memory: of the layout. Its ``shares`` (3, 6) say how much models count, `BEFORE` if they are zero.
             springs: as of `springs`, (2, 6). How far they bend decides how far the hysteresis turns over.
             torque: in N m, (6,).
             duration: in s.
         """
         is_first = memory.started[0] == 0.0
         kernels.gears.step(springs, _GAP, torque, float(duration), is_first, memory.state)
+        if not memory.shares.any():
+            memory.shares[:] = BEFORE
         memory.started[0] = 1.0
-        return memory.state[1:].flatten()
+        states = np.empty(NUM_STATES)
+        kernels.gears.mix(_GAP, memory.state, memory.shares, states)
+        return states
+
+    @staticmethod
+    def weigh(
+        against: np.ndarray, J: np.ndarray, r: np.ndarray, weights: np.ndarray, others: np.ndarray
+    ) -> None:
+        """Renews what speaks against each model of each gear, after one sample of the camera.
+
+        Args:
+            against: half of the squared errors that it would have had more, in variances, (3, 6); is renewed.
+            J: Jacobian of the tip, (6, 6), rotation first.
+            r: how far the tip was seen from where it was predicted, (6,).
+            weights: of the camera, one over variances, (6,).
+            others: by how much links would be further ahead with each model, rad, (3, 6), see `MotorPlan`.
+        """
+        kernels.gears.weigh(J, r, weights / _ONE_IN, others, _KEPT, against)
+
+    @staticmethod
+    def likely(against: np.ndarray) -> np.ndarray:
+        """How likely each model of each gear is, (3, 6), columns are joints, after what speaks against it."""
+        likely = BEFORE * np.exp(against.min(axis=0) - against)
+        return likely / likely.sum(axis=0)
 
     def variances(
         self, sizes: np.ndarray, states: np.ndarray, torque: np.ndarray, spread: float
@@ -95,7 +130,7 @@ class GearErrors:
         """
         hysteresis, *teeth = states.reshape(3, NUM_JOINTS)
         gap, spring = sizes[-2:].sum(axis=0), _GAP.held / self._compliance
-        carried = spring * _GAP.width * hysteresis
+        carried = spring * _GAP.widths[0] * hysteresis
         unsure = np.maximum(np.hypot(carried, 2.0 * spring * gap), _LEAST_TORQUE)
         expected = -erf((torque + 0.5 * carried) / (math.sqrt(2.0) * unsure))
         position = (sizes[-2:] * teeth).sum(axis=0)  # times the gap

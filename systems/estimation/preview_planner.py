@@ -9,7 +9,7 @@ from robots.pose import pose_error
 from systems.estimation import kernels
 from systems.estimation.arm_geometry import Arm, Constants
 from systems.estimation.arm_loads import NUM_SETS
-from systems.estimation.gear_errors import NUM_STATES
+from systems.estimation.gear_errors import BEFORE, NUM_MODELS, NUM_STATES
 from systems.estimation.kernels.arrays import FollowerState, PathInstant, Planned
 from systems.estimation.memory import Layout
 from systems.estimation.tip_model import TipModel
@@ -38,6 +38,7 @@ class MotorPlan(NamedTuple):
     twist: np.ndarray  # (6,), of the tip
     columns: np.ndarray  # (6, 18 + g), as `ArmGeometry.arm` gives them
     states: np.ndarray  # (18,), of the gears, see `GearErrors`
+    others: np.ndarray  # (3, 6) rad, by how much links would be further ahead with each model of their gears
     ratios: np.ndarray  # (6,), speed of each joint for that of its motor, 1 but for the waves of its gear
 
     @property
@@ -134,6 +135,7 @@ class PreviewPlanner:
         wanted: Wanted,
         since_start: float,
         step: float,
+        likely: np.ndarray = BEFORE,
     ) -> MotorPlan:
         """Plans one instant.
 
@@ -143,12 +145,13 @@ class PreviewPlanner:
             wanted: the path at this instant.
             since_start: s.
             step: s since the last instant that was planned.
+            likely: how likely each model of the gears is, (3, 6).
         """
         x, rate = parameters
         model = self._model
         constants = self.constants(memory, x)
         moment = wanted.X_WE, wanted.V_WE, *_blend(since_start), rate[model.G], wanted.aside
-        instant = PathInstant(*moment, float(step), _NEWTON_STEP)
+        instant = PathInstant(*moment, float(step), _NEWTON_STEP, likely)
         state = FollowerState(
             memory.q,
             memory.rates,
@@ -157,16 +160,17 @@ class PreviewPlanner:
             memory.start_yield,
             memory.yields,
             memory.gears.state,
+            memory.gears.shares,
         )
         motion, moving, loads = np.empty((4, 6)), np.empty((3, 6)), np.empty((NUM_SETS, 18))
         columns, states = np.empty((6, len(constants.frame))), np.zeros(NUM_STATES)
-        ratios = np.empty(6)
-        planned = Planned(motion, moving, loads, columns, states, ratios)
+        ratios, others = np.empty(6), np.zeros((NUM_MODELS, 6))
+        planned = Planned(motion, moving, loads, columns, states, others, ratios)
         arm = constants, model.loads.masses, model.unknowns(x), self._gears
         kernels.plan.plan(*arm, instant, state, planned)
         theta, velocity, acceleration, twist = motion
         links = moving[1:].ravel()
-        return MotorPlan(theta, velocity, acceleration, loads, links, twist, columns, states, ratios)
+        return MotorPlan(theta, velocity, acceleration, loads, links, twist, columns, states, others, ratios)
 
 
 def _blend(since_start: float) -> tuple[float, float]:

@@ -20,7 +20,7 @@ from systems.estimation.events import (
     Event,
     Innovations,
 )
-from systems.estimation.gear_errors import NUM_SHAPES
+from systems.estimation.gear_errors import NUM_MODELS, NUM_SHAPES
 from systems.estimation.keyframes import Keyframes, forget_open, open_keyframe
 from systems.estimation.memory import Layout
 from systems.estimation.suppositions import Suppositions
@@ -87,6 +87,7 @@ class TipEstimator:
             unmodelled=self._unmodelled.layout,
             camera=self._camera.layout,
             after_step=self._displacement.layout,
+            against=(NUM_MODELS, 6),  # models of each gear, see `GearErrors.weigh`
         )
         self._constants: Constants | None = None
 
@@ -181,18 +182,14 @@ class TipEstimator:
         """
         H, x = self.predict(memory, pair).H[0], self.x_robot(memory)
         covariance = H @ self.covariance_of_robot(memory) @ H.T
-        J, by_gears = self._by_gears(memory, x, pair)
+        J = self.model.jacobian(self._constants_at(memory, x), x, pair.theta)
+        by_gears = self.model.gear_variances(x, pair.loads, pair.states)
         angles = self._unmodelled.joint_variances(memory.unmodelled, by_gears) + pair.rounding**2
         covariance += (J * angles) @ J.T + np.diag(self._unmodelled.variances(memory.unmodelled))
         if memory.after_step.is_open[0]:
             d = H @ (memory.xi - memory.after_step.xi_before)
             covariance += 0.5 * np.outer(d, d)
         return covariance
-
-    def _by_gears(self, memory: SimpleNamespace, x: np.ndarray, pair: Pair) -> tuple[np.ndarray, ...]:
-        """The Jacobian of the tip, and what gears are said to be off by, variances of the joints, (6,)."""
-        J = self.model.jacobian(self._constants_at(memory, x), x, pair.theta)
-        return J, self.model.gear_variances(x, pair.loads, pair.states)
 
     def add(self, memory: SimpleNamespace, pair: Pair) -> Event | None:
         """Learns from one pair; says if something happened to the robot."""
@@ -205,7 +202,7 @@ class TipEstimator:
         model, x, since_first = self.model, self.x(memory), self._since_first(memory, pair.time)
         shapes = model.gear_shapes(pair.theta, pair.states)
         seen = pair.theta, pair.loads, pair.twist, pair.X_WE
-        r, H, gears = model.innovation(self._constants_at(memory, x), x, seen, shapes, since_first)
+        r, H, gears, J = model.innovation(self._constants_at(memory, x), x, seen, shapes, since_first)
         weight = 1.0 / (1.0 + (pair.unrest / config.calm) ** 2)
         event, innovations = None, memory.innovations
         if memory.count[0] <= config.test_after and since_first <= config.test_at_latest:
@@ -216,7 +213,7 @@ class TipEstimator:
             if verdict.is_outlier:
                 return None
             if weight > _CALM_WEIGHT and self._innovations.measure_noise(innovations, r):
-                self._unmodelled.add(memory.unmodelled, r, lambda: self._doubts(memory, H, pair))
+                self._unmodelled.add(memory.unmodelled, r, lambda: self._doubts(memory, H, J, pair))
             if verdict.has_jumped or verdict.has_drifted:
                 self._unmodelled.rest(memory.unmodelled)
             if verdict.is_calm:
@@ -238,13 +235,15 @@ class TipEstimator:
                 self._displacement.keep(memory.after_step, memory.P, memory.xi)
             elif memory.after_step.samples[0]:
                 before = r + H @ (memory.xi - memory.after_step.xi_before)
-                at = (H, model.jacobian(self._constants_at(memory, x), x, pair.theta)), pair.X_WE
-                found = self._displacement.found(memory.after_step, before, *at, memory.noise.weights)
+                at = (H, J), pair.X_WE, memory.noise.weights
+                found = self._displacement.found(memory.after_step, before, *at)
                 if found in (CAMERA_MOVED, JOINTS_SHIFTED):
                     return self._take_back(memory, found, pair.X_WE)
                 if found == TOOL_DISPLACED and memory.after_step.is_event[0]:
                     size = self._displacement.size(memory.after_step, found, pair.X_WE[:3, 3])
                     event = Event(found, size, size)
+        if model.has_gear_errors and weight > _CALM_WEIGHT:
+            model.gear_errors.weigh(memory.against, J, r, memory.noise.weights, pair.others)
         if self._noise.hear(memory.noise, r, H, memory.xi, pair):
             self._weigh_anew(memory)
         self._take(memory, (r, gears, H), pair, shapes, weight)
@@ -335,13 +334,13 @@ class TipEstimator:
         if self._keyframes.invert(memory.keyframes, memory.A_open, memory.P):
             memory.taken[0] = 0.0
 
-    def _doubts(self, memory: SimpleNamespace, H: np.ndarray, pair: Pair) -> Doubts:
+    def _doubts(self, memory: SimpleNamespace, H: np.ndarray, J: np.ndarray, pair: Pair) -> Doubts:
         memory.is_busy[0] = 1.0
         factor, by_model = self.variance_factor(memory), H @ memory.P @ H.T
         noise, by_model = factor * memory.noise.variances, max(1.0, factor) * by_model
         if not self.model.has_gear_errors:
             return Doubts(noise, by_model, np.zeros((6, 6)), np.empty((0, 6)))
-        J, by_gears = self._by_gears(memory, self.x(memory), pair)
+        by_gears = self.model.gear_variances(self.x(memory), pair.loads, pair.states)
         return Doubts(noise, by_model, (J * by_gears) @ J.T, robust_inverse(J))
 
     def _doubt(self, memory: SimpleNamespace) -> None:

@@ -12,7 +12,7 @@ from systems.controller_model import ControllerModel
 from systems.estimation import kernels
 from systems.estimation.arm_geometry import Arm, ArmGeometry, Constants
 from systems.estimation.arm_loads import ArmLoads
-from systems.estimation.gear_errors import NUM_SHAPES, NUM_STATES, OPEN, SHAPE_NAMES, GearErrors
+from systems.estimation.gear_errors import NUM_MODELS, NUM_SHAPES, NUM_STATES, OPEN, SHAPE_NAMES, GearErrors
 from systems.estimation.kernels.arrays import Seen, SeenOnce, Unknowns
 from systems.estimation.learnt_robot import known_before
 
@@ -58,6 +58,7 @@ class Pair(NamedTuple):
     X_WE: np.ndarray  # (4, 4), seen
     unrest: float = 0.0  # m/s^2, of the tip by parameters that are led in
     states: np.ndarray = np.zeros(NUM_STATES)  # of the gears, see `GearErrors`
+    others: np.ndarray = np.zeros((NUM_MODELS, NUM_JOINTS))  # rad, see `MotorPlan`
     time: float = 0.0  # s, as the camera's clock has it
     rounding: np.ndarray = np.zeros(NUM_JOINTS)  # rad, standard deviation of theta by steps of the encoders
 
@@ -270,7 +271,7 @@ class TipModel:
         pair: tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray],
         shapes: np.ndarray | None = None,
         time: float = 0.0,
-    ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
         """How far the tip is seen from where it is predicted.
 
         Args:
@@ -279,13 +280,16 @@ class TipModel:
             shapes, time: of this instant, as of `predict`.
 
         Returns:
-            The error (6,), rotation in rad first; its columns (6, size); deflections of gears in rad, (6,).
+            The error (6,), rotation in rad first; its columns (6, size); deflections of gears in rad, (6,);
+            the Jacobian of the tip, (6, 6).
         """
         theta, loads, twist, X_WE = pair
-        out = np.empty(6), np.empty((6, self.size)), np.empty(6)
+        r, H, gears = np.empty(6), np.empty((6, self.size)), np.empty(6)
+        columns = np.empty((6, len(constants.frame)))
         seen = SeenOnce(twist, time, NO_SHAPES if shapes is None else shapes)
+        out = r, H, gears, columns
         kernels.tip.innovation(constants, self.unknowns(x), theta, loads, seen, X_WE, *out)
-        return out
+        return r, H, gears, columns[:, :NUM_JOINTS]
 
     def predict_anew(
         self,

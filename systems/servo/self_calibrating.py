@@ -370,7 +370,8 @@ class SelfCalibrating(LeafSystem):
         waited = self._learning.wait(memory, instant, self._probe, path_start)
         aside = self._probe.at(instant - first, path_start - first, memory.amplitude, waited)
         wanted = Wanted(moment.X_WE, moment.V_WE, aside)
-        plan = self._planner.step(memory.planner, (lead.x, lead.rate), wanted, since_start, instant - last)
+        at = wanted, since_start, instant - last, self.tip_model.gear_errors.likely(memory.estimator.against)
+        plan = self._planner.step(memory.planner, (lead.x, lead.rate), *at)
         memory.columns[:] = plan.columns[:, 18:]
         motion = plan.theta, plan.velocity, plan.acceleration
         command = self._drives.command(drives, motion, plan.on_motors, self._model.payload)
@@ -387,12 +388,12 @@ class SelfCalibrating(LeafSystem):
             command.torques.ravel(),
             command.position - plan.theta,
             plan.states,
+            plan.others.ravel(),
         )
         np.concatenate(row, out=coming.row.all)
         # While the delay is corrected the path is sent faster or slower than it is to be travelled.
         velocity = (1.0 + memory.delay.rate[0]) * command.velocity
-        for i, part in enumerate((command.position, velocity, command.torque)):
-            coming.commands[i] = part
+        coming.commands[:] = command.position, velocity, command.torque
         memory.planned[0], coming.path_time[0] = instant, reference.path_time(instant)
         coming.begins_path[0] = last < path_start <= instant
         coming.is_led_in[0] = last < first + _LED_IN <= instant

@@ -21,7 +21,7 @@ from systems.estimation.events import (
     Event,
     EventLog,
 )
-from systems.estimation.gear_errors import NUM_STATES
+from systems.estimation.gear_errors import NUM_MODELS, NUM_STATES
 from systems.estimation.kernels.arrays import Ring
 from systems.estimation.memory import History, Layout
 from systems.estimation.probing.probe import Probe
@@ -60,6 +60,7 @@ PLAN = Layout(
     torques=(len(TORQUES), 6),
     ahead=(6,),
     states=(NUM_STATES,),
+    others=(NUM_MODELS, NUM_JOINTS),
 )
 
 
@@ -207,7 +208,8 @@ class Learning:
             return None
         is_settling = exposure < memory.delay.settled[0] + _SETTLING or exposure < memory.paused_until[0]
         unrest = UNREST if is_settling else float(now.unrest[0])
-        return Pair(at.theta, then.loads, then.motion, now.twist, at.X_WE, unrest, then.states, stamp)
+        gears = then.states, then.others
+        return Pair(at.theta, then.loads, then.motion, now.twist, at.X_WE, unrest, *gears, stamp)
 
     def encoders_at(self, memory: SimpleNamespace, time: float) -> np.ndarray | None:
         """Positions between two samples, a cubic through positions and velocities, rad, (6,)."""

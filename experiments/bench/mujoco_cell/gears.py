@@ -1,8 +1,8 @@
 """Gears with play, hysteresis and uneven ratios for a MuJoCo model, written anew.
 
 Nothing of `robots.drivetrain` is in it. What differs from its parts on purpose: teeth that part may pull as
-long as their damper does, hysteresis is made of springs that slip, each from a stretch of its own, in place of
-Dahl's rounded one, and the hump of friction at low speeds is another curve.
+long as their damper does, hysteresis is made of springs that slip, each from a stretch of its own, in place
+of Dahl's rounded one, and the hump of friction at low speeds is another curve.
 """
 
 # MuJoCo's functions are in a library of which type checkers see nothing.
@@ -17,7 +17,7 @@ from experiments.bench.mujoco_cell.arm import JOINTS, Arm
 from robots.description.model import RobotModel
 
 _ARC_MINUTE = np.deg2rad(1.0 / 60.0)  # rad
-_SLIPS = np.array([1.5e-4, 4e-4, 1e-3])  # rad, stretches at which the springs of hysteresis slip
+SLIPS = np.array([1.5e-4, 4e-4, 1e-3])  # rad, stretches at which the springs of hysteresis slip
 
 
 @dataclass(frozen=True)
@@ -50,18 +50,18 @@ class WornGears:
             return size * (1.0 + rng.uniform(-0.2, 0.2, len(JOINTS)))
 
         self._model, self._motors = model, arm.motors
-        self._gears = np.array([model.joint(f"gear_{number}").qposadr[0] for number in JOINTS])
-        self.stiffness = model.jnt_stiffness[self._gears].copy()
-        self._damping = model.dof_damping[self._gears].copy()
+        self.joints = np.array([model.joint(f"gear_{number}").qposadr[0] for number in JOINTS])
+        self.stiffness = model.jnt_stiffness[self.joints].copy()
+        self._damping = model.dof_damping[self.joints].copy()
         self.half_play = 0.5 * about(wear.play * _ARC_MINUTE)
         self._grease = about(wear.grease) * self._damping
-        self._springs = (about(wear.hysteresis) * self.stiffness)[:, None] / len(_SLIPS)
+        self.springs = (about(wear.hysteresis) * self.stiffness)[:, None] / len(SLIPS)
         self._frequency = 2.0 * np.asarray(robot.gear_ratio)
         self._unevenness = about(wear.unevenness)
         self._phase = rng.uniform(0.0, 2.0 * np.pi, len(JOINTS))
         self._hump = about(wear.hump) * model.dof_frictionloss[self._motors]
         self._hump_speed = wear.hump_speed
-        self.stretch = np.zeros((len(JOINTS), len(_SLIPS)))  # rad, of the springs of hysteresis
+        self.stretch = np.zeros((len(JOINTS), len(SLIPS)))  # rad, of the springs of hysteresis
         self._last = np.zeros(len(JOINTS))
 
     def uneven(self, theta: np.ndarray) -> np.ndarray:
@@ -73,24 +73,24 @@ class WornGears:
         theta = data.qpos[self._motors]
         for _ in range(10):
             mujoco.mj_forward(self._model, data)
-            load = -data.qfrc_bias[self._gears]
+            load = -data.qfrc_bias[self.joints]
             x = load / self.stiffness + np.copysign(self.half_play, load)
-            data.qpos[self._gears] = x + self.uneven(theta)
+            data.qpos[self.joints] = x + self.uneven(theta)
         self._last, self.stretch = x, np.zeros_like(self.stretch)
 
     def step(self, data: mujoco.MjData) -> None:
         """Before a step of the physics: springs and dampers of teeth where they are now, and torques."""
         theta, speed = data.qpos[self._motors], data.qvel[self._motors]
         uneven = self.uneven(theta)
-        x = data.qpos[self._gears] - uneven
+        x = data.qpos[self.joints] - uneven
         meet = np.abs(x) > self.half_play
         model = self._model
-        model.jnt_stiffness[self._gears] = np.where(meet, self.stiffness, 0.0)
-        model.qpos_spring[self._gears] = np.copysign(self.half_play, x) + uneven
-        model.dof_damping[self._gears] = self._grease + np.where(meet, self._damping, 0.0)
+        model.jnt_stiffness[self.joints] = np.where(meet, self.stiffness, 0.0)
+        model.qpos_spring[self.joints] = np.copysign(self.half_play, x) + uneven
+        model.dof_damping[self.joints] = self._grease + np.where(meet, self._damping, 0.0)
         turn, self._last = x - self._last, x
-        self.stretch = np.clip(self.stretch + turn[:, None], -_SLIPS, _SLIPS)
-        held = -(self._springs * self.stretch).sum(axis=1)
-        data.qfrc_applied[self._gears] = held
+        self.stretch = np.clip(self.stretch + turn[:, None], -SLIPS, SLIPS)
+        held = -(self.springs * self.stretch).sum(axis=1)
+        data.qfrc_applied[self.joints] = held
         share = speed / self._hump_speed
         data.qfrc_applied[self._motors] -= self._hump * share * np.exp(0.5 * (1.0 - share**2))

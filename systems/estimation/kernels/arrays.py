@@ -87,6 +87,7 @@ class PathInstant(NamedTuple):
     aside: np.ndarray  # (3, 6), a motion of the joints beside the path: rad and derivatives
     step: float  # s since the instant before
     newton_step: float  # rad, a step of Newton's method that is small enough to be the last
+    likely: np.ndarray  # (m, 6), how likely each model of a gear is
 
 
 class FollowerState(NamedTuple):
@@ -98,7 +99,8 @@ class FollowerState(NamedTuple):
     start_error: np.ndarray  # (6,), from the tip to the path where the robot began
     start_yield: np.ndarray  # (6,) rad, by which motors were further ahead then than they should have been
     yields: np.ndarray  # (4, 6) rad, by which motors are ahead, newest first
-    gears: np.ndarray  # (4, 6), of `GearErrors`
+    gears: np.ndarray  # (1 + 3 m, 6), of `GearErrors` with m models of each gear
+    shares: np.ndarray  # (m, 6), by which these count; they follow how likely they are
 
 
 class Drives(NamedTuple):
@@ -139,13 +141,13 @@ class DriveMemory(NamedTuple):
 
 
 class Gap(NamedTuple):
-    """Play of a gear, and what stands beside its teeth."""
+    """Play of a gear, and what stands beside its teeth, of m models that differ."""
 
     half: float  # rad, half of the least play
     least: float  # of the compliance that the robot's file says
     grease: float  # N m s/rad, that teeth move against
     held: float  # of the stiffness of the gear, what the hysteresis has
-    width: float  # rad of deflection, after which it has turned over
+    widths: np.ndarray  # (m,) rad of deflection, after which it has turned over; the first is their unit
 
 
 class Gears(NamedTuple):
@@ -165,6 +167,7 @@ class Planned(NamedTuple):
     loads: np.ndarray  # (5, 18)
     columns: np.ndarray  # (6, C)
     states: np.ndarray  # (18,) of the gears
+    others: np.ndarray  # (m, 6) rad, by how much links would be further ahead with each model of a gear
     ratios: np.ndarray  # (6,) speed of the joint for that of the motor, 1 but for the waves of its gear
 
 

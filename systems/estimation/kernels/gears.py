@@ -23,33 +23,82 @@ def step(springs, gap, torque, duration, is_first, state):
 
     Args:
         springs: their compliance in rad per N m and half of their play in rad, (2, n).
-        gap: `Gap`.
+        gap: `Gap`, with m models.
         torque: of the gears, N m, (n,), for the duration in s.
         is_first: whether nothing is known of what was before.
-        state: (4, n): deflection of spring and gap together in rad, that of the hysteresis in shares of its
-            width, and where the teeth are in an open gap and in one that is held; is renewed.
+        state: (1 + 3 m, n): where the teeth are in an open gap; and of each model the deflection of spring
+            and gap together in rad, that of the hysteresis in rad, and where the teeth are in a gap that it
+            holds; is renewed.
     """
     for j in range(len(torque)):
         compliance, half = springs[0, j], springs[1, j]
-        held = gap.held / compliance  # N m/rad
-        if is_first:
-            side = -1.0 if torque[j] > 0.0 else 1.0 if torque[j] < 0.0 else 0.0
-            state[1, j], state[2, j], state[3, j] = 0.0, side, side
-            state[0, j] = half * side - compliance * torque[j]
-            continue
-        pace = duration / (gap.grease * half)  # per N m
-        free = state[2, j] - pace * torque[j]
-        state[2, j] = min(max(free, -1.0), 1.0)
-        # Implicit in the spring of the hysteresis, which goes along with the teeth.
-        z, teeth, spring = gap.width * state[1, j], state[3, j], held * half
-        push = torque[j] + held * z - spring * teeth
-        way = (teeth - pace * push) / (1.0 + pace * spring)
-        state[3, j] = min(max(way, -1.0), 1.0)
-        deflection = half * state[3, j] - compliance * (torque[j] + held * z)
-        turn = deflection - state[0, j]
-        end = 1.0 if turn > 0.0 else -1.0
-        state[0, j] = deflection
-        state[1, j] = end + (state[1, j] - end) * math.exp(-abs(turn) / gap.width)
+        held, pace = gap.held / compliance, duration / (gap.grease * half)  # N m/rad, per N m
+        spring = held * half
+        side = -1.0 if torque[j] > 0.0 else 1.0 if torque[j] < 0.0 else 0.0
+        state[0, j] = side if is_first else min(max(state[0, j] - pace * torque[j], -1.0), 1.0)
+        for m in range(len(gap.widths)):
+            k, width = 1 + 3 * m, gap.widths[m]
+            if is_first:
+                state[k, j] = half * side - compliance * torque[j]
+                state[k + 1, j], state[k + 2, j] = 0.0, side
+                continue
+            # Implicit in the spring of the hysteresis, which goes along with the teeth.
+            z, teeth = state[k + 1, j], state[k + 2, j]
+            push = torque[j] + held * z - spring * teeth
+            way = (teeth - pace * push) / (1.0 + pace * spring)
+            state[k + 2, j] = min(max(way, -1.0), 1.0)
+            deflection = half * state[k + 2, j] - compliance * (torque[j] + held * z)
+            turn = deflection - state[k, j]
+            end = width if turn > 0.0 else -width
+            state[k, j] = deflection
+            state[k + 1, j] = end + (z - end) * math.exp(-abs(turn) / width)
+
+
+@compiled
+def mix(gap, state, shares, states):
+    """What models expect together: hysteresis, teeth in an open gap and in one that is held, (18,).
+
+    Args:
+        gap, state: as of `step`.
+        shares: of the models, (m, n).
+        states: is written; hysteresis in units of the first width.
+    """
+    n = shares.shape[1]
+    for j in range(n):
+        z = teeth = 0.0
+        for m in range(len(shares)):
+            z += shares[m, j] * state[2 + 3 * m, j]
+            teeth += shares[m, j] * state[3 + 3 * m, j]
+        states[j], states[n + j], states[2 * n + j] = z / gap.widths[0], state[0, j], teeth
+
+
+@compiled
+def differ(gap, state, states, sizes, others):
+    """By how much links would be further ahead, rad, (m, n), if each model alone were right.
+
+    Args:
+        gap, state, states: as of `mix`.
+        sizes: of the shapes in rad, (7, n).
+        others: is written.
+    """
+    n = others.shape[1]
+    for m in range(len(others)):
+        for j in range(n):
+            z, teeth = state[2 + 3 * m, j] / gap.widths[0], state[3 + 3 * m, j]
+            others[m, j] = sizes[4, j] * (z - states[j]) + sizes[6, j] * (teeth - states[2 * n + j])
+
+
+@compiled
+def weigh(J, r, weights, others, kept, against):
+    """Renews what speaks against models, (m, n), see `GearErrors.weigh`; ``kept`` of it is left."""
+    for j in range(others.shape[1]):
+        pull = stiff = 0.0
+        for i in range(6):
+            pull += J[i, j] * weights[i] * r[i]
+            stiff += J[i, j] ** 2 * weights[i]
+        for m in range(len(others)):
+            d = others[m, j]
+            against[m, j] = kept * against[m, j] + d * (0.5 * d * stiff - pull)
 
 
 @compiled

@@ -5,12 +5,15 @@ import math
 import numpy as np
 
 from robots.compiled import compiled, inner
-from systems.estimation.kernels.gears import shapes, springs
+from systems.estimation.kernels.gears import differ, mix, shapes, springs
 from systems.estimation.kernels.gears import step as step_gears
 from systems.estimation.kernels.geometry import place
 from systems.estimation.kernels.loads import load
 from systems.estimation.kernels.poses import error
 from systems.estimation.kernels.tip import deflect, move_by_geometry
+
+# s, in which models of gears come to count as much as they are likely, so that no plan jerks
+_LED = 0.5
 
 
 @inner
@@ -136,7 +139,7 @@ def _motors(moving, wander, yields, history, step, lag, columns, out):
 
 
 @inner
-def _add_gear_errors(gears, unknowns, g, step, planned, state, yields):
+def _add_gear_errors(gears, unknowns, g, wanted, planned, state, yields):
     """By how much gears are off beyond their springs, taken from the yields; renews their state."""
     x, torque, turns = unknowns.x, np.empty(6), np.empty(6)
     for j in range(6):
@@ -146,11 +149,14 @@ def _add_gear_errors(gears, unknowns, g, step, planned, state, yields):
         turns[j] = gears.ratio[j] * (planned.moving[0, j] + yields[j])
     sizes = x[g + 24 :].reshape(-1, 6)
     bend = springs(gears.compliance, gears.gap, x[g : g + 6], sizes)
-    step_gears(bend, gears.gap, torque, step, False, state.gears)
-    waves = np.empty(sizes.shape)
-    for k in range(3):
+    step_gears(bend, gears.gap, torque, wanted.step, False, state.gears)
+    lead = min(1.0, wanted.step / _LED)
+    for m in range(len(state.shares)):
         for j in range(6):
-            planned.states[6 * k + j] = state.gears[1 + k, j]
+            state.shares[m, j] += lead * (wanted.likely[m, j] - state.shares[m, j])
+    mix(gears.gap, state.gears, state.shares, planned.states)
+    differ(gears.gap, state.gears, planned.states, sizes, planned.others)
+    waves = np.empty(sizes.shape)
     shapes(turns, planned.states, waves)
     for k in range(len(sizes)):
         for j in range(6):
@@ -176,7 +182,7 @@ def plan(c, masses, unknowns, gears, wanted, state, planned):
         planned.ratios[j] = 1.0
     _follow(c, masses, unknowns, wanted, state, planned.moving, planned.columns, planned.loads, yields)
     if len(unknowns.x) > g + 24:
-        _add_gear_errors(gears, unknowns, g, wanted.step, planned, state, yields)
+        _add_gear_errors(gears, unknowns, g, wanted, planned, state, yields)
     for i in range(6):
         yields[i] += wanted.left * state.start_yield[i]
     columns, history = planned.columns, state.yields

@@ -96,11 +96,11 @@ def _complete(unknowns, g, loads, unit, yields, seen, columns, X_WE, H):
 
 
 @inner
-def predict_one(c, unknowns, theta, loads, seen, X_WE, H, gears):
-    """`predict` for one instant, with `SeenOnce`."""
+def predict_one(c, unknowns, theta, loads, seen, X_WE, H, gears, columns):
+    """`predict` for one instant, with `SeenOnce`; writes the columns of the arm, too, (6, C)."""
     g = len(c.chosen)
     unit, yields, q, step = np.empty(18), np.empty(18), np.empty(6), np.empty(6)
-    frames, columns = np.empty((7, 4, 4)), np.empty((6, len(c.frame)))
+    frames = np.empty((7, 4, 4))
     deflect(unknowns, g, loads, unit, yields)
     for j in range(6):
         gears[j] = yields[j]
@@ -122,16 +122,17 @@ def predict(c, unknowns, theta, loads, seen, X_WE, H, gears):
         seen: `Seen`.
         X_WE: (n, 4, 4), H: (n, 6, size), gears: deflections in rad (n, 6), are written.
     """
+    columns = np.empty((6, len(c.frame)))
     for n in range(len(theta)):
         once = SeenOnce(seen.twist[n], seen.time[n], seen.shapes[n])
-        predict_one(c, unknowns, theta[n], loads[n], once, X_WE[n], H[n], gears[n])
+        predict_one(c, unknowns, theta[n], loads[n], once, X_WE[n], H[n], gears[n], columns)
 
 
 @compiled
-def innovation(c, unknowns, theta, loads, seen, X_seen, r, H, gears):
+def innovation(c, unknowns, theta, loads, seen, X_seen, r, H, gears, columns):
     """How far the camera sees the tip from where it is predicted, (6,), beside what `predict_one` writes."""
     X_WE = np.empty((4, 4))
-    predict_one(c, unknowns, theta, loads, seen, X_WE, H, gears)
+    predict_one(c, unknowns, theta, loads, seen, X_WE, H, gears, columns)
     error(X_seen, X_WE, r)
 
 
