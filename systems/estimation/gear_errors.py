@@ -19,11 +19,19 @@ NUM_STATES = 3 * NUM_JOINTS  # the last three shapes of each joint
 # and where the robot's is a quarter or four times as much, the tip is as near to its path to a hundredth of a
 # millimetre; and beside the teeth a hysteresis of a tenth of the gear's stiffness. Where there is none the
 # other column fits, where there is half of it the mean of both. Within how many rad it turns over differs:
-# one of three is near, the least where gears shake, whose elements turn over sooner than those at rest.
-_GAP = Gap(half=2.5e-5, least=0.2, grease=40.0, held=0.1, widths=np.array([3.5e-4, 7e-4, 1.4e-3]))
+# one of three is near, the least where gears shake, whose elements turn over sooner than those at rest. And
+# play that is large for what loads bend, as half an arc minute is in wrists, is not found from a sixth.
+_WIDTHS, _HALVES = (3.5e-4, 7e-4, 1.4e-3), (2.5e-5, 8e-5)  # rad
+_GAP = Gap(
+    least=0.2,
+    grease=40.0,
+    held=0.1,
+    widths=np.tile(_WIDTHS, len(_HALVES)),
+    halves=np.repeat(_HALVES, len(_WIDTHS)),
+)
 NUM_MODELS = len(_GAP.widths)
-# How likely each model of each joint is before anything is seen, (3, 6), assumed.
-BEFORE = np.tile([[0.6], [0.2], [0.2]], NUM_JOINTS)
+# How likely each model of each joint is before anything is seen, (6, 6), assumed.
+BEFORE = np.outer([4.0, 2.0, 2.0, 2.0, 1.0, 1.0], np.full(NUM_JOINTS, 1.0 / 12.0))
 # Of what a sample says about models: those of a crossing, some dozens, are off together when it comes early.
 _ONE_IN = 10.0
 _KEPT = 1.0 - 1.0 / 5000.0  # of what speaks against models, from one sample to the next
@@ -44,8 +52,8 @@ class GearErrors:
     slowly it decides when they cross, tenths of a second before or after an open gap. How much it carries is
     in the mixture of both.
 
-    The turn within which hysteresis turns over is no linear parameter. So several models of each gear, each
-    with a turn of its own, are carried along and count by how likely they are after what a camera has shown.
+    The turn within which hysteresis turns over and the play are no linear parameters. So models of each gear
+    with several of both are carried along, and count by how likely they are after what a camera has shown.
     """
 
     def __init__(self, robot: RobotModel) -> None:
@@ -76,7 +84,7 @@ class GearErrors:
         At first the teeth lie where the load has them, and the hysteresis is relaxed.
 
         Args:
-            memory: of the layout. Its ``shares`` (3, 6) say how much models count, `BEFORE` if they are zero.
+            memory: of the layout. Its ``shares`` (6, 6) say how much models count, `BEFORE` if they are zero.
             springs: as of `springs`, (2, 6). How far they bend decides how far the hysteresis turns over.
             torque: in N m, (6,).
             duration: in s.
@@ -97,19 +105,20 @@ class GearErrors:
         """Renews what speaks against each model of each gear, after one sample of the camera.
 
         Args:
-            against: half of the squared errors that it would have had more, in variances, (3, 6); is renewed.
+            against: half of the squared errors that it would have had more, in variances, (6, 6); is renewed.
             J: Jacobian of the tip, (6, 6), rotation first.
             r: how far the tip was seen from where it was predicted, (6,).
             weights: of the camera, one over variances, (6,).
-            others: by how much links would be further ahead with each model, rad, (3, 6), see `MotorPlan`.
+            others: by how much links would be further ahead with each model, rad, (6, 6), see `MotorPlan`.
         """
         kernels.gears.weigh(J, r, weights / _ONE_IN, others, _KEPT, against)
 
     @staticmethod
     def likely(against: np.ndarray) -> np.ndarray:
-        """How likely each model of each gear is, (3, 6), columns are joints, after what speaks against it."""
-        likely = BEFORE * np.exp(against.min(axis=0) - against)
-        return likely / likely.sum(axis=0)
+        """How likely each model of each gear is, (6, 6), columns are joints, after what speaks against it."""
+        likely = np.empty_like(BEFORE)
+        kernels.gears.believe(BEFORE, against, likely)
+        return likely
 
     def variances(
         self, sizes: np.ndarray, states: np.ndarray, torque: np.ndarray, spread: float

@@ -38,7 +38,7 @@ class MotorPlan(NamedTuple):
     twist: np.ndarray  # (6,), of the tip
     columns: np.ndarray  # (6, 18 + g), as `ArmGeometry.arm` gives them
     states: np.ndarray  # (18,), of the gears, see `GearErrors`
-    others: np.ndarray  # (3, 6) rad, by how much links would be further ahead with each model of their gears
+    others: np.ndarray  # (6, 6) rad, by how much links would be further ahead with each model of their gears
     ratios: np.ndarray  # (6,), speed of each joint for that of its motor, 1 but for the waves of its gear
 
     @property
@@ -145,7 +145,7 @@ class PreviewPlanner:
             wanted: the path at this instant.
             since_start: s.
             step: s since the last instant that was planned.
-            likely: how likely each model of the gears is, (3, 6).
+            likely: how likely each model of the gears is, (6, 6).
         """
         x, rate = parameters
         model = self._model

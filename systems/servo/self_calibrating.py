@@ -155,12 +155,10 @@ class SelfCalibrating(LeafSystem):
         q, still = np.linspace(0.1, 0.6, NUM_JOINTS), np.zeros(NUM_JOINTS)
         X_WE = model.forward(model.constants(model.mean), model.mean, q[None])[0][0]
         self._planner.start(memory.planner, model.mean, q, X_WE)
-        wanted, parameters = (
-            Wanted(X_WE, still, np.zeros((3, NUM_JOINTS))),
-            (model.mean, np.zeros(model.size)),
-        )
+        wanted = Wanted(X_WE, still, np.zeros((3, NUM_JOINTS)))
+        at = wanted, 0.0, self.period, model.gear_errors.likely(memory.estimator.against)
         for _ in range(2):
-            plan = self._planner.step(memory.planner, parameters, wanted, 0.0, self.period)
+            plan = self._planner.step(memory.planner, (model.mean, np.zeros(model.size)), *at)
             motion = plan.theta, plan.velocity, plan.acceleration
             command = self._drives.command(memory.drives, motion, plan.on_motors, self._model.payload)
         self._drives.deviate(memory.drives, still, still, still)

@@ -143,11 +143,11 @@ class DriveMemory(NamedTuple):
 class Gap(NamedTuple):
     """Play of a gear, and what stands beside its teeth, of m models that differ."""
 
-    half: float  # rad, half of the least play
     least: float  # of the compliance that the robot's file says
     grease: float  # N m s/rad, that teeth move against
     held: float  # of the stiffness of the gear, what the hysteresis has
     widths: np.ndarray  # (m,) rad of deflection, after which it has turned over; the first is their unit
+    halves: np.ndarray  # (m,) rad, half of the least play
 
 
 class Gears(NamedTuple):

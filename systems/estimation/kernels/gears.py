@@ -13,7 +13,7 @@ def springs(compliance, gap, factors, sizes):
     out = np.empty((2, len(compliance)))
     for j in range(len(compliance)):
         out[0, j] = max(factors[j], gap.least) * compliance[j]
-        out[1, j] = max(sizes[5, j] + sizes[6, j], gap.half)
+        out[1, j] = max(sizes[5, j] + sizes[6, j], gap.halves[0])
     return out
 
 
@@ -31,19 +31,20 @@ def step(springs, gap, torque, duration, is_first, state):
             holds; is renewed.
     """
     for j in range(len(torque)):
-        compliance, half = springs[0, j], springs[1, j]
-        held, pace = gap.held / compliance, duration / (gap.grease * half)  # N m/rad, per N m
-        spring = held * half
+        compliance = springs[0, j]
+        held = gap.held / compliance  # N m/rad
         side = -1.0 if torque[j] > 0.0 else 1.0 if torque[j] < 0.0 else 0.0
-        state[0, j] = side if is_first else min(max(state[0, j] - pace * torque[j], -1.0), 1.0)
+        free = state[0, j] - duration / (gap.grease * springs[1, j]) * torque[j]
+        state[0, j] = side if is_first else min(max(free, -1.0), 1.0)
         for m in range(len(gap.widths)):
-            k, width = 1 + 3 * m, gap.widths[m]
+            k, width, half = 1 + 3 * m, gap.widths[m], max(springs[1, j], gap.halves[m])
             if is_first:
                 state[k, j] = half * side - compliance * torque[j]
                 state[k + 1, j], state[k + 2, j] = 0.0, side
                 continue
             # Implicit in the spring of the hysteresis, which goes along with the teeth.
             z, teeth = state[k + 1, j], state[k + 2, j]
+            pace, spring = duration / (gap.grease * half), held * half
             push = torque[j] + held * z - spring * teeth
             way = (teeth - pace * push) / (1.0 + pace * spring)
             state[k + 2, j] = min(max(way, -1.0), 1.0)
@@ -99,6 +100,20 @@ def weigh(J, r, weights, others, kept, against):
         for m in range(len(others)):
             d = others[m, j]
             against[m, j] = kept * against[m, j] + d * (0.5 * d * stiff - pull)
+
+
+@compiled
+def believe(before, against, likely):
+    """Writes how likely models are, (m, n), from how likely they were and what speaks against them."""
+    for j in range(against.shape[1]):
+        least, total = against[0, j], 0.0
+        for m in range(len(against)):
+            least = min(least, against[m, j])
+        for m in range(len(against)):
+            likely[m, j] = before[m, j] * math.exp(least - against[m, j])
+            total += likely[m, j]
+        for m in range(len(against)):
+            likely[m, j] /= total
 
 
 @compiled
