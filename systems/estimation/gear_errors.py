@@ -34,6 +34,7 @@ NUM_MODELS = len(_GAP.widths)
 BEFORE = np.outer([4.0, 2.0, 2.0, 2.0, 1.0, 1.0], np.full(NUM_JOINTS, 1.0 / 12.0))
 # Of what a sample says about models: those of a crossing, some dozens, are off together when it comes early.
 _ONE_IN = 10.0
+_USUAL = 4.0  # standard deviations of the camera; where it shows more, that is no gear's doing
 _KEPT = 1.0 - 1.0 / 5000.0  # of what speaks against models, from one sample to the next
 # Of the spread, how large an open gap may be. Until a load has turned over slowly nothing tells it from one
 # that is held, and then a held one is the better guess.
@@ -111,7 +112,7 @@ class GearErrors:
             weights: of the camera, one over variances, (6,).
             others: by how much links would be further ahead with each model, rad, (6, 6), see `MotorPlan`.
         """
-        kernels.gears.weigh(J, r, weights / _ONE_IN, others, _KEPT, against)
+        kernels.gears.weigh(J, r, weights, others, (_USUAL, 1.0 / _ONE_IN, _KEPT), against)
 
     @staticmethod
     def likely(against: np.ndarray) -> np.ndarray:

@@ -90,8 +90,18 @@ def differ(gap, state, states, sizes, others):
 
 
 @compiled
-def weigh(J, r, weights, others, kept, against):
-    """Renews what speaks against models, (m, n), see `GearErrors.weigh`; ``kept`` of it is left."""
+def weigh(J, r, weights, others, limits, against):
+    """Renews what speaks against models, (m, n), see `GearErrors.weigh`.
+
+    Args:
+        J, r, weights, others, against: as there.
+        limits: standard deviations beyond which a sample says nothing; how much one counts; what is kept of
+            what spoke against models before.
+    """
+    usual, share, kept = limits
+    for i in range(6):
+        if r[i] ** 2 * weights[i] > usual**2:
+            return
     for j in range(others.shape[1]):
         pull = stiff = 0.0
         for i in range(6):
@@ -99,7 +109,7 @@ def weigh(J, r, weights, others, kept, against):
             stiff += J[i, j] ** 2 * weights[i]
         for m in range(len(others)):
             d = others[m, j]
-            against[m, j] = kept * against[m, j] + d * (0.5 * d * stiff - pull)
+            against[m, j] = kept * against[m, j] + share * d * (0.5 * d * stiff - pull)
 
 
 @compiled
