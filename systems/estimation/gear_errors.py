@@ -44,7 +44,7 @@ _LEAST_TORQUE = 1e-6  # N m, so that a gear which nothing holds has a side
 
 
 class GearErrors:
-    """Shapes of which a gear's error is a sum, each between -1 and 1.
+    """Shapes of which a gear's error is a sum, each between -1 and 1 or, of hysteresis, some times as much.
 
     Sine and cosine of one and of two turns of the motor for the uneven ratio; a state of Dahl's model, driven
     by how far the gear yields, for hysteresis; and where the teeth are in their gap, twice. A load pushes
@@ -80,7 +80,7 @@ class GearErrors:
     def step(
         self, memory: SimpleNamespace, springs: np.ndarray, torque: np.ndarray, duration: float
     ) -> np.ndarray:
-        """Loads the gears for a time; returns their states in -1 to 1, (18,).
+        """Loads the gears for a time; returns their states, (18,), the last three shapes of each joint.
 
         At first the teeth lie where the load has them, and the hysteresis is relaxed.
 

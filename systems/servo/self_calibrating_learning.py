@@ -46,7 +46,8 @@ _LOOK_EVERY = 5  # ticks, between two searches for the dead time
 _GIVE_UP = 1.6  # s after the start: what is believed of the dead time has to do
 
 # A row of the plan: motors, loads, links, tip, unrest, columns and correction of the drive model, torques of
-# its search for gains, by how much the command is ahead of the plan, states of the gears.
+# its search for gains, by how much the command is ahead of the plan, states of the gears and what their
+# models differ by.
 PLAN = Layout(
     theta=(6,),
     velocity=(6,),

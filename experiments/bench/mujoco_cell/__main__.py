@@ -4,7 +4,7 @@ Arm, drives, encoders and camera are MuJoCo's or written anew; of ours they have
 Robots are as wrong as in the scenario `everything`: every frame displaced by up to 6 mm and turned by up to
 0.9 degrees, springs and friction off by up to 20 %, a load of another mass and centre, a dead time and stamps
 of the camera that are 3 ms off. Beyond that Coulomb friction sticks, and drives are sampled, with lags of
-their own.
+their own. With ``--play`` gears have play, hysteresis and uneven ratios, which are none of ours either.
 """
 
 import argparse
@@ -51,7 +51,8 @@ def main() -> None:
     parser.add_argument(
         "--play",
         type=float,
-        help="arc minutes, of gears that have hysteresis, uneven ratios and a hump of friction, too",
+        metavar="ARC_MINUTES",
+        help="of gears that have hysteresis, uneven ratios and a hump of friction, too; else none of these",
     )
     parser.add_argument("--jobs", type=int, default=None, help="parallel processes; one per core")
     parser.add_argument("--json", metavar="FILE", default="")
@@ -59,6 +60,8 @@ def main() -> None:
     if options.friction_time < 2.0 * STEP:
         parser.error(f"--friction-time must be two steps of {STEP} s or more, got {options.friction_time}")
     wrong = Wrong(bending=options.bending, friction_time=options.friction_time)
+    if options.play is not None and options.play < 0.0:
+        parser.error(f"--play must not be negative, got {options.play:g}")
     if min(options.gains) <= 0.0:
         parser.error(f"--gains must be positive, got {' '.join(f'{gain:g}' for gain in options.gains)}")
     drives = Drives(*options.gains, planner=20.0 if options.egm else 0.0)
