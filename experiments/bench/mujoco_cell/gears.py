@@ -33,7 +33,10 @@ class Wear:
 
 
 class WornGears:
-    """The gears of a MuJoCo model, whose springs they take over."""
+    """The gears of a MuJoCo model, whose springs they take over.
+
+    What uneven ratios make of the torque that motors feel, half a hundredth of it, is left out.
+    """
 
     def __init__(self, arm: Arm, robot: RobotModel, wear: Wear, seed: int) -> None:
         """Draws what each gear has.
@@ -59,7 +62,7 @@ class WornGears:
         self._frequency = 2.0 * np.asarray(robot.gear_ratio)
         self._unevenness = about(wear.unevenness)
         self._phase = rng.uniform(0.0, 2.0 * np.pi, len(JOINTS))
-        self._hump = about(wear.hump) * model.dof_frictionloss[self._motors]
+        self.hump = about(wear.hump) * model.dof_frictionloss[self._motors]
         self._hump_speed = wear.hump_speed
         self.stretch = np.zeros((len(JOINTS), len(SLIPS)))  # rad, of the springs of hysteresis
         self._last = np.zeros(len(JOINTS))
@@ -67,6 +70,11 @@ class WornGears:
     def uneven(self, theta: np.ndarray) -> np.ndarray:
         """By how much links are ahead of motors at theta, rad, (6,)."""
         return self._unevenness * np.sin(self._frequency * theta + self._phase)
+
+    def more_friction(self, speed: np.ndarray) -> np.ndarray:
+        """What motors need more at low speeds, N m, (6,), at their speeds in rad/s of the joint."""
+        share = speed / self._hump_speed
+        return self.hump * share * np.exp(0.5 * (1.0 - share**2))
 
     def rest(self, data: mujoco.MjData) -> None:
         """Teeth lie on the side to which gravity pushes them, and the springs of hysteresis are relaxed."""
@@ -92,5 +100,4 @@ class WornGears:
         self.stretch = np.clip(self.stretch + turn[:, None], -SLIPS, SLIPS)
         held = -(self.springs * self.stretch).sum(axis=1)
         data.qfrc_applied[self.joints] = held
-        share = speed / self._hump_speed
-        data.qfrc_applied[self._motors] -= self._hump * share * np.exp(0.5 * (1.0 - share**2))
+        data.qfrc_applied[self._motors] -= self.more_friction(speed)
