@@ -19,15 +19,15 @@ from systems.estimation.memory import Layout
 
 # Torque that is needed beside the feedforward; rotor, viscous, Coulomb, and what that has more at low speeds;
 # the load of a kilogram, and of a kg m of its first moment along x, y, z; a kilogram that is not held; what
-# friction is more than believed where it turns over sharply.
-_FILTERED = 11
+# friction is more than believed where it turns over at once, and within a third of the believed width.
+_FILTERED = 12
 # Of each torque, of a planner, of what is late beside the plan, and of what nobody gives with other gains
 COLUMNS = 6 * (_FILTERED + 1 + len(FACTORS))
 _VISCOUS, _COULOMB, _HUMPS, _CONSTANTS = slice(14, 37, 4), slice(15, 37, 4), slice(16, 37, 4), slice(37, 43)
 DEAD_TIME, MASS, MOMENT, SMOOTHED = 0, 43, slice(44, 47), 47
 SHARP, NOT_HELD, GIVING = slice(48, 54), slice(54, 60), slice(60, 66)
-OTHER_GAINS = slice(66, 69)
-SIZE = 69
+OTHER_GAINS, THIRD = slice(66, 69), slice(69, 75)
+SIZE = 75
 LATE = slice(9, 11)  # of the columns, six by six: how a planner smooths, and how fast commands leave the plan
 # Of Coulomb's friction, the spread of what there may be more of it; less where it is learnt early, or the
 # first lap of robots without a hump is twisted more
@@ -36,6 +36,7 @@ _SLOW = 0.05  # rad/s, of Stribeck's effect, exp(-|v| / _SLOW) as Tustin has it;
 # The spreads of how much of Coulomb friction turns over more sharply than believed, in all joints alike and
 # in one beside the others: all have bearings and seals of a kind, and one stop of one shows it
 _SHARPER, _SHARPER_ALONE = 6.0, 0.6
+_WITHIN_A_THIRD = 0.7  # likewise of what turns over neither as gently as believed nor at once
 # kg that the robot's controller may not hold, or hold too much, of a robot that carries 7 kg: of all joints
 # alike, and of one beside the others, as it may have other gains for the load that it was told
 _UNTOLD, _UNTOLD_ALONE = 5.0, 3.0
@@ -57,7 +58,7 @@ class DriveCommand(NamedTuple):
     velocity: np.ndarray  # (6,) rad/s
     torque: np.ndarray  # (6,) N m, joint side, on top of what the drives do for gravity
     beside: np.ndarray  # (6,) rad, of the position what is beside the plan because of what was learnt
-    columns: np.ndarray  # (96,), what `DriveModel.features` needs of this instant
+    columns: np.ndarray  # (102,), what `DriveModel.features` needs of this instant
     torques: np.ndarray  # (4, 6) N m, what `GainSearch.follow` takes
 
 
@@ -141,7 +142,7 @@ class DriveModel:
         of_cascade = config.speed_lag_sigma if model.takes_torque else config.smoothing_sigma
         late = of_cascade if kind == "cascade" else 0.0
         spread += [config.payload_sigma * self._scale] + [self._moment] * 3 + [late]
-        spread += [0.0] * 12 + [0.0 if model.takes_torque else _GIVES] * 6 + [_OTHERWISE] * 3
+        spread += [0.0] * 12 + [0.0 if model.takes_torque else _GIVES] * 6 + [_OTHERWISE] * 3 + [0.0] * 6
         self._prior = np.diag(np.array(spread) ** 2)
         self._prior[NOT_HELD, NOT_HELD] = self._scale**2 * (_UNTOLD**2 + _UNTOLD_ALONE**2 * np.eye(6))
         sets = len(FACTORS)
@@ -156,7 +157,7 @@ class DriveModel:
             correction=(6,),
             smoothed=(6,),
             hung=(2, 6),  # rad, by which motors were off when they were slow, fading, and are if they are
-            deviation=Layout(last=(6, 6), z=(6, 6, 2), out=(6, 6)),  # of `deviate`
+            deviation=Layout(last=(7, 6), z=(7, 6, 2), out=(7, 6)),  # of `deviate`
             wound=(3, 6),  # of what drives wound up meanwhile: integral and error; for how long, s
             gains=gains_layout,
             coming=gains_layout,  # gains that were found and not taken yet; factors of 0: there are none
@@ -203,7 +204,7 @@ class DriveModel:
         return DriveCommand(position, velocity, torque, beside, columns, memory.w[_SEARCHED])
 
     def features(self, v: np.ndarray, a: np.ndarray, columns: np.ndarray) -> np.ndarray:
-        """Rows of the regression, shape (6, 69), from motion and the filtered torques (96,)."""
+        """Rows of the regression, shape (6, 75), from motion and the filtered torques (102,)."""
         Phi = np.zeros((6, SIZE))
         kernels.drives.features(v, a, columns, Phi)
         return Phi
@@ -241,7 +242,7 @@ class DriveModel:
         Args:
             memory: of the layout.
             planned: position, velocity and acceleration, (6,) each.
-            columns, beside: of the command of that instant, (96,) and (6,) in rad.
+            columns, beside: of the command of that instant, (102,) and (6,) in rad.
             actual: where the motors were, rad, (6,).
             most: nothing is learnt if more than this is not explained yet, rad; of a joint with much friction
                 for the stiffness of its drive that much more.
@@ -280,6 +281,7 @@ class DriveModel:
         P[humps, humps] = spread**2
         if not P[SHARP, SHARP].any() and not self._hides_sticking:
             P[SHARP, SHARP] = _SHARPER**2 + _SHARPER_ALONE**2 * np.eye(6)
+            P[THIRD, THIRD] = _WITHIN_A_THIRD**2 * (1.0 + np.eye(6))
             # Until now they had to make up for friction that turns over sharply.
             P[_DIAGONAL[_VISCOUS], _DIAGONAL[_VISCOUS]] += _VISCOUS_SPREAD**2
             P[_DIAGONAL[_COULOMB], _DIAGONAL[_COULOMB]] += _COULOMB_SPREAD**2

@@ -129,11 +129,11 @@ class DriveMemory(NamedTuple):
     """What one command hands on to the next."""
 
     started: np.ndarray  # (1,)
-    # Integral of a following error, and the error, of each of eleven torques, with each set of gains
-    z: np.ndarray  # (4, 11, 6, 2)
-    w: np.ndarray  # (11, 6), those torques; if torques are taken, of the first what changes evenly
-    beta: np.ndarray  # (69,), parameters of the regression
-    led: np.ndarray  # (2, 69), the same as they are used, which follow those, and their rates
+    # Integral of a following error, and the error, of each of twelve torques, with each set of gains
+    z: np.ndarray  # (4, 12, 6, 2)
+    w: np.ndarray  # (12, 6), those torques; if torques are taken, of the first what changes evenly
+    beta: np.ndarray  # (75,), parameters of the regression
+    led: np.ndarray  # (2, 75), the same as they are used, which follow those, and their rates
     correction: np.ndarray  # (6,) rad
     smoothed: np.ndarray  # (6,) rad/s, accelerations through 1 / (s + following)
     hung: np.ndarray  # (2, 6) rad, by which motors were off when they were slow, fading, and are if they are

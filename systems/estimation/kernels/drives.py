@@ -9,17 +9,18 @@ from systems.estimation.kernels.geometry import place_links
 from systems.estimation.kernels.loads import hold
 from systems.estimation.kernels.plan import follow
 
-_SHARP_WIDTH = 0.02  # of the believed width over which friction turns over, where it turns over at once
+# Of the believed width over which friction turns over: where it turns over at once, and where within a third,
+# in which the sign of a measured speed is not known
+_SHARP_WIDTH, _THIRD_WIDTH = 0.02, 0.3
 _STILL = 0.1  # of that width, below which a motor may hang in its friction
 _FORGOTTEN = 0.1  # s, in which what it was off by then has fallen to a third
 _WINDS = 0.5  # s, longer at rest than that, steps of an encoder may be taken for it
-_BLUR = 0.3  # of the believed width, in which the sign of a measured speed is not known
 _MOST_PERIODS = 1.5  # by which torques are sent ahead or held back
 
 
 @compiled
 def features(v, a, filtered, Phi):
-    """Rows of the regression, (6, 69), which are zero before; see `DriveModel.features`."""
+    """Rows of the regression, (6, 75), which are zero before; see `DriveModel.features`."""
     for i in range(6):
         Phi[i, 0] = Phi[i, 1 + i] = v[i] + filtered[60 + i]
         Phi[i, 7 + i] = 1e-2 * a[i]
@@ -32,6 +33,7 @@ def features(v, a, filtered, Phi):
         Phi[i, 48 + i] = filtered[66 + i]
         Phi[i, 54 + i] = filtered[48 + i]
         Phi[i, 60 + i] = filtered[72 + i]
+        Phi[i, 69 + i] = filtered[96 + i]
         for k in range(3):
             Phi[i, 66 + k] = filtered[78 + 6 * k + i]
 
@@ -44,22 +46,22 @@ def deviate(drives, v, dv, da, last, z, out):
         drives: `Drives`.
         v: planned speeds, rad/s, (6,).
         dv, da: by how much speeds and accelerations were more, rad/s and rad/s^2, (6,).
-        last: (6, 6), torques a period ago: in all, of rotor, viscous and Coulomb friction, its hump, and
-            what it turns over more sharply; is renewed.
-        z: (6, 6, 2), integral of the following error and error of each; is renewed.
-        out: (6, 6) rad, those errors; is written.
+        last: (7, 6), torques a period ago: in all, of rotor, viscous and Coulomb friction, its hump, and
+            what it turns over more sharply, at once and within a third; is renewed.
+        z: (7, 6, 2), integral of the following error and error of each; is renewed.
+        out: (7, 6) rad, those errors; is written.
     """
-    w = np.empty(6)
+    w = np.empty(7)
     for i in range(6):
         coulomb, width, u = drives.coulomb[i], drives.width[i], v[i] + dv[i]
-        blur, sign, before = _BLUR * width, math.tanh(u / width), math.tanh(v[i] / width)
+        third, sign, before = _THIRD_WIDTH * width, math.tanh(u / width), math.tanh(v[i] / width)
         w[1], w[2], w[3] = drives.rotor[i] * da[i], drives.viscous[i] * dv[i], coulomb * (sign - before)
         hump = sign * math.exp(-abs(u) / drives.slow) - before * math.exp(-abs(v[i]) / drives.slow)
         w[4] = coulomb * hump
-        w[5] = coulomb * (math.tanh(u / blur) - math.tanh(v[i] / blur)) - w[3]
+        w[5] = w[6] = coulomb * (math.tanh(u / third) - math.tanh(v[i] / third)) - w[3]
         w[0] = drives.inertia[i] * da[i] + w[2] + w[3]
         _filter(drives.step[0, i], z[:, i], last[:, i], w)
-        for k in range(6):
+        for k in range(7):
             last[k, i], out[k, i] = w[k], z[k, i, 1]
 
 
@@ -74,7 +76,7 @@ def _behind(v, a, filtered, beta, i):
         total += filtered[24 + 6 * k + i] * beta[43 + k]
     for k in range(3):
         total += filtered[78 + 6 * k + i] * beta[66 + k]
-    total += filtered[54 + i] * beta[47] + filtered[66 + i] * beta[48 + i]
+    total += filtered[54 + i] * beta[47] + filtered[66 + i] * beta[48 + i] + filtered[96 + i] * beta[69 + i]
     return total + beta[37 + i] + filtered[48 + i] * beta[54 + i] + filtered[72 + i] * beta[60 + i]
 
 
@@ -144,7 +146,7 @@ def look_back(drives, planned, beside, filtered, actual, deviation, hung, P, bet
         beside: what was commanded beside the plan because of what was learnt, rad, (6,).
         filtered: as of `features`.
         actual: positions of the motors, rad, (6,).
-        deviation: (6, 6) rad, of `deviate`.
+        deviation: (7, 6) rad, of `deviate`.
         hung: rad, (2, 6), by which motors were off when they were slow, fading, and are if they are; is
             renewed.
         P, beta: as of `learn`.
@@ -170,6 +172,7 @@ def look_back(drives, planned, beside, filtered, actual, deviation, hung, P, bet
         for k in range(4):
             Phi[i, 13 + 4 * i + k] += deviation[1 + k, i]
         Phi[i, 48 + i] += deviation[5, i]
+        Phi[i, 69 + i] += deviation[6, i]
         y[i] = theta[i] - actual[i] + beside[i] - deviation[0, i]
         unexplained = y[i]
         for j in range(len(beta)):
@@ -222,7 +225,7 @@ def _missing(z, beta, i):
 @inner
 def _learnt(z, beta, i):
     """The following error of a joint by what has been learnt of its rotor and friction."""
-    total = z[10, 1] * beta[48 + i]
+    total = z[10, 1] * beta[48 + i] + z[11, 1] * beta[69 + i]
     for k in range(4):
         total += z[1 + k, 1] * beta[13 + 4 * i + k]
     return total
@@ -257,14 +260,15 @@ def command(drives, arm, masses, memory, motion, loads, mass, limits, out, filte
             may add to the speed of a joint in rad/s.
         out: (4, 6), position, velocity, torque, and what of the position is beside the plan because of what
             was learnt; is written.
-        filtered: (96,), what `features` takes, of rotor, viscous and Coulomb friction and its hump, of a
+        filtered: (102,), what `features` takes, of rotor, viscous and Coulomb friction and its hump, of a
             kilogram and of a kg m along each axis, of a kilogram
             that is not held; the accelerations that a planner smooths, how fast the command runs away from
-            the plan in rad/s, of what friction turns over more sharply, and of all that the motion needs
-            and is not given as a torque, with the gains and by how much more with three others; is written.
+            the plan in rad/s, of what friction turns over at once, of all that the motion needs and is not
+            given as a torque, with the gains and by how much more with three others, and of what friction
+            turns over within a third of the believed width; is written.
     """
     theta, v, a = motion
-    X_WE, frames, w = np.empty((4, 4)), np.empty((7, 4, 4)), np.empty(11)
+    X_WE, frames, w = np.empty((4, 4)), np.empty((7, 4, 4)), np.empty(12)
     held, with_more = np.empty(6), np.empty(6)
     place_links(arm, theta, X_WE, frames)
     hold(masses, drives.payload, frames, theta, held)
@@ -286,7 +290,8 @@ def command(drives, arm, masses, memory, motion, loads, mass, limits, out, filte
         turn = drives.period * a[i]
         w[3] = drives.coulomb[i] * _mean_sign(v[i] - 0.5 * turn, turn, drives.width[i])
         w[4] = w[3] * math.exp(-abs(v[i]) / drives.slow)
-        w[10] = drives.coulomb[i] * _mean_sign(v[i] - 0.5 * turn, turn, _SHARP_WIDTH * drives.width[i]) - w[3]
+        for k, width in enumerate((_SHARP_WIDTH * drives.width[i], _THIRD_WIDTH * drives.width[i])):
+            w[10 + k] = drives.coulomb[i] * _mean_sign(v[i] - 0.5 * turn, turn, width) - w[3]
         for k in range(4):
             w[5 + k] = loads[1 + k, i]
         w[9] = with_more[i] - held[i]
@@ -315,7 +320,8 @@ def command(drives, arm, masses, memory, motion, loads, mass, limits, out, filte
         last[0] = even if drives.takes_torque else needed
         for k in range(1, 10):
             last[k], filtered[6 * (k - 1) + i] = w[k], z[k, 1]
-        last[10], filtered[66 + i] = w[10], z[10, 1]
+        for k, at in enumerate((66, 96)):
+            last[10 + k], filtered[at + i] = w[10 + k], z[10 + k, 1]
         filtered[72 + i] = missing = _missing(z, led, i)
         for k in range(3):
             other = memory.z[1 + k, :, i]
@@ -329,7 +335,7 @@ def command(drives, arm, masses, memory, motion, loads, mass, limits, out, filte
         before = correction if is_first else memory.correction[i]
         correction = before + min(max(correction - before, -most), most)
         memory.correction[i] = correction
-        off, sticks = memory.hung[1, i], led[48 + i]
+        off, sticks = memory.hung[1, i], led[48 + i] + led[69 + i]
         unwound, speed = _unwound(drives, v[i], a[i], off, sticks, memory.wound, i)
         out[3, i] = correction + unwound
         out[0, i] += out[3, i]

@@ -18,6 +18,7 @@ from systems.estimation.drives.drive_model import (
     SHARP,
     SIZE,
     SMOOTHED,
+    THIRD,
     DriveModel,
 )
 from systems.link.abb.motion import EgmMotion, EgmMotionConfig
@@ -347,7 +348,7 @@ def test_friction_is_learnt_anew_where_the_load_was_another_one():
     """With a load that nobody told motors are off their plan, and turn over at other times than planned."""
     model, memory = drives()
     model.open_low_speeds(memory)
-    friction = np.array([*range(14, 37, 4), *range(15, 37, 4), *range(SHARP.start, SHARP.stop)])
+    friction = np.r_[14:37:4, 15:37:4, SHARP, THIRD]
     memory.beta[friction], memory.P[friction, 0], memory.P[0, friction] = 0.5, 1e-4, 1e-4
     model.widen(memory)
     assert memory.beta[friction].all()
@@ -356,11 +357,12 @@ def test_friction_is_learnt_anew_where_the_load_was_another_one():
     model.widen(memory, is_told_otherwise=True, is_on_path=False)
     assert not memory.beta[friction].any()
     assert not memory.P[SHARP].any()
+    assert not memory.P[THIRD].any()
     assert not memory.P[friction, 0].any()
     started = drives()[1].P
     np.testing.assert_array_equal(memory.P[friction[:12]], started[friction[:12]])
     model.open_low_speeds(memory)
-    assert (np.diag(memory.P)[SHARP] > 1.0).all()
+    assert (np.diag(memory.P)[np.r_[SHARP, THIRD]] > 0.5).all()
 
 
 @pytest.mark.parametrize(("robot", "early"), [("kr16", [3, 4, 5]), ("irb1200", [])])
@@ -372,7 +374,8 @@ def test_humps_are_open_early_where_friction_moves_a_joint_most(robot, early):
 
     model.open_low_speeds(memory, is_early=True)
     assert np.flatnonzero(spreads()).tolist() == early
-    assert (memory.P[49, 49] > 0.0) == (not early)  # how sharply it turns over, such joints hide
+    opened = np.diag(memory.P)[np.r_[SHARP, THIRD]] > 0.0
+    assert (opened == (not early)).all()  # how sharply it turns over, such joints hide
     known = 0.5 * spreads()
     memory.P[np.arange(16, 37, 4), np.arange(16, 37, 4)] = known
     model.open_low_speeds(memory)
