@@ -157,7 +157,7 @@ class DriveModel:
             correction=(6,),
             smoothed=(6,),
             hung=(2, 6),  # rad, by which motors were off when they were slow, fading, and are if they are
-            deviation=Layout(last=(7, 6), z=(7, 6, 2), out=(7, 6)),  # of `deviate`
+            deviation=Layout(last=(6, 6), z=(6, 6, 2), out=(6, 6)),  # of `deviate`
             wound=(3, 6),  # of what drives wound up meanwhile: integral and error; for how long, s
             gains=gains_layout,
             coming=gains_layout,  # gains that were found and not taken yet; factors of 0: there are none

@@ -9,8 +9,8 @@ from systems.estimation.kernels.geometry import place_links
 from systems.estimation.kernels.loads import hold
 from systems.estimation.kernels.plan import follow
 
-# Of the believed width over which friction turns over: where it turns over at once, and where within a third,
-# in which the sign of a measured speed is not known
+# Of the believed width over which friction turns over: where it turns over at once, and where within a third;
+# in that the sign of a measured speed is not known
 _SHARP_WIDTH, _THIRD_WIDTH = 0.02, 0.3
 _STILL = 0.1  # of that width, below which a motor may hang in its friction
 _FORGOTTEN = 0.1  # s, in which what it was off by then has fallen to a third
@@ -46,22 +46,22 @@ def deviate(drives, v, dv, da, last, z, out):
         drives: `Drives`.
         v: planned speeds, rad/s, (6,).
         dv, da: by how much speeds and accelerations were more, rad/s and rad/s^2, (6,).
-        last: (7, 6), torques a period ago: in all, of rotor, viscous and Coulomb friction, its hump, and
-            what it turns over more sharply, at once and within a third; is renewed.
-        z: (7, 6, 2), integral of the following error and error of each; is renewed.
-        out: (7, 6) rad, those errors; is written.
+        last: (6, 6), torques a period ago: in all, of rotor, viscous and Coulomb friction, its hump, and
+            what it turns over more sharply, at once or within a third; is renewed.
+        z: (6, 6, 2), integral of the following error and error of each; is renewed.
+        out: (6, 6) rad, those errors; is written.
     """
-    w = np.empty(7)
+    w = np.empty(6)
     for i in range(6):
         coulomb, width, u = drives.coulomb[i], drives.width[i], v[i] + dv[i]
         third, sign, before = _THIRD_WIDTH * width, math.tanh(u / width), math.tanh(v[i] / width)
         w[1], w[2], w[3] = drives.rotor[i] * da[i], drives.viscous[i] * dv[i], coulomb * (sign - before)
         hump = sign * math.exp(-abs(u) / drives.slow) - before * math.exp(-abs(v[i]) / drives.slow)
         w[4] = coulomb * hump
-        w[5] = w[6] = coulomb * (math.tanh(u / third) - math.tanh(v[i] / third)) - w[3]
+        w[5] = coulomb * (math.tanh(u / third) - math.tanh(v[i] / third)) - w[3]
         w[0] = drives.inertia[i] * da[i] + w[2] + w[3]
         _filter(drives.step[0, i], z[:, i], last[:, i], w)
-        for k in range(7):
+        for k in range(6):
             last[k, i], out[k, i] = w[k], z[k, i, 1]
 
 
@@ -146,7 +146,7 @@ def look_back(drives, planned, beside, filtered, actual, deviation, hung, P, bet
         beside: what was commanded beside the plan because of what was learnt, rad, (6,).
         filtered: as of `features`.
         actual: positions of the motors, rad, (6,).
-        deviation: (7, 6) rad, of `deviate`.
+        deviation: (6, 6) rad, of `deviate`.
         hung: rad, (2, 6), by which motors were off when they were slow, fading, and are if they are; is
             renewed.
         P, beta: as of `learn`.
@@ -172,7 +172,7 @@ def look_back(drives, planned, beside, filtered, actual, deviation, hung, P, bet
         for k in range(4):
             Phi[i, 13 + 4 * i + k] += deviation[1 + k, i]
         Phi[i, 48 + i] += deviation[5, i]
-        Phi[i, 69 + i] += deviation[6, i]
+        Phi[i, 69 + i] += deviation[5, i]
         y[i] = theta[i] - actual[i] + beside[i] - deviation[0, i]
         unexplained = y[i]
         for j in range(len(beta)):
@@ -261,11 +261,11 @@ def command(drives, arm, masses, memory, motion, loads, mass, limits, out, filte
         out: (4, 6), position, velocity, torque, and what of the position is beside the plan because of what
             was learnt; is written.
         filtered: (102,), what `features` takes, of rotor, viscous and Coulomb friction and its hump, of a
-            kilogram and of a kg m along each axis, of a kilogram
-            that is not held; the accelerations that a planner smooths, how fast the command runs away from
-            the plan in rad/s, of what friction turns over at once, of all that the motion needs and is not
-            given as a torque, with the gains and by how much more with three others, and of what friction
-            turns over within a third of the believed width; is written.
+            kilogram and of a kg m along each axis, of a kilogram that is not held; the accelerations that a
+            planner smooths, how fast the command runs away from the plan in rad/s, of what friction turns
+            over at once, of all that the motion needs and is not given as a torque, with the gains and by
+            how much more with three others, and of what friction turns over within a third of the believed
+            width; is written.
     """
     theta, v, a = motion
     X_WE, frames, w = np.empty((4, 4)), np.empty((7, 4, 4)), np.empty(12)
