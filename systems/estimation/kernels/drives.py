@@ -335,6 +335,7 @@ def command(drives, arm, masses, memory, motion, loads, mass, limits, out, filte
         before = correction if is_first else memory.correction[i]
         correction = before + min(max(correction - before, -most), most)
         memory.correction[i] = correction
+        # Nobody tells both shapes apart at a stop, and a motor that creeps does not stay off.
         off, sticks = memory.hung[1, i], led[48 + i] + led[69 + i]
         unwound, speed = _unwound(drives, v[i], a[i], off, sticks, memory.wound, i)
         out[3, i] = correction + unwound
