@@ -40,12 +40,12 @@ class CameraStreams:
             now: the steady clock in s.
 
         Raises:
-            ValueError: if a stream cannot be opened or has images of another size.
+            ValueError: if a stream cannot be opened; the message names each of them.
         """
         self._size, self._period, self._delay, self._now = size, period, delay, now
         self._names, self._given, self._is_closed = list(cameras), -np.inf, False
         self._frames: list[tuple[float, np.ndarray] | None] = [None] * len(self._names)
-        self._problem, self._unopened = "", []
+        self._problem, self._unopened = "", set[str]()
         places = [address.replace("{camera}", name) for name in self._names]
         opened = [threading.Event() for _ in places]
         self._threads = [
@@ -58,14 +58,16 @@ class CameraStreams:
             each.wait()
         if self._unopened:
             self.close()
-            raise ValueError(f"station.overview.source: {self._unopened[0]}: no video that can be read")
+            # In the order of the cameras: which thread was first is chance.
+            missing = ", ".join(place for place in places if place in self._unopened)
+            raise ValueError(f"station.overview.source: {missing}: no video that can be read")
 
     def _read(self, number: int, place: str, opened: threading.Event) -> None:
         # Opened here, all at once: a stream may take seconds, in which the frames of the others would wait.
         is_live = "://" in place
         video = cv2.VideoCapture(place, cv2.CAP_FFMPEG, _LIMITS) if is_live else cv2.VideoCapture(place)
         if not video.isOpened():
-            self._unopened.append(place)
+            self._unopened.add(place)
         opened.set()
         # A file has no clock of its own, a live stream waits for the next frame anyway.
         pause = 0.0 if is_live else self._period
