@@ -30,6 +30,7 @@ def _renewed(memory: SimpleNamespace) -> list[np.ndarray]:
         memory.planner.all,
         memory.columns.ravel(),
         memory.planned,
+        memory.feedback.all,
         memory.waited,
         memory.repeats.all,
         drives.started,

@@ -8,9 +8,10 @@ from robots.description.model import NUM_JOINTS
 from systems.controller_model import ControllerModel
 from systems.estimation import kernels
 from systems.estimation.drives.dead_time import CommandDelay
-from systems.estimation.drives.drive_model import COLUMNS, LATE, DriveModel
+from systems.estimation.drives.drive_model import COLUMNS, LATE, DriveCommand, DriveModel
 from systems.estimation.drives.encoder_steps import EncoderSteps
 from systems.estimation.drives.gain_search import TORQUES
+from systems.estimation.drives.motor_feedback import MotorFeedback
 from systems.estimation.events import (
     DEAD_TIME_CHANGED,
     GAINS_UNLIKE_BELIEF,
@@ -78,7 +79,9 @@ class Learning:
         self._half = max(1, round(_DIFFERENCE / model.period))
         self.tip_model = TipModel(model, config.estimator.spread)
         self.estimator = TipEstimator(self.tip_model, config.estimator)
-        self.drives = DriveModel(model, config.drives, config.drive, self.tip_model.has_gear_errors)
+        of_drives = config.drives, config.drive, self.tip_model.has_gear_errors
+        self.drives = DriveModel(model, *of_drives)
+        self.feedback = MotorFeedback(*of_drives, self.drives.moved_by_friction, model.period)
         self.delay = CommandDelay(model.period, config.dead_time)
         self.events, self.steps = EventLog(), EncoderSteps()
         reach = _REACH + max(model.command_delay, config.dead_time.longest) + model.camera_delay
@@ -86,10 +89,12 @@ class Learning:
         self.plan, self.encoders = History(PLAN.size, length), History(2 * NUM_JOINTS, length)
         # Gears yield later than they are loaded, by what their damping holds back.
         self._load_lag = float(np.median(self.tip_model.lag[:6]))
+        search = {"search": self.drives.search.layout, "looks": (1,), "taken": (1,)}  # and gains taken
         self.arrays = {
             "estimator": self.estimator.layout,
             "drives": self.drives.layout,
-            "gains": self._gains_layout(),
+            "feedback": self.feedback.layout,
+            "gains": Layout(**search) if self.drives.finds_gains else Layout(),
             "repeats": Layout(count=(1,), looks=(1,), sigma=(1,)),  # of the probe, see `Pace.look`
             "shown_at": (1,),  # the planned instant at which a probe that does not wait has shown gains
             "learn_from": (1,),  # s, the planned instant from which on motors show what their drives are
@@ -118,11 +123,6 @@ class Learning:
             "paused_until": (1,),
             "implausible": (1,),  # the most parameters that were beyond all bounds so far
         }
-
-    def _gains_layout(self) -> Layout:
-        """Of the search for gains: how often was looked, and others were taken."""
-        drives = self.drives
-        return Layout(search=drives.search.layout, looks=(1,), taken=(1,)) if drives.finds_gains else Layout()
 
     def start(self, memory: SimpleNamespace) -> None:
         """Writes what is known before the first sample."""
@@ -262,8 +262,7 @@ class Learning:
         needed = self._deviate(memory)
         if self._asks_for_gains(memory):
             self.drives.search.follow(memory.gains.search, memory.passed.torques + needed)
-        is_early = instant < memory.first[0] + _FIRST_LEARNT
-        if is_early or not self.delay.is_settled(memory.delay, instant) or np.isnan(off[0]):
+        if not self.is_on_plan(memory, instant) or np.isnan(off[0]):
             memory.drives.deviation.all[:] = 0.0  # that motors were elsewhere then was no friction's doing
             return
         actual = memory.passed.theta - off
@@ -271,6 +270,17 @@ class Learning:
             self._look_for_gains(memory, instant, actual)
         if instant > memory.learn_from[0]:
             self._learn_drives(memory, instant, actual)
+
+    def is_on_plan(self, memory: SimpleNamespace, instant: float) -> bool:
+        """Whether motors are on their plan at an instant but for what drives leave."""
+        has_begun = instant >= memory.first[0] + _FIRST_LEARNT
+        return bool(has_begun) and self.delay.is_settled(memory.delay, instant)
+
+    def feed_back(self, memory: SimpleNamespace, command: DriveCommand, instant: float) -> DriveCommand:
+        """A command for an instant with what encoders say of motors now."""
+        off = memory.off[-1] if self.is_on_plan(memory, instant) else np.zeros(NUM_JOINTS)
+        of_motors = off, self.steps.sigma(memory.steps), float(memory.delay.delay[0])
+        return self.feedback.add(memory.feedback, command, *of_motors)
 
     def _deviate(self, memory: SimpleNamespace) -> np.ndarray:
         """What motors needed beyond their plan, as they moved otherwise, `DriveModel.deviate`."""
@@ -295,6 +305,7 @@ class Learning:
     def begin(self, memory: SimpleNamespace, shown: float) -> None:
         """The robot begins to move; in ``shown`` s most of the probe will be over, if there is one."""
         memory.shown_at[0], memory.drives.coming.factors[:] = memory.first[0] + shown, 0.0
+        memory.feedback.beside[:] = 0.0
         if not memory.amplitude.any():
             memory.delay.known[0], memory.shown_at[0] = 1.0, np.inf  # nothing will show them
 

@@ -17,6 +17,7 @@ class DriveModelConfig:
     # to the plan, 1/s, less where commands are late
     braking: float = 100.0
     held_to_plan: float = 7.0
+    feedback: float = 20.0  # 1/s, of what a cascade leaves, at most; 0: none
     following: float = (
         20.0  # 1/s, with which the planner of a robot's controller follows references, as of EGM
     )

@@ -45,6 +45,7 @@ _OTHERWISE = 0.12  # share of what other gains would make of it, in all joints a
 _DOUBT = 30.0  # times what a motor was off by while it hung: by that its following error may be due to it
 _VISCOUS_SPREAD, _COULOMB_SPREAD = 0.3, 0.5  # of what a robot's file says of friction
 _HIDING = 1e-3  # rad, slack of a joint whose following errors have other reasons at low speeds
+_MOVED = 2e-4  # rad, slack of a joint whose motor is off by friction more than by all else; assumed
 _SLACK = 0.3  # of Coulomb's friction, by which it may be off while little is known of it
 _STEEPEST = 0.5  # rad/s, what learning may add to the speed of a joint
 _RESTS = {"cascade": 1e-5, "velocity": 1e-5, "position": 3e-5}  # rad, where a motor rests beside its command
@@ -162,6 +163,11 @@ class DriveModel:
             gains=gains_layout,
             coming=gains_layout,  # gains that were found and not taken yet; factors of 0: there are none
         )
+
+    @property
+    def moved_by_friction(self) -> np.ndarray:
+        """Which motors are off their plan by friction first of all, and show it, (6,)."""
+        return (self._drives.slack > _MOVED) & (not self._hides_sticking)
 
     def start(self, memory: SimpleNamespace) -> None:
         """Writes what is believed before anything moves."""

@@ -3,7 +3,7 @@
 # MuJoCo's functions are in a library of which type checkers see nothing.
 # pyright: reportAttributeAccessIssue=false
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from itertools import pairwise
 
 import mujoco
@@ -165,3 +165,23 @@ def test_the_true_tip_is_on_its_path_from_the_first_lap_on_physics_that_are_not_
     assert found["static_mm"] < 0.005
     assert found["guard"] == 0
     assert not found["learnt"]["events"]
+
+
+@dataclass(frozen=True)
+class WithoutFeedback(CellRun):
+    """The law learns from encoders, and feeds nothing back of what they show."""
+
+    @property
+    def settings(self) -> tuple[str, ...]:
+        """Those of the run, and no feedback."""
+        return *super().settings, "servo.laws.self_calibrating.drives.feedback=0"
+
+
+@pytest.mark.slow
+def test_friction_unlike_any_that_is_known_moves_the_tip_less_on_the_first_lap_with_feedback():
+    """That of a PUMA moves its motors by a quarter of a milliradian, before it has been learnt."""
+    alone, fed_back = (
+        run(kind("puma560", 1), lambda share: None)["laps"][0]["max_norm_mm"]
+        for kind in (WithoutFeedback, CellRun)
+    )
+    assert fed_back < 0.75 * alone

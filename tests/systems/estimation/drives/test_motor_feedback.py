@@ -1,0 +1,117 @@
+"""What encoders show is fed back: less of what nobody foresaw is left, and no dead time makes it unstable."""
+
+import numpy as np
+import pytest
+
+from systems.estimation.drives.drive_config import DriveModelConfig
+from systems.estimation.drives.drive_model import COLUMNS, DriveCommand
+from systems.estimation.drives.motor_feedback import MotorFeedback
+from tests.systems.estimation.drives.motors import PERIOD, drives
+
+STEP, STILL = 5e-4, np.zeros(6)  # s
+POSITION, SPEED, INTEGRAL = 25.0, 100.0, 10.0  # 1/s, of a cascade
+
+
+def part(kind="cascade", has_play=False, **config):
+    feedback = MotorFeedback(DriveModelConfig(**config), kind, has_play, STILL == 0.0, PERIOD)
+    return feedback, feedback.layout.view(np.zeros(feedback.layout.size))
+
+
+def some_command():
+    position, velocity, torque, beside = np.random.default_rng(0).normal(size=(4, 6))
+    return DriveCommand(position, velocity, torque, beside, np.zeros(COLUMNS), np.zeros((4, 6)))
+
+
+def behind_by(disturbance, delay, duration=2.0, planned_speed=0.0, sticks=0.0, **config):
+    """By how much a motor of unit inertia is off its plan, rad, every period: a cascade, late by the delay.
+
+    ``disturbance`` is an acceleration at a time; ``sticks`` one by which friction holds it, in rad/s^2.
+    """
+    feedback, memory = part(**config)
+    command = DriveCommand(STILL, STILL, STILL, STILL, np.zeros(COLUMNS), np.zeros((4, 6)))
+    coming, position, speed, wound, off = [(0.0, 0.0)] * (1 + round(delay / PERIOD)), 0.0, 0.0, 0.0, []
+    for k in range(round(duration / PERIOD)):
+        now = planned_speed * PERIOD * k
+        off.append(now - position)
+        told = feedback.add(memory, command, np.full(6, off[-2] if k else 0.0), STILL, delay)
+        coming.append((told.position[0], told.velocity[0]))
+        beside, rate = coming.pop(0)
+        for i in range(round(PERIOD / STEP)):
+            plan = now + planned_speed * STEP * i
+            wanted = planned_speed + rate + POSITION * (plan + beside - position)
+            wound += STEP * INTEGRAL * (wanted - speed)
+            push = SPEED * (wanted - speed + wound) + disturbance(PERIOD * k)
+            speed += STEP * push
+            speed -= np.sign(speed) * min(abs(speed), STEP * sticks)
+            position += STEP * speed
+    return np.array(off)
+
+
+@pytest.mark.parametrize("delay", [0.0, 4e-3, 8e-3])
+def test_of_a_torque_that_nobody_foresaw_less_is_left(delay):
+    def turns_over(t):
+        return 2.0 if t % 1.0 < 0.5 else -2.0
+
+    alone, fed_back = (behind_by(turns_over, delay, feedback=gain) for gain in (0.0, 20.0))
+    assert np.abs(fed_back).max() < 0.87 * np.abs(alone).max()  # 0.77 without a delay, 0.85 with two periods
+    assert fed_back.std() < 0.65 * alone.std()
+
+
+@pytest.mark.parametrize("delay", [0.04, 0.14, 0.3])
+def test_no_dead_time_makes_it_unstable(delay):
+    alone, fed_back = (
+        behind_by(lambda t: 2.0 * (t < 0.1), delay, 6.0, feedback=gain) for gain in (0.0, 20.0)
+    )
+    assert np.abs(fed_back).max() < 1.02 * np.abs(alone).max()
+    assert np.abs(fed_back[-100:]).max() < 1e-3 * np.abs(alone).max()
+
+
+def test_a_motor_that_sticks_does_not_creep_to_and_fro_further_each_time():
+    """At a speed at which it hangs until the drive's integral breaks it loose: it moves in steps."""
+    alone, fed_back = (
+        behind_by(lambda _: 0.0, 8e-3, 6.0, planned_speed=1e-3, sticks=0.5, feedback=gain)
+        for gain in (0.0, 20.0)
+    )
+    assert np.abs(fed_back[500:]).max() < 1.1 * np.abs(alone[500:]).max()
+    assert np.abs(fed_back[1000:]).max() < 1.1 * np.abs(fed_back[500:1000]).max()
+
+
+def test_nothing_is_fed_back_that_encoders_do_not_show_nor_to_drives_that_ring_or_gears_with_play():
+    command = some_command()
+    behind, step = STILL + 1e-3, STILL + 1e-5
+    for of_drives, off, rounding in (
+        (("cascade", False), np.full(6, np.nan), STILL),
+        (("cascade", False), 1.7 * step, step),  # less than half a step of the encoder
+        (("cascade", True), behind, STILL),
+        (("position", False), behind, STILL),
+        (("velocity", False), behind, STILL),
+    ):
+        feedback, memory = part(*of_drives)
+        told = feedback.add(memory, command, off, rounding, 0.0)
+        np.testing.assert_array_equal(np.array(told[:4]), np.array(command[:4]))
+
+
+def test_what_is_fed_back_counts_as_commanded_beside_the_plan_and_is_bounded():
+    feedback, memory = part()
+    command = some_command()
+    off = np.array([4.0, -2.0, 1.0, 0.0, 0.5, -4.0])  # rad, in proportion, so that all stay on their way
+    for _ in range(1000):
+        told = feedback.add(memory, command, off, STILL, 0.0)
+    at_last = 0.5e-3 * off  # of more than 2 mrad drives are not the reason
+    np.testing.assert_allclose(told.position - command.position, at_last, rtol=1e-6)
+    np.testing.assert_allclose(told.beside - command.beside, at_last, rtol=1e-6)
+    np.testing.assert_allclose(told.velocity, command.velocity, atol=1e-9)
+    np.testing.assert_array_equal(told.torque, command.torque)
+
+
+def test_of_motors_that_friction_moves_less_than_all_else_nothing_is_fed_back():
+    """A PUMA 560 has most for the stiffness of its drives, a KR 16 so much that it hides the rest."""
+    fed_back = {
+        name: drives(robot=name)[0].moved_by_friction for name in ("puma560", "ur10", "irb1200", "kr16")
+    }
+    assert {name for name, motors in fed_back.items() if motors.any()} == {"puma560"}
+    assert fed_back["puma560"].sum() == 5
+    feedback = MotorFeedback(DriveModelConfig(), "cascade", False, fed_back["puma560"], PERIOD)
+    memory = feedback.layout.view(np.zeros(feedback.layout.size))
+    feedback.add(memory, some_command(), STILL + 1e-3, STILL, 0.0)
+    np.testing.assert_array_equal(memory.beside > 0.0, fed_back["puma560"])
