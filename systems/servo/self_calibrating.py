@@ -373,7 +373,8 @@ class SelfCalibrating(LeafSystem):
         memory.columns[:] = plan.columns[:, 18:]
         motion = plan.theta, plan.velocity, plan.acceleration
         command = self._drives.command(drives, motion, plan.on_motors, self._model.payload)
-        command = self._learning.feed_back(memory, command, instant)
+        if self._learning.feedback.acts:
+            command = self._learning.feed_back(memory, command, instant)
         is_starting = since_start < _STARTING and np.abs(memory.planner.start_error).max() > 1e-3
         unrest = 0.0 if self._learning.delay.is_settled(memory.delay, instant) and not is_starting else UNREST
         row = (

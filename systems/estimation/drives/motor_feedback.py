@@ -43,6 +43,7 @@ class MotorFeedback:
         """
         self._gain = config.feedback if kind == "cascade" and not has_play else 0.0
         self._motors = np.asarray(motors, dtype=float)
+        self.acts = self._gain > 0.0 and bool(self._motors.any())  # else it changes no command
         self._period = period
         self.layout = Layout(beside=(NUM_JOINTS,))  # rad
 

@@ -115,3 +115,5 @@ def test_of_motors_that_friction_moves_less_than_all_else_nothing_is_fed_back():
     memory = feedback.layout.view(np.zeros(feedback.layout.size))
     feedback.add(memory, some_command(), STILL + 1e-3, STILL, 0.0)
     np.testing.assert_array_equal(memory.beside > 0.0, fed_back["puma560"])
+    assert feedback.acts
+    assert not MotorFeedback(DriveModelConfig(), "cascade", False, fed_back["ur10"], PERIOD).acts
