@@ -66,14 +66,10 @@ def test_no_dead_time_makes_it_unstable(delay):
     assert np.abs(fed_back[-100:]).max() < 1e-3 * np.abs(alone).max()
 
 
-def test_a_motor_that_sticks_does_not_creep_to_and_fro_further_each_time():
-    """At a speed at which it hangs until the drive's integral breaks it loose: it moves in steps."""
-    alone, fed_back = (
-        behind_by(lambda _: 0.0, 8e-3, 6.0, planned_speed=1e-3, sticks=0.5, feedback=gain)
-        for gain in (0.0, 20.0)
-    )
-    assert np.abs(fed_back[500:]).max() < 1.1 * np.abs(alone[500:]).max()
-    assert np.abs(fed_back[1000:]).max() < 1.1 * np.abs(fed_back[500:1000]).max()
+def test_a_motor_that_sticks_does_not_move_in_steps():
+    """In place of the lag an integral would make it hang and leap by 0.18 mrad, for ever."""
+    fed_back = behind_by(lambda _: 0.0, 8e-3, 6.0, planned_speed=1e-4, sticks=2.0, feedback=20.0)
+    assert np.abs(fed_back[500:]).max() < 1e-5
 
 
 def test_nothing_is_fed_back_that_encoders_do_not_show_nor_to_drives_that_ring_or_gears_with_play():
