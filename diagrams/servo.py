@@ -23,6 +23,7 @@ from robots.description.model import NUM_JOINTS, RobotModel
 from systems.controller_model import ControllerModel
 from systems.feedforward import FEEDFORWARDS
 from systems.feedforward.feedforward import Feedforward
+from systems.feedforward.joint_motion import Standing
 from systems.feedforward.predictive.config import PredictiveConfig
 from systems.feedforward.predictive.correction import PredictiveCorrection
 from systems.guard.guard import CommandGuard, GuardConfig
@@ -73,6 +74,7 @@ class Servo(Diagram):
         scenario: Scenario,
         law: str | type[System] | System,
         watch: Watch | LiveWatch | None = None,
+        standing: Standing | None = None,
     ) -> None:
         """Builds the controller of one law.
 
@@ -81,6 +83,7 @@ class Servo(Diagram):
             scenario: what to do, and what the controller believes of the station.
             law: a shipped law by name, ``FILE.py:CLASS``, a class, or any system with the ports of a law.
             watch: what slows the path for people.
+            standing: the robot before the run, if a camera has looked at it.
 
         Raises:
             ValueError: if the law is unknown or has not the ports, or a part refuses its configuration.
@@ -124,7 +127,7 @@ class Servo(Diagram):
             if self.law.HasOutputPort(name):
                 commands[name] = self.law.GetOutputPort(name)
         if feedforward.kind != "none":
-            ahead = builder.AddNamedSystem("feedforward", self._feedforward(scenario))
+            ahead = builder.AddNamedSystem("feedforward", self._feedforward(scenario, standing))
             builder.ConnectInput(joints, ahead.GetInputPort("joint_sample"))
             self._add_feedforward(builder, ahead, commands)
         if feedforward.predictive.kind != "none":
@@ -169,7 +172,7 @@ class Servo(Diagram):
             is_speed_only=law.drive == "velocity",
         )
 
-    def _feedforward(self, scenario: Scenario) -> Feedforward:
+    def _feedforward(self, scenario: Scenario, standing: Standing | None) -> Feedforward:
         """The inverse model, prepared for the path. Raises ScenarioError if somebody may slow the path."""
         config = scenario.servo.feedforward
         model = FEEDFORWARDS.find(config.kind)(self.model, config)
@@ -178,7 +181,7 @@ class Servo(Diagram):
                 f"servo.feedforward.kind={config.kind} is computed before the run and needs the planned "
                 "speed, but reference.override or the law slows the path"
             )
-        model.prepare(self.reference.path, np.deg2rad(scenario.home_deg))
+        model.prepare(self.reference.path, np.deg2rad(scenario.home_deg), standing)
         return model
 
     def _connect_reference(self, builder: DiagramBuilder) -> None:

@@ -13,7 +13,7 @@ from diagrams.integration import Integration
 from diagrams.scenario.scenario import Scenario
 from diagrams.station import SimulatedStation
 from robots.calibration.measurements import Measurements
-from robots.description.model import load_robot
+from robots.description.model import RobotModel, load_robot
 from systems.reference.joint_mover import JointMover
 from systems.samples import JointSample, PoseSample
 
@@ -44,8 +44,22 @@ class MeasurementRecord:
 class MeasurementRun:
     """A station whose robot visits configurations and rests at each until it is measured."""
 
-    def __init__(self, scenario: Scenario, procedure: MeasurementProcedure | None = None) -> None:
-        """Builds the diagram. Raises ValueError if a part refuses its configuration."""
+    def __init__(
+        self,
+        scenario: Scenario,
+        procedure: MeasurementProcedure | None = None,
+        plant: RobotModel | None = None,
+    ) -> None:
+        """Builds the diagram.
+
+        Args:
+            scenario: its station is measured.
+            procedure: how.
+            plant: the robot in the station, if it is another one than the scenario's.
+
+        Raises:
+            ValueError: if a part refuses its configuration.
+        """
         self._procedure = procedure or MeasurementProcedure()
         # Events have their times in runs along a path.
         self._config = replace(scenario.station, events=[])
@@ -53,7 +67,7 @@ class MeasurementRun:
         # one that is the newest at its first tick may be from before it.
         needed = self._procedure.fewest_exposures * scenario.station.camera.period
         self._window = max(self._ticks(self._procedure.window), self._tick_at(needed) + 1)
-        robot = load_robot(scenario.robot)
+        robot = plant or load_robot(scenario.robot)
         builder = DiagramBuilder()
         self._station = builder.AddNamedSystem("station", SimulatedStation(robot, self._config, "cascade"))
         mover = JointMover(self._procedure.speed_share * robot.speed)

@@ -14,6 +14,8 @@ from diagrams.record.coverage import Prediction, coverage
 from diagrams.record.log import GuardEvent, RunLog
 from diagrams.record.packed_log import PackedLog
 from diagrams.record.played import measured_along, path_marks, played
+from diagrams.runs.measurement import MeasurementRun
+from diagrams.scenario.controller_model import controller_model
 from diagrams.scenario.scenario import Scenario, ScenarioError
 from diagrams.servo import Servo, calibrated, law_name, learnt, predicted_tip
 from diagrams.station import SimulatedStation
@@ -22,6 +24,8 @@ from robots.description.model import RobotModel, load_robot
 from robots.dynamics.newton_inverse import inverse_kinematics
 from systems.cell.events.station_events import check_events
 from systems.controller_model import ControllerModel
+from systems.feedforward import FEEDFORWARDS
+from systems.feedforward.joint_motion import Standing
 from systems.guard.guard import KINDS
 from systems.reference.paths import CartesianPath, make_path
 
@@ -87,7 +91,8 @@ class Experiment:
         if watch is None and scenario.station.overview.enabled:
             watch = make_watch(scenario, robot, drawn)
         self.watch = watch
-        servo = Servo(robot, scenario, law, self.watch)
+        standing = self._standing(robot, drawn)
+        servo = Servo(robot, scenario, law, self.watch, standing)
         self.station = builder.AddNamedSystem(
             "station",
             SimulatedStation(
@@ -128,6 +133,21 @@ class Experiment:
         self._events: list[GuardEvent] = []  # what the run itself has to say
         self._wall_time = 0.0
         self._predictions: list[Prediction] = []  # of the tip, one a chunk, by a law that says where it is
+
+    def _standing(self, robot: RobotModel, drawn: RobotModel) -> Standing | None:
+        """The robot before the run as encoders and camera show it, if the inverse model is to know."""
+        scenario = self.scenario
+        config = scenario.servo.feedforward
+        if config.resting != "seen" or config.kind == "none":
+            return None
+        if not FEEDFORWARDS.find(config.kind).is_computed_beforehand:
+            return None
+        start = start_position(controller_model(scenario, robot), scenario, make_path(scenario.reference))
+        try:
+            seen = MeasurementRun(scenario, plant=drawn).measure(start[None], self.seed).measured
+        except ValueError as error:
+            raise ScenarioError(f"servo.feedforward.resting=seen: {error}") from error
+        return Standing(seen.q[0], seen.position[0])
 
     def advance(
         self,

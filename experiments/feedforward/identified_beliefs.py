@@ -11,6 +11,7 @@ from robots.description.variation import Factors, varied
 # Shares, either way, see docs/identification.md; play, hysteresis and ripple are known worst of all.
 SPRINGS, DAMPERS, PARTS, FRICTION = 0.03, 0.25, 0.2, 0.2
 PHASE_DEG = 15.0  # of the ripple, either way
+TIP = 3e-5  # m, standard deviation of where a calibration has the tip, along each axis
 
 
 def believed(true: RobotModel, draw: int) -> RobotModel:
@@ -43,7 +44,8 @@ def believed(true: RobotModel, draw: int) -> RobotModel:
     ]
     beams = off(DAMPERS, n).tolist()
     links = [_with_beam(link, share) for link, share in zip(robot.links, beams, strict=True)]
-    return replace(robot, joints=joints, links=links)
+    tool = replace(robot.tool, translation=robot.tool.translation + TIP * rng.standard_normal(3))
+    return replace(robot, joints=joints, links=links, tool=tool)
 
 
 def _with_parts(

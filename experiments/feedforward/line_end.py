@@ -3,7 +3,7 @@
 ``python -m experiments.feedforward.line_end [--payload SHARE] [--draws N] [--first SEED] [--lines N...]
 [ROBOT...]``
 drives the realistic robots, with the plain ones believed and with what an identification may find of the
-true ones.
+true ones; `corrected`, and `seen` where a camera has looked at the robot at rest before.
 """
 
 import argparse
@@ -44,6 +44,12 @@ _BEHIND, _WAVES = 1e-4, 20.0  # rad and rad/s: how motors stray while a tick is 
 _EDGES = 4
 _ROBOTS = ("kr16", "kr210")
 KIND, CORRECTED = "elastic_structure", "corrected"  # of inverse models
+# With what an identification may find: label, inverse model, predictive correction, where links may rest
+_LABELLED = (
+    ("alone", KIND, "none", "anywhere"),
+    ("corrected", CORRECTED, "motors", "anywhere"),
+    ("seen", CORRECTED, "motors", "seen"),
+)
 _DRAWS = 4  # of what an identification may find
 PACE = 40.0  # 1/s^2, k_a, where joints are quick enough for it
 
@@ -143,7 +149,12 @@ def trials(name: str, plant: str | None = None) -> tuple[RectangleTrial, Rectang
 
 
 def trial(
-    believed: RobotModel, true: RobotModel, kind: str, predictive: str, share: float = 1.0
+    believed: RobotModel,
+    true: RobotModel,
+    kind: str,
+    predictive: str,
+    share: float = 1.0,
+    resting: str = "anywhere",
 ) -> RectangleTrial:
     """A trial with a share of the largest payload.
 
@@ -153,8 +164,9 @@ def trial(
         kind: of the inverse model.
         predictive: kind of the predictive correction beside it.
         share: of the largest payload.
+        resting: whether a camera looks first, see `FeedforwardConfig`.
     """
-    config = FeedforwardConfig(kind, predictive=PredictiveConfig(predictive))
+    config = FeedforwardConfig(kind, resting=resting, predictive=PredictiveConfig(predictive))
     return RectangleTrial(believed, share * true.payload.largest_mass, config, true)
 
 
@@ -173,8 +185,8 @@ def rows(
         worst = {}
         for draw in draws:
             belief = believed(true, draw)
-            for label, kind, beside in (("alone", KIND, "none"), ("corrected", CORRECTED, "motors")):
-                values = _values(trial(belief, true, kind, beside, share), edge)
+            for label, kind, beside, resting in _LABELLED:
+                values = _values(trial(belief, true, kind, beside, share, resting), edge)
                 worst[label] = np.maximum(worst.get(label, 0.0), values)
                 yield _row(name, edge, f"draw {draw}", label, values)
         for label, values in worst.items():

@@ -27,6 +27,9 @@ class FeedforwardConfig:
     inertia_error: float = quantity(0.0, -0.9, 10.0)
     # Of the stable inverse: which point is exact, the tip or where axes 4, 5 and 6 meet
     point: str = choice("tip", ("tip", "wrist"))
+    # Of `corrected`: where gears without load rest in their play before the motion, anywhere or where the
+    # station's camera, which then looks at the robot before the run, sees them
+    resting: str = choice("anywhere", ("anywhere", "seen"))
     # What becomes of a path with too few continuous derivatives: refuse it, or accept torques that jump
     rough_path: str = choice("refuse", ("refuse", "accept"))
     correction: CorrectionConfig = field(default_factory=CorrectionConfig)

@@ -18,7 +18,7 @@ from robots.kinematics.forward import Kinematics, robust_solve
 from systems.controller_model import ControllerModel
 from systems.feedforward.between_ticks import BetweenTicks
 from systems.feedforward.config import FeedforwardConfig
-from systems.feedforward.joint_motion import Answer, Drive, JointReference
+from systems.feedforward.joint_motion import Answer, Drive, JointReference, Standing
 from systems.feedforward.prefilter import Prefilter
 from systems.reference.paths import CartesianPath
 from systems.samples import JointSample
@@ -177,12 +177,13 @@ class Feedforward(LeafSystem):
             rows.append((answer.position, answer.velocity, answer.torque))
         return np.array(rows)
 
-    def prepare(self, path: CartesianPath, home: np.ndarray) -> None:
+    def prepare(self, path: CartesianPath, home: np.ndarray, standing: Standing | None = None) -> None:
         """What is to be done before a run; a model that looks ahead takes its time here.
 
         Args:
             path: that the run will ask for.
             home: where the joints are before it, in rad, shape (6,).
+            standing: the robot there, if a camera has looked at it.
 
         Raises:
             ValueError: if the path is not for this model.

@@ -15,6 +15,14 @@ class JointReference:
 
 
 @dataclass(frozen=True)
+class Standing:
+    """A robot at rest, as encoders and a camera show it."""
+
+    theta: np.ndarray  # rad, (6,)
+    p_WE: np.ndarray  # m, tip in the world, (3,)
+
+
+@dataclass(frozen=True)
 class Drive:
     """What motors shall do so that the links follow, and what the model remembers of it."""
 

@@ -8,7 +8,8 @@ from pydrake.multibody.tree import JacobianWrtVariable
 from robots.description.model import NUM_JOINTS, RobotModel
 from robots.identification.arm_along_motion import ElasticArm
 from robots.identification.motion import BETA, GAMMA, MotionCase, SensorPlace
-from systems.feedforward.corrected_inverse.resting_places import MIDDLE, Resting
+from systems.feedforward.corrected_inverse.resting_places import MIDDLE, Resting, seen_places
+from systems.feedforward.joint_motion import Standing
 
 _UNLOADED = 1e-6  # rad: a gear that its load winds up by less has no load that holds it in its play
 _CLOSE = 2  # steps from one inverse of the mass matrix to the next, for the hand is light and turns
@@ -113,6 +114,14 @@ class BelievedArm:
         )
         self.unloaded[_MOVING:] = False
 
+    def seen_resting(self, standing: Standing) -> tuple[Resting, ...]:
+        """Where gears without load may rest before the motion, if the tip is seen there; `seen_places`."""
+        x = self._at_rest.copy()
+        x[:NUM_JOINTS] += self._uneven[0][0]
+        p_WE, J = self._tip(standing.theta, x, True)
+        half_gaps = np.where(self.unloaded, self._gears[:, 2], 0.0)
+        return seen_places(standing.p_WE - p_WE, J[:, :NUM_JOINTS], half_gaps)
+
     def course(
         self,
         offset: np.ndarray,
@@ -141,7 +150,7 @@ class BelievedArm:
         start[:NUM_JOINTS] += offset[0]
         gears = self._gears.copy()
         gears[self.unloaded, 2] *= resting.play
-        start[:NUM_JOINTS] += np.where(self.unloaded, resting.place * gears[:, 2], 0.0)
+        start[:NUM_JOINTS] += np.where(self.unloaded, np.multiply(resting.place, gears[:, 2]), 0.0)
         arm_kernel.go_through(
             self._step,
             self._posture,

@@ -17,7 +17,7 @@ from systems.feedforward.config import FeedforwardConfig
 from systems.feedforward.corrected_inverse.believed_arm import BelievedArm
 from systems.feedforward.corrected_inverse.resting_places import ANYWHERE, MIDDLE, Resting, WorstOf
 from systems.feedforward.elastic_structure import ElasticStructureFeedforward
-from systems.feedforward.joint_motion import JointReference
+from systems.feedforward.joint_motion import JointReference, Standing
 from systems.feedforward.predictive.correction import smoothness
 from systems.reference.paths import CartesianPath
 
@@ -52,6 +52,7 @@ class CorrectedFeedforward(ElasticStructureFeedforward):
     A gear without load may rest anywhere within its play before the motion, and no encoder tells where. Then
     the motion is simulated from both ends of the play, wider and narrower, and from its middle, and what is
     least is a smooth worst case of all of them (`WorstOf`), of the distances and of the ringing at the end.
+    A camera tells, if it sees the tip at rest: then it is simulated from about there (`seen_places`).
     """
 
     title = "corrected"
@@ -77,15 +78,17 @@ class CorrectedFeedforward(ElasticStructureFeedforward):
         yielding = replace(model, elasticity="structure")
         self._smoothness = _SMOOTHER * reach(model.robot) * smoothness(yielding)  # m s^2
         self._played: tuple[np.ndarray, np.ndarray] | None = None
+        self._standing: Standing | None = None
         self.history: list[float] = []  # m, the simulated tip's effective distance, before each iteration
 
-    def prepare(self, path: CartesianPath, home: np.ndarray) -> None:
+    def prepare(self, path: CartesianPath, home: np.ndarray, standing: Standing | None = None) -> None:
         """Simulates and corrects the motion along a path; see `Feedforward.prepare`.
 
         Raises:
             ValueError: also if the path is out of reach, or as `play`.
         """
-        super().prepare(path, home)
+        super().prepare(path, home, standing)
+        self._standing = standing
         first = self._preview % self._period  # as the ticks ask for it
         times = np.arange(first, path.duration + self._period, self._period)
         references, last = [], home
@@ -150,7 +153,9 @@ class CorrectedFeedforward(ElasticStructureFeedforward):
         return self._told(motion, load)
 
     def _restings(self) -> Sequence[Resting]:
-        return ANYWHERE if self._believed.unloaded.any() else (MIDDLE,)
+        if not self._believed.unloaded.any():
+            return (MIDDLE,)
+        return self._believed.seen_resting(self._standing) if self._standing else ANYWHERE
 
     def _found(self, shapes: np.ndarray, wanted: np.ndarray, last: float) -> np.ndarray:
         """How much of each shape is to be added to each motor in rad, (c, 6).

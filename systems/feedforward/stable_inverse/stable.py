@@ -16,7 +16,7 @@ from robots.kinematics.analytic_inverse import JointLimitError, UnreachableError
 from systems.controller_model import ControllerModel
 from systems.feedforward.config import FeedforwardConfig
 from systems.feedforward.feedforward import Feedforward
-from systems.feedforward.joint_motion import JointReference
+from systems.feedforward.joint_motion import JointReference, Standing
 from systems.feedforward.stable_inverse.bounded_inverse import (
     BoundedMotion,
     Motion,
@@ -83,13 +83,13 @@ class StableFeedforward(Feedforward):
         self._period, self._preview = model.period, model.preview
         self._plan: Plan | None = None
 
-    def prepare(self, path: CartesianPath, home: np.ndarray) -> None:
+    def prepare(self, path: CartesianPath, home: np.ndarray, standing: Standing | None = None) -> None:
         """Computes the motion for a path; see `Feedforward.prepare`.
 
         Raises:
             ValueError: also if the path is out of reach, or as `plan`.
         """
-        super().prepare(path, home)
+        super().prepare(path, home, standing)
         times = np.arange(0.0, path.duration + 0.5 * _SAMPLE, _SAMPLE)
         q, last = np.empty((len(times), NUM_JOINTS)), home
         for row, X, time in zip(q, path.sample(times)[0], times, strict=True):

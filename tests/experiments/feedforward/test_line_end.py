@@ -123,6 +123,30 @@ def test_where_axis_1_may_rest_anywhere_in_its_play_no_more_is_left_than_uncorre
 
 
 @pytest.mark.slow
+@pytest.mark.parametrize("edge", [AWAY, 2])
+def test_where_a_camera_sees_axis_1_rest_half_is_left_of_what_is_left_uncorrected(edge: int):
+    """Lines on which it hardly moves: there it matters most where in its play it begins."""
+    true = load_robot("kr210-realistic")
+    belief = believed(true, 1)
+    both = (
+        trial(belief, true, "elastic_structure", "none"),
+        trial(belief, true, "corrected", "motors", resting="seen"),
+    )
+    alone, seen = (line_end(each, line_scenario(each, edge)) for each in both)
+    assert seen.tip.effective < 0.5 * alone.tip.effective
+    assert seen.tip.largest < 0.5 * alone.tip.largest
+
+
+def test_a_camera_that_sees_nothing_before_the_run_is_named():
+    true = load_robot("kr16-realistic")
+    of = trial(true, true, "corrected", "motors", resting="seen")
+    scenario = line_scenario(of, ACROSS)
+    scenario.station.camera.dropouts = [[0.0, 10.0]]
+    with pytest.raises(ScenarioError, match=r"feedforward\.resting=seen: .*the camera saw the tool at none"):
+        line_end(of, scenario)
+
+
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["kr16", "kr16-realistic"])
 def test_of_a_robot_that_is_as_believed_the_corrected_inverse_leaves_no_more(name: str):
     """Some micrometres beside: those of the forward model and of commands that are told every 4 ms."""

@@ -9,6 +9,7 @@ from experiments.feedforward.line_end import LAW, line_scenario, trial
 from robots.description.model import NUM_JOINTS, load_robot
 from systems.feedforward.corrected_inverse.believed_arm import BelievedArm
 from systems.feedforward.corrected_inverse.resting_places import Resting
+from systems.feedforward.joint_motion import Standing
 
 ROBOT, STEP, EVERY = load_robot("kr16-realistic"), 1e-3, 4
 LOAD = ROBOT.payload.largest_mass
@@ -67,6 +68,18 @@ def test_a_gear_without_load_rests_where_it_is_put_in_its_play():
     width = 2.0 * 1.5 * ROBOT.drive_trains.half_gap[0]
     distances = np.linalg.norm(other - one, axis=1)
     assert distances == pytest.approx(width * np.linalg.norm(one[0, :2]), rel=1e-3)
+
+
+@pytest.mark.parametrize("place", [-0.4, 0.0, 0.5])
+def test_a_camera_that_sees_the_tip_at_rest_tells_where_in_its_play(place: float):
+    _, theta, _ = swung()
+    theta = np.tile(theta[0], (10, 1))
+    still = np.zeros_like(theta)
+    arm = BelievedArm(ROBOT, LOAD, STEP, EVERY)
+    arm.set_motion(theta, still)
+    seen = arm.course(still, still, None, Resting(place, 1.0)).tip[0]
+    found = next(each for each in arm.seen_resting(Standing(theta[0], seen)) if each.play == 1.0)
+    assert found.place == pytest.approx((place, 0.0, 0.0, 0.0, 0.0, 0.0), abs=0.02)
 
 
 @pytest.mark.slow
