@@ -17,11 +17,13 @@ from robots.planning.optimum import optimum
 from robots.planning.path_dynamics import PathDynamics
 from robots.planning.rigid_start import rigid_start
 
-_BENT = (1.0, 0.5, 0.0)  # shares of the free way's bend that are tried
+_BENT = (1.0, 0.75, 0.5, 0.0)  # shares of the free way's bend that are tried
+_AS_QUICK = 1.05  # times the shortest duration, as the planner has it, up to which the plant decides
+_TRIED = 2  # ways, there, at most
 _PIECES = 60  # in which a way is checked
 
 
-def free_leg(
+def free_legs(
     robot: RobotModel,
     payload: float,
     leg: Leg,
@@ -29,11 +31,12 @@ def free_leg(
     dynamics: str = "elastic_structure",
     obstacles: tuple[Obstacle, ...] = (),
     sharpness: tuple[int, float] = (36, 1.0),
-) -> Leg:
-    """The leg between the same joint positions on the way on which it is quickest.
+) -> list[Leg]:
+    """The leg between the same joint positions on the ways on which it is quickest, the best one first.
 
-    The free way of a rigid arm, half of its bend, the straight way of the joints and the leg as it is are
-    tried, as far as they are clear.
+    The free way of a rigid arm, three quarters and half of its bend, the straight way of the joints and the
+    leg as it is are tried, as far as they are clear. What a planner believes of the quickest, the plant may
+    not: it is for that to choose among those that are nearly as quick.
 
     Args:
         robot: that moves.
@@ -60,7 +63,9 @@ def free_leg(
             f"the arm touches itself, the floor or an obstacle at {100.0 * max(filter(None, blocked)):.0f} % "
             "of the way; a target in between may lead it round"
         )
-    return min(clear, key=lambda each: _duration(robot, payload, each.path, limits, dynamics, sharpness))
+    durations = [_duration(robot, payload, each.path, limits, dynamics, sharpness) for each in clear]
+    ranked = [clear[i] for i in np.argsort(durations) if durations[i] <= _AS_QUICK * min(durations)]
+    return ranked[:_TRIED]
 
 
 def blended(straight: Curve, bent: Curve, share: float) -> Curve:

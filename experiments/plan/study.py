@@ -10,11 +10,11 @@ from typing import Any
 import numpy as np
 
 from experiments.cli.option_limits import one_of
-from experiments.plan.free_leg import free_leg
+from experiments.plan.free_leg import free_legs
 from experiments.plan.legs import Leg, legs_of
 from experiments.plan.plant_run import PlantDriver
 from experiments.plan.timings import SineSquared, Timing, quickest
-from experiments.plan.within_limits import ROUNDING, Kept, kept_in_plant, largest_share, lowered
+from experiments.plan.within_limits import ROUNDING, Kept, kept_in_plant, largest_share, lowered_there
 from robots.description.model import RobotModel
 from robots.measurement_design.obstacles import Obstacle
 from robots.planning.jerk_profile import best_jerk_profile
@@ -129,14 +129,14 @@ def study_legs(
     plan: Plan, legs: list[Leg], progress: Callable[[float], None] | None = None
 ) -> list[LegResult]:
     """The same for legs that are known, whatever ``plan.path`` says; arguments and errors likewise."""
-    ready: list[_Ready] = []
+    ready: list[list[_Ready]] = []
     results: list[LegResult] = []
     for number, leg in enumerate([*legs, *legs]):
         try:
             if number < len(legs):
                 ready.append(_made_ready(plan, leg))
             else:
-                allowed = np.inf if plan.may_ring else max(each.usual.run.criterion for each in ready)
+                allowed = np.inf if plan.may_ring else max(ways[0].usual.run.criterion for ways in ready)
                 results.append(_planned(plan, ready[number - len(legs)], max(allowed, STILL)))
         except PathError as error:
             raise PathError(f"{leg.name}: {error}") from error
@@ -147,7 +147,7 @@ def study_legs(
 
 @dataclass(frozen=True)
 class _Ready:
-    """A leg with what its motion is measured against."""
+    """A way with what its motion is measured against."""
 
     leg: Leg
     dynamics: PathDynamics  # as the planner believes
@@ -156,11 +156,10 @@ class _Ready:
     usual: Kept[Timing]
 
 
-def _made_ready(plan: Plan, leg: Leg) -> _Ready:
-    dynamics = PathDynamics(plan.robot, plan.payload, leg.path, plan.dynamics)
-    elastic = PathDynamics(plan.robot, plan.payload, leg.path, "elastic_structure")
+def _made_ready(plan: Plan, leg: Leg) -> list[_Ready]:
+    """The ways of a leg; one, if it is not free."""
+    dynamics, elastic, driver = _of_way(plan, leg)
     require_standing(dynamics, plan.limits)
-    driver = PlantDriver(plan.robot, plan.payload, elastic, plan.plant, plan.is_for_law)
 
     def baseline(limits: MotionLimits) -> Timing:
         return (
@@ -168,19 +167,48 @@ def _made_ready(plan: Plan, leg: Leg) -> _Ready:
         )
 
     usual = kept_in_plant(baseline, driver, plan.limits)
-    if plan.is_free:
-        leg = free_leg(
-            plan.robot, plan.payload, leg, plan.limits, plan.dynamics, plan.obstacles, plan.sharpness(leg)
-        )
-        dynamics = PathDynamics(plan.robot, plan.payload, leg.path, plan.dynamics)
-        elastic = PathDynamics(plan.robot, plan.payload, leg.path, "elastic_structure")
-        driver = PlantDriver(plan.robot, plan.payload, elastic, plan.plant, plan.is_for_law)
-    return _Ready(leg, dynamics, elastic, driver, usual)
+    if not plan.is_free:
+        return [_Ready(leg, dynamics, elastic, driver, usual)]
+    known = plan.robot, plan.payload, leg, plan.limits, plan.dynamics, plan.obstacles
+    return [_Ready(way, *_of_way(plan, way), usual) for way in free_legs(*known, plan.sharpness(leg))]
 
 
-def _planned(plan: Plan, ready: _Ready, allowed: float) -> LegResult:
-    usual, dynamics = ready.usual, ready.dynamics
-    last: list[tuple[Optimum, float]] = []
+def _of_way(plan: Plan, leg: Leg) -> tuple[PathDynamics, PathDynamics, PlantDriver]:
+    dynamics = PathDynamics(plan.robot, plan.payload, leg.path, plan.dynamics)
+    elastic = PathDynamics(plan.robot, plan.payload, leg.path, "elastic_structure")
+    return dynamics, elastic, PlantDriver(plan.robot, plan.payload, elastic, plan.plant, plan.is_for_law)
+
+
+def _planned(plan: Plan, ways: list[_Ready], allowed: float) -> LegResult:
+    """The leg on the way on which it is quickest in the plant."""
+    ready = ways[0]
+    kept, best, seconds = _within_limits(plan, ready)
+    for other in ways[1:]:
+        try:
+            found = _within_limits(plan, other, kept.timing.duration if kept.keeps else np.inf)
+        except (_SlowerError, PathError):
+            continue
+        if found[0].keeps or not kept.keeps:
+            ready, (kept, best, _) = other, found
+    if kept.run.criterion > allowed:
+        kept, best = calm_enough(plan, ready, kept, best, allowed)
+    front = _front(plan, ready.dynamics, kept) if plan.objective == "front" else []
+    return LegResult(ready.leg, ready.elastic, kept, ready.usual, best, seconds, front)
+
+
+class _SlowerError(Exception):
+    """Another way is quicker."""
+
+
+def _within_limits(
+    plan: Plan, ready: _Ready, at_most: float = np.inf
+) -> tuple[Kept[TimeSpline], Optimum, float]:
+    """The best motion that keeps the limits in the plant, and how long planning it took at most in s.
+
+    Raises:
+        _SlowerError: if it takes longer than ``at_most``, in s: with lower limits it only becomes slower.
+    """
+    usual, last = ready.usual.timing, []
 
     def optimal(limits: MotionLimits) -> TimeSpline:
         began = time.perf_counter()
@@ -188,20 +216,18 @@ def _planned(plan: Plan, ready: _Ready, allowed: float) -> LegResult:
         count, smoother = plan.sharpness(ready.leg)
         starts = [
             rigid_start(plan.robot, plan.payload, ready.leg.path, limits, count),
-            as_spline(usual.timing, count),
+            as_spline(usual, count),
         ]
         if plan.objective == "energy":
             starts.reverse()
-        found = _optimal(plan, dynamics, limits, starts, usual.timing.duration, smoother)
+        found = _optimal(plan, ready.dynamics, limits, starts, usual.duration, smoother)
         last.append((found, time.perf_counter() - began))
+        if found.motion.duration >= at_most:
+            raise _SlowerError
         return found.motion
 
-    kept = kept_in_plant(optimal, ready.driver, plan.limits)
-    found, seconds = last[-1][0], max(each for _, each in last)
-    if kept.run.criterion > allowed:
-        kept, found = calm_enough(plan, ready, kept, found, allowed)
-    front = _front(plan, dynamics, kept) if plan.objective == "front" else []
-    return LegResult(ready.leg, ready.elastic, kept, usual, found, seconds, front)
+    kept = kept_in_plant(optimal, ready.driver, plan.limits, varies=True)
+    return kept, last[-1][0], max(each for _, each in last)
 
 
 def calm_enough(
@@ -241,7 +267,7 @@ def calm_enough(
             run = ready.driver.run(near)
             if largest_share(run, plan.limits) <= 1.0 + ROUNDING:
                 return Kept(calm.motion, run, True, margins), calm
-            margins = lowered(margins, run, plan.limits)
+            margins = lowered_there(margins, run, plan.limits)
         return None
 
     best, too_little = (kept, found), 0.0

@@ -7,10 +7,9 @@ from scipy.integrate import trapezoid
 
 from robots.description.model import NUM_JOINTS
 from robots.planning.joint_path import PathError
-from robots.planning.limits import JOINT_LIMITS, MotionLimits
+from robots.planning.limits import JOINT_LIMITS, OVER_TIME, MotionLimits
 from robots.planning.path_dynamics import ORDERS, Demand, PathDynamics
 
-OVER_TIME = tuple(name for name in JOINT_LIMITS if name != "continuous_torque")
 _PLACES = 101  # on a path
 BINDING = 0.98  # share of a limit from which on it is said to bind
 

@@ -1,10 +1,10 @@
 """What a motion must keep to: limits of joints, motors, gears and of the tool."""
 
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, field, fields, replace
 
 import numpy as np
 
-from robots.description.model import RobotModel
+from robots.description.model import NUM_JOINTS, RobotModel
 
 # Of each joint, in the order of figures: name, unit and what people call it.
 JOINT_LIMITS = {
@@ -17,6 +17,7 @@ JOINT_LIMITS = {
     "gear_torque_rate": ("N m/s", "rate of gear torque"),
 }
 
+OVER_TIME = tuple(name for name in JOINT_LIMITS if name != "continuous_torque")
 _OF_MOTORS = ("speed", "acceleration", "jerk", "motor_torque")
 RESERVE = 0.1  # of them, for a law: what its corrections take on top of a motion
 
@@ -36,10 +37,19 @@ class MotionLimits:
     gear_torque_rate: np.ndarray  # N m/s
     tool_speed: float = np.inf  # m/s
     tool_acceleration: float = np.inf  # m/s^2
+    # What a planner may use of `OVER_TIME` at times of a motion: shares at k even times of its duration
+    shares: np.ndarray = field(default_factory=lambda: np.ones((2, len(OVER_TIME), NUM_JOINTS)))
 
     def scaled(self, share: float) -> "MotionLimits":
         """All of them times a share."""
-        return replace(self, **{each.name: share * getattr(self, each.name) for each in fields(self)})
+        names = [each.name for each in fields(self) if each.name != "shares"]
+        return replace(self, **{name: share * getattr(self, name) for name in names})
+
+    def shares_at(self, x: np.ndarray) -> np.ndarray:
+        """The shares that may be used at shares of the duration (m,), shape (m, limits, 6)."""
+        even = np.linspace(0.0, 1.0, len(self.shares))
+        columns = [np.interp(x, even, each) for each in self.shares.reshape(len(even), -1).T]
+        return np.array(columns).T.reshape(len(x), *self.shares.shape[1:])
 
     def with_reserve(self, share: float) -> "MotionLimits":
         """What is left where a law that corrects the motion needs a share of what motors can.

@@ -7,8 +7,8 @@ import numpy as np
 
 from robots.description.model import NUM_JOINTS
 from robots.planning.joint_path import PathError
-from robots.planning.limit_use import OVER_TIME, energy
-from robots.planning.limits import MotionLimits
+from robots.planning.limit_use import energy
+from robots.planning.limits import OVER_TIME, MotionLimits
 from robots.planning.path_dynamics import ORDERS, PathDynamics
 from robots.planning.ringing import Band, ringing_rows
 from robots.planning.spline_program import PointProgram, Solution, solve
@@ -156,7 +156,14 @@ def _scales(limits: MotionLimits) -> np.ndarray:
 def _used(dynamics: PathDynamics, limits: MotionLimits, motion: TimeSpline) -> np.ndarray:
     """The largest share of each row of `PathDynamics.near`."""
     rates = motion.rates(points(len(motion.coefficients)) * motion.duration)
-    return np.abs(dynamics.rows(rates)).max(axis=1) / _scales(limits)
+    used = np.abs(dynamics.rows(rates)) / _shares(limits, len(motion.coefficients)).T
+    return used.max(axis=1) / _scales(limits)
+
+
+def _shares(limits: MotionLimits, count: int) -> np.ndarray:
+    """What may be used of `_scales` at the points of a spline with so many coefficients, (points, rows)."""
+    of_joints = limits.shares_at(points(count))
+    return np.column_stack([of_joints.reshape(len(of_joints), -1), np.ones((len(of_joints), 2))])
 
 
 def _solved(
@@ -214,6 +221,7 @@ def _program(
     values = dynamics.near(rates, z)
     scales, chosen = _scales(limits), [int(row) for row in np.flatnonzero(rows)]
     bounded = [values[row] / scales[row] for row in chosen] + [y[1]]  # never backwards
+    shares = _shares(limits, len(start.coefficients))[:, chosen]
     speed, torque = values[:NUM_JOINTS], values[3 * NUM_JOINTS : 4 * NUM_JOINTS]
     lasting = [int(joint) for joint in np.flatnonzero(np.isfinite(limits.continuous_torque))]
     means = [(torque[joint] / float(limits.continuous_torque[joint])) ** 2 for joint in lasting]
@@ -228,8 +236,8 @@ def _program(
         cost = w * ca.sum1(power) * T * unit / of_start + smooth
     return PointProgram(
         ca.Function("bounded", [y, z], [ca.vertcat(*bounded)]),
-        np.append([-1.0 if row < 6 * NUM_JOINTS else -0.1 for row in chosen], 0.0),
-        np.append(np.ones(len(chosen)), np.inf),
+        np.column_stack([np.where(np.array(chosen) < 6 * NUM_JOINTS, -shares, -0.1), np.zeros(len(shares))]),
+        np.column_stack([shares, np.full(len(shares), np.inf)]),
         ca.Function("means", [y, z], [ca.vertcat(*means)]),
         ca.Function("cost", [y, w, z], [cost]),
         dynamics.places,

@@ -2,8 +2,8 @@
 
 At every point the motion is given by few numbers y, linear in the variables: the derivatives of the splines
 by the share of the duration, and the duration. What is bounded and what it costs are functions of y, the same
-at all points. So Jacobian and Hessian are those of one point, put together by the matrix of the splines:
-differentiating the whole program would take far longer.
+at all points, if not within the same limits. So Jacobian and Hessian are those of one point, put together by
+the matrix of the splines: differentiating the whole program would take far longer.
 """
 
 from dataclasses import dataclass
@@ -21,7 +21,7 @@ class PointProgram:
 
     Attributes:
         bounded: of (y, z), r numbers.
-        lower: their limits, shape (r,).
+        lower: their limits, shape (r,), or (points, r) where they are not the same at all points.
         upper: likewise.
         means: of (y, z), m numbers whose weighted sums over all points are at most 1.
         cost: of (y, w, z), whose sum over all points is minimised.
@@ -71,7 +71,7 @@ def solve(
         linear: A, shape (l, size), with lower and upper limits of A x, shape (l,).
     """
     size, count = matrix.shape[1], len(weights)
-    n, r, m = program.bounded.size1_in(0), len(program.lower), program.means.size1_out(0)
+    n, r, m = program.bounded.size1_in(0), program.bounded.size1_out(0), program.means.size1_out(0)
     x, w = ca.MX.sym("x", size), ca.DM(weights).T
     y = ca.reshape(matrix @ x + ca.DM(offset), n, count)
     z = program.places.map(count)(y[0, :]) if program.places else ca.MX(0, count)
@@ -120,8 +120,10 @@ def solve(
         x0=start,
         lbx=bounds[0],
         ubx=bounds[1],
-        lbg=np.concatenate([np.tile(program.lower, count), np.full(m, -np.inf), between[0]]),
-        ubg=np.concatenate([np.tile(program.upper, count), np.ones(m), between[1]]),
+        lbg=np.concatenate(
+            [np.broadcast_to(program.lower, (count, r)).ravel(), np.full(m, -np.inf), between[0]]
+        ),
+        ubg=np.concatenate([np.broadcast_to(program.upper, (count, r)).ravel(), np.ones(m), between[1]]),
     )
     stats = solver.stats()
     return Solution(np.array(found["x"]).ravel(), int(stats["iter_count"]), str(stats["return_status"]))

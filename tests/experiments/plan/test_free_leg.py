@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from experiments.plan.free_leg import blended, free_leg
+from experiments.plan.free_leg import blended, free_legs
 from experiments.plan.legs import Leg
 from robots.description.model import load_robot
 from robots.description.placement import Placement
@@ -31,7 +31,7 @@ def test_a_bend_of_nothing_is_straight_and_of_one_the_whole():
 def test_the_way_is_clear_and_no_slower_than_the_straight_one_and_what_is_blocked_is_refused():
     robot = load_robot("kr16")
     leg, limits = Leg("swing", straight_joint_path(START, GOAL), False), motion_limits(robot)
-    found = free_leg(robot, 16.0, leg, limits, "rigid")
+    found = free_legs(robot, 16.0, leg, limits, "rigid")[0]
     durations = [
         optimum(
             PathDynamics(robot, 16.0, each.path, "rigid"),
@@ -45,4 +45,4 @@ def test_the_way_is_clear_and_no_slower_than_the_straight_one_and_what_is_blocke
     middle = Kinematics(robot).forward(leg.path.at(np.array([0.5])))[0, :3, 3]
     wall = Obstacle("wall", np.array([0.6, 0.02, 3.0]), Placement(middle))
     with pytest.raises(PathError, match=r"an obstacle at \d\d % of the way"):
-        free_leg(robot, 16.0, leg, limits, "rigid", (wall,))
+        free_legs(robot, 16.0, leg, limits, "rigid", (wall,))

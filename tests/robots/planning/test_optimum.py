@@ -9,7 +9,7 @@ from robots.description.model import load_robot
 from robots.planning.jerk_profile import JerkProfile, best_jerk_profile
 from robots.planning.joint_path import straight_joint_path
 from robots.planning.limit_use import energy, use_of
-from robots.planning.limits import MotionLimits, motion_limits
+from robots.planning.limits import OVER_TIME, MotionLimits, motion_limits
 from robots.planning.optimum import optimum
 from robots.planning.path_dynamics import PathDynamics
 from robots.planning.rigid_start import quickest_rigid, rigid_start
@@ -120,3 +120,26 @@ def test_quicker_and_more_frugal_than_the_best_jerk_profile_in_the_same_limits(r
     assert quick.motion.duration < 0.92 * base.duration
     assert work[1] < 0.85 * work[0]
     assert max(quick.iterations, frugal.iterations) <= 60
+
+
+def test_a_limit_that_is_lower_for_a_while_is_kept_then_and_used_otherwise(robot):
+    """Axis 1, whose torque may change less in the first third: slower than without, not as if throughout."""
+    dynamics = axis_1(robot)
+    of_torque = inertia(dynamics) * np.array([1.0, *FREE[1:]])
+    whole = limits(gear_torque=8.0 * of_torque, gear_torque_rate=100.0 * of_torque, speed=np.full(6, 50.0))
+    shares = np.ones((4, len(OVER_TIME), 6))
+    shares[:2, OVER_TIME.index("gear_torque_rate")] = 0.5
+    first, throughout = replace(whole, shares=shares), replace(whole, gear_torque_rate=50.0 * of_torque)
+    found = {}
+    for name, kept in (("whole", whole), ("first", first), ("throughout", throughout)):
+        start = rigid_start(robot, 16.0, dynamics.path, replace(kept, acceleration=np.full(6, 8.0)), 60)
+        best = optimum(dynamics, kept, start, smoother=_ROUGHEST)
+        assert best.is_solved
+        found[name] = best.motion
+    motion = found["first"]
+    assert found["whole"].duration < motion.duration < found["throughout"].duration
+    used = np.abs(dynamics.demand(motion.rates(motion.times)).gear_torque_rate[:, 0])
+    used /= whole.gear_torque_rate[0]
+    is_first = motion.times < motion.duration / 3.0
+    assert used[is_first].max() == pytest.approx(0.5, abs=0.02)
+    assert used[~is_first].max() == pytest.approx(1.0, abs=0.02)
