@@ -16,7 +16,7 @@ _ROUNDS = 12
 _THERE = 9  # of them with lower limits at the times at which they were exceeded, then at all
 _TIMES = 61  # of a motion, between which limits are lowered evenly
 _NEAR = 0.012  # s, and 1.5 of these times: what the plant exceeds is somewhat late, and moves
-_MORE = 1.1  # times what it was too much
+_MORE = 1.1  # power of what it was too much
 _STEP = 0.995  # beyond what a motion was too much
 ROUNDING = 1e-6
 
@@ -90,7 +90,7 @@ def lowered_there(margins: MotionLimits, run: PlantRun, limits: MotionLimits) ->
     for share, at in zip(shares, x, strict=True):
         there = np.abs(np.clip(run.times / run.duration, 0.0, 1.0) - at) <= near
         most = used[there].max(axis=0, initial=1.0)
-        share *= np.where(most > 1.0, 1.0 - _MORE * (1.0 - _STEP / most), 1.0)
+        share *= np.where(most > 1.0, (_STEP / most) ** _MORE, 1.0)
     continuous = margins.continuous_torque * np.where(mean > 1.0, _STEP / np.maximum(mean, 1.0), 1.0)
     return replace(margins, shares=shares, continuous_torque=continuous)
 
