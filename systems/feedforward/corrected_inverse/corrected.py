@@ -85,7 +85,8 @@ class CorrectedFeedforward(ElasticStructureFeedforward):
         """Simulates and corrects the motion along a path; see `Feedforward.prepare`.
 
         Raises:
-            ValueError: also if the path is out of reach, or as `play`.
+            ValueError: also if the path is out of reach, the robot stands elsewhere than is believed, or as
+                `play`.
         """
         super().prepare(path, home, standing)
         self._standing = standing

@@ -6,6 +6,7 @@ import numpy as np
 
 _POWER = 3.0  # of the mean over the cases: near the worst of them, and still smooth
 _SEEN = 3e-5  # m: how well a calibrated robot knows where its tip is, camera and all
+_UNLIKE = 3e-4  # m, of which a tenth is usual: what springs that are some percent off add to that, and more
 _SHOWN = 0.4  # of half of the play, up to which a camera shows a place; 0.58 where nothing is known of it
 _PLAY_KNOWN = 0.12  # share, likewise; anywhere within a fifth
 _LEAST = 1e-3  # share of the largest reference, so that a case that is right already does not count alone
@@ -38,6 +39,9 @@ def seen_places(gap: np.ndarray, J: np.ndarray, half_gaps: np.ndarray) -> tuple[
     Returns:
         What is seen, and a standard deviation of place and of play to either side of it; ``ANYWHERE`` if the
         tip hardly moves by the play of one of them.
+
+    Raises:
+        ValueError: if the tip is further off than play and a calibration explain.
     """
     own = np.flatnonzero(half_gaps)
     A = J[:, own] * half_gaps[own]
@@ -47,6 +51,13 @@ def seen_places(gap: np.ndarray, J: np.ndarray, half_gaps: np.ndarray) -> tuple[
     if sigma.max() > _SHOWN:
         return ANYWHERE
     seen = np.clip(np.linalg.lstsq(A, gap, rcond=None)[0], -1.0, 1.0)
+    left = float(np.linalg.norm(gap - A @ seen))
+    if left > _UNLIKE:
+        raise ValueError(
+            f"feedforward corrected: the tip at rest is {1e3 * left:.1f} mm from where it is believed, "
+            "more than play explains: give the controller the calibrated robot, or set "
+            "servo.feedforward.resting=anywhere"
+        )
     is_at_end = np.abs(seen) > 1.0 - np.hypot(sigma, _PLAY_KNOWN)
 
     def resting(beside: np.ndarray, play: float) -> Resting:

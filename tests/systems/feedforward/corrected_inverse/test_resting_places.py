@@ -36,6 +36,13 @@ def test_near_an_end_it_rests_there_and_how_wide_the_play_is_is_all_that_is_open
     assert sorted(each.play for each in found) == [0.88, 1.0, 1.12]
 
 
+@pytest.mark.parametrize("axis", [0, 2])
+def test_a_robot_that_is_not_calibrated_is_refused(axis: int):
+    """Along what axis 1 moves, or across: a millimetre is no play."""
+    with pytest.raises(ValueError, match=r"is (0\.9|1\.0) mm from where .* calibrated robot"):
+        seen_places(1e-3 * np.eye(3)[axis], J, HALF_GAPS)
+
+
 def test_of_a_tip_that_hardly_moves_with_it_a_camera_says_nothing():
     assert seen_at(1.0, reach=0.1) == ANYWHERE
 
