@@ -13,7 +13,7 @@ LAWS = NamedClasses(
         "compensation": "systems.servo.compensation:Compensation",
         "disturbance_observer": "systems.servo.baselines.disturbance_observer:DisturbanceObserver",
         "iterative_learning": "systems.servo.baselines.iterative_learning:IterativeLearning",
-        "self_calibrating": "systems.servo.self_calibrating:SelfCalibrating",
+        "self_calibrating": "systems.servo.self_calibrating.law:SelfCalibrating",
     },
 )
 

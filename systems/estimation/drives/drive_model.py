@@ -14,21 +14,21 @@ from systems.estimation.arm_loads import ArmLoads
 from systems.estimation.drives.drive_config import DriveModelConfig
 from systems.estimation.drives.drive_gains import FACTORS, believed_gains, cascade_gains, straight_inertia
 from systems.estimation.drives.gain_search import TORQUES, Gains, GainSearch
+from systems.estimation.kernels import drive_columns as at
 from systems.estimation.kernels.arrays import DriveMemory, Drives
 from systems.estimation.memory import Layout
 
-# Torque that is needed beside the feedforward; rotor, viscous, Coulomb, and what that has more at low speeds;
-# the load of a kilogram, and of a kg m of its first moment along x, y, z; a kilogram that is not held; what
-# friction is more than believed where it turns over at once, and within a third of the believed width.
-_FILTERED = 12
-# Of each torque, of a planner, of what is late beside the plan, and of what nobody gives with other gains
-COLUMNS = 6 * (_FILTERED + 1 + len(FACTORS))
-_VISCOUS, _COULOMB, _HUMPS, _CONSTANTS = slice(14, 37, 4), slice(15, 37, 4), slice(16, 37, 4), slice(37, 43)
-DEAD_TIME, MASS, MOMENT, SMOOTHED = 0, 43, slice(44, 47), 47
-SHARP, NOT_HELD, GIVING = slice(48, 54), slice(54, 60), slice(60, 66)
-OTHER_GAINS, THIRD = slice(66, 69), slice(69, 75)
-SIZE = 75
-LATE = slice(9, 11)  # of the columns, six by six: how a planner smooths, and how fast commands leave the plan
+DEAD_TIME, MASS, SMOOTHED, SIZE = at.DEAD_TIME, at.MASS, at.SMOOTHED, at.SIZE
+MOMENT, OTHER_GAINS = (slice(k, k + 3) for k in (at.MOMENT, at.OTHER_GAINS))
+_ROTORS, _VISCOUS, _COULOMB, _HUMPS = (
+    slice(at.FRICTION + k, at.CONSTANT, at.OF_FRICTION) for k in range(at.OF_FRICTION)
+)
+_CONSTANTS, SHARP, NOT_HELD, GIVING, THIRD = (
+    slice(k, k + 6) for k in (at.CONSTANT, at.SHARP, at.NOT_HELD, at.GIVING, at.THIRD)
+)
+REGRESSORS = at.NUM_ROWS, 6  # the shape of what `DriveModel.features` takes
+# Of these, how a planner smooths, and how fast commands leave the plan
+LATE = slice(at.ROW_SMOOTHED, at.ROW_RATE + 1)
 # Of Coulomb's friction, the spread of what there may be more of it; less where it is learnt early, or the
 # first lap of robots without a hump is twisted more
 _HUMP, _EARLY_HUMP = 0.3, 0.1
@@ -43,7 +43,8 @@ _UNTOLD, _UNTOLD_ALONE = 5.0, 3.0
 _GIVES = 1.0  # share by which drives may give way more or less for that reason
 _OTHERWISE = 0.12  # share of what other gains would make of it, in all joints alike
 _DOUBT = 30.0  # times what a motor was off by while it hung: by that its following error may be due to it
-_VISCOUS_SPREAD, _COULOMB_SPREAD = 0.3, 0.5  # of what a robot's file says of friction
+_ROTOR_SPREAD = 0.3  # of what a robot's file says of rotors
+_VISCOUS_SPREAD, _COULOMB_SPREAD = 0.3, 0.5  # likewise of friction
 _HIDING = 1e-3  # rad, slack of a joint whose following errors have other reasons at low speeds
 _MOVED = 2e-4  # rad, slack of a joint whose motor is off by friction more than by all else; assumed
 _SLACK = 0.3  # of Coulomb's friction, by which it may be off while little is known of it
@@ -59,7 +60,7 @@ class DriveCommand(NamedTuple):
     velocity: np.ndarray  # (6,) rad/s
     torque: np.ndarray  # (6,) N m, joint side, on top of what the drives do for gravity
     beside: np.ndarray  # (6,) rad, of the position what is beside the plan because of what was learnt
-    columns: np.ndarray  # (102,), what `DriveModel.features` needs of this instant
+    regressors: np.ndarray  # (17, 6), what `DriveModel.features` needs of this instant
     torques: np.ndarray  # (4, 6) N m, what `GainSearch.follow` takes
 
 
@@ -133,12 +134,13 @@ class DriveModel:
         self.finds_gains = not model.takes_torque  # where torques are sent, gains matter little
         self.search = GainSearch(gains, *self._gains, model.load_scale, period)
         self._hides_sticking = bool((self._drives.slack > _HIDING).any())
+        self._moved_by_friction = (self._drives.slack > _MOVED) & (not self._hides_sticking)
         # The arm as the drives know it, which hold it against gravity.
         drawn = ArmGeometry(robot, np.array([], dtype=int))
         self._held = drawn.constants(np.zeros(NUM_PARAMETERS)), ArmLoads(robot).masses
         spread = [config.dead_time_sigma, *[config.lag_sigma] * 6, *[1e-4] * 6]
         self._scale, self._moment = model.load_scale, config.moment_sigma * model.load_scale
-        spread += [0.3, _VISCOUS_SPREAD, _COULOMB_SPREAD, 0.0] * 6 + [_RESTS[kind]] * 6
+        spread += [_ROTOR_SPREAD, _VISCOUS_SPREAD, _COULOMB_SPREAD, 0.0] * 6 + [_RESTS[kind]] * 6
         # Drives that take torques without a cascade are not known by such a time.
         of_cascade = config.speed_lag_sigma if model.takes_torque else config.smoothing_sigma
         late = of_cascade if kind == "cascade" else 0.0
@@ -150,8 +152,8 @@ class DriveModel:
         gains_layout = Layout(slack=(6,), kp=(6,), ki=(sets, 6), kd=(6,), step=(sets, 6, 2, 4), factors=(2,))
         self.layout = Layout(
             started=(1,),
-            z=(len(FACTORS), _FILTERED, 6, 2),  # integral of e, and e
-            w=(_FILTERED, 6),
+            z=(len(FACTORS), at.NUM_TORQUES, 6, 2),  # integral of e, and e
+            w=(at.NUM_TORQUES, 6),
             beta=(SIZE,),
             led=(2, SIZE),  # beta as commands use it, and its rate
             P=(SIZE, SIZE),
@@ -164,10 +166,15 @@ class DriveModel:
             coming=gains_layout,  # gains that were found and not taken yet; factors of 0: there are none
         )
 
-    @property
-    def moved_by_friction(self) -> np.ndarray:
-        """Which motors are off their plan by friction first of all, and show it, (6,)."""
-        return (self._drives.slack > _MOVED) & (not self._hides_sticking)
+    def shares_fed_back(self, memory: SimpleNamespace) -> np.ndarray:
+        """By which share what motors are off by may be fed back, (6,), see `MotorFeedback`.
+
+        All of it where friction moves a motor first of all. Elsewhere a rotor that is not known yet makes it
+        ring with its drive, for which feedback is late and adds to it: as far as the rotor has become known.
+        """
+        sigma = np.sqrt(memory.P[_DIAGONAL[_ROTORS], _DIAGONAL[_ROTORS]])
+        shares = np.maximum(0.0, 1.0 - sigma / _ROTOR_SPREAD)
+        return np.maximum(shares, self._moved_by_friction)
 
     def start(self, memory: SimpleNamespace) -> None:
         """Writes what is believed before anything moves."""
@@ -202,17 +209,17 @@ class DriveModel:
             memory.hung,
             memory.wound,
         )
-        out, columns = np.empty((4, 6)), np.empty(COLUMNS)
+        out, regressors = np.empty((4, 6)), np.empty(REGRESSORS)
         limits = _LED_IN, _STEEPEST
         drives = self._as_found(memory)
-        kernels.drives.command(drives, *self._held, known, motion, loads, mass, limits, out, columns)
+        kernels.drives.command(drives, *self._held, known, motion, loads, mass, limits, out, regressors)
         position, velocity, torque, beside = out
-        return DriveCommand(position, velocity, torque, beside, columns, memory.w[_SEARCHED])
+        return DriveCommand(position, velocity, torque, beside, regressors, memory.w[_SEARCHED])
 
-    def features(self, v: np.ndarray, a: np.ndarray, columns: np.ndarray) -> np.ndarray:
-        """Rows of the regression, shape (6, 75), from motion and the filtered torques (102,)."""
+    def features(self, v: np.ndarray, a: np.ndarray, regressors: np.ndarray) -> np.ndarray:
+        """The equations of six joints, (6, 75), from motion and regressors (17, 6)."""
         Phi = np.zeros((6, SIZE))
-        kernels.drives.features(v, a, columns, Phi)
+        kernels.drives.features(v, a, regressors, Phi)
         return Phi
 
     def deviate(self, memory: SimpleNamespace, v: np.ndarray, dv: np.ndarray, da: np.ndarray) -> np.ndarray:
@@ -238,7 +245,7 @@ class DriveModel:
         self,
         memory: SimpleNamespace,
         planned: tuple[np.ndarray, np.ndarray, np.ndarray],
-        columns: np.ndarray,
+        regressors: np.ndarray,
         beside: np.ndarray,
         actual: np.ndarray,
         most: float = np.inf,
@@ -248,7 +255,7 @@ class DriveModel:
         Args:
             memory: of the layout.
             planned: position, velocity and acceleration, (6,) each.
-            columns, beside: of the command of that instant, (102,) and (6,) in rad.
+            regressors, beside: of the command of that instant, (17, 6) and (6,) in rad.
             actual: where the motors were, rad, (6,).
             most: nothing is learnt if more than this is not explained yet, rad; of a joint with much friction
                 for the stiffness of its drive that much more.
@@ -258,7 +265,7 @@ class DriveModel:
         """
         doubt = 0.0 if self._hides_sticking else _DOUBT
         known = memory.hung, memory.P, memory.beta, self._config.following_sigma**2, doubt, most
-        then = planned, beside, columns, actual, memory.deviation.out
+        then = planned, beside, regressors, actual, memory.deviation.out
         return kernels.drives.look_back(self._as_found(memory), *then, *known)
 
     def learn(self, memory: SimpleNamespace, Phi: np.ndarray, y: np.ndarray) -> None:

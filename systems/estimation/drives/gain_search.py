@@ -9,10 +9,11 @@ import numpy as np
 from robots.description.model import NUM_JOINTS
 from systems.estimation import kernels
 from systems.estimation.drives.drive_gains import DriveGains, filter_steps
+from systems.estimation.kernels import drive_columns as at
 from systems.estimation.memory import Layout
 
 # What a motion needs; of it what the rotor needs and Coulomb friction; and that of a kilogram
-TORQUES = (0, 1, 3, 5)
+TORQUES = at.W_MISSING, at.W_ROTOR, at.W_COULOMB, at.W_LOADS
 _STEPS = np.geomspace(0.4, 2.5, 5)  # factors of the gains of position and of the integral that are believed
 _GRID = np.array(list(product(_STEPS, _STEPS)))
 # Columns that are the same unknown in all joints, with their spreads: how far motors give way, kilograms of a

@@ -5,6 +5,7 @@ import math
 import numpy as np
 
 from robots.compiled import compiled, inner
+from systems.estimation.kernels import drive_columns as at
 from systems.estimation.kernels.geometry import place_links
 from systems.estimation.kernels.loads import hold
 from systems.estimation.kernels.plan import follow
@@ -19,23 +20,23 @@ _MOST_PERIODS = 1.5  # by which torques are sent ahead or held back
 
 
 @compiled
-def features(v, a, filtered, Phi):
+def features(v, a, rows, Phi):
     """Rows of the regression, (6, 75), which are zero before; see `DriveModel.features`."""
     for i in range(6):
-        Phi[i, 0] = Phi[i, 1 + i] = v[i] + filtered[60 + i]
-        Phi[i, 7 + i] = 1e-2 * a[i]
+        Phi[i, at.DEAD_TIME] = Phi[i, at.LAG + i] = v[i] + rows[at.ROW_RATE, i]
+        Phi[i, at.INERTIA + i] = 1e-2 * a[i]
+        for k in range(at.OF_FRICTION):
+            Phi[i, at.FRICTION + at.OF_FRICTION * i + k] = rows[at.ROW_FRICTION + k, i]
+        Phi[i, at.CONSTANT + i] = 1.0
         for k in range(4):
-            Phi[i, 13 + 4 * i + k] = filtered[6 * k + i]
-        Phi[i, 37 + i] = 1.0
-        for k in range(4):
-            Phi[i, 43 + k] = filtered[24 + 6 * k + i]
-        Phi[i, 47] = filtered[54 + i]
-        Phi[i, 48 + i] = filtered[66 + i]
-        Phi[i, 54 + i] = filtered[48 + i]
-        Phi[i, 60 + i] = filtered[72 + i]
-        Phi[i, 69 + i] = filtered[96 + i]
+            Phi[i, at.MASS + k] = rows[at.ROW_LOADS + k, i]
+        Phi[i, at.SMOOTHED] = rows[at.ROW_SMOOTHED, i]
+        Phi[i, at.SHARP + i] = rows[at.ROW_SHARP, i]
+        Phi[i, at.NOT_HELD + i] = rows[at.ROW_NOT_HELD, i]
+        Phi[i, at.GIVING + i] = rows[at.ROW_GIVING, i]
+        Phi[i, at.THIRD + i] = rows[at.ROW_THIRD, i]
         for k in range(3):
-            Phi[i, 66 + k] = filtered[78 + 6 * k + i]
+            Phi[i, at.OTHER_GAINS + k] = rows[at.ROW_OTHER_GAINS + k, i]
 
 
 @compiled
@@ -66,18 +67,20 @@ def deviate(drives, v, dv, da, last, z, out):
 
 
 @inner
-def _behind(v, a, filtered, beta, i):
-    """The row of a joint times the parameters."""
-    rate = v + filtered[60 + i]
-    total = rate * beta[0] + rate * beta[1 + i] + 1e-2 * a * beta[7 + i]
+def _behind(v, a, rows, beta, i):
+    """The equation of a joint: its rows times the parameters."""
+    rate = v + rows[at.ROW_RATE, i]
+    total = rate * beta[at.DEAD_TIME] + rate * beta[at.LAG + i] + 1e-2 * a * beta[at.INERTIA + i]
+    for k in range(at.OF_FRICTION):
+        total += rows[at.ROW_FRICTION + k, i] * beta[at.FRICTION + at.OF_FRICTION * i + k]
     for k in range(4):
-        total += filtered[6 * k + i] * beta[13 + 4 * i + k]
-    for k in range(4):
-        total += filtered[24 + 6 * k + i] * beta[43 + k]
+        total += rows[at.ROW_LOADS + k, i] * beta[at.MASS + k]
     for k in range(3):
-        total += filtered[78 + 6 * k + i] * beta[66 + k]
-    total += filtered[54 + i] * beta[47] + filtered[66 + i] * beta[48 + i] + filtered[96 + i] * beta[69 + i]
-    return total + beta[37 + i] + filtered[48 + i] * beta[54 + i] + filtered[72 + i] * beta[60 + i]
+        total += rows[at.ROW_OTHER_GAINS + k, i] * beta[at.OTHER_GAINS + k]
+    smoothed, sharp = rows[at.ROW_SMOOTHED, i] * beta[at.SMOOTHED], rows[at.ROW_SHARP, i] * beta[at.SHARP + i]
+    total += smoothed + sharp + rows[at.ROW_THIRD, i] * beta[at.THIRD + i]
+    total = total + beta[at.CONSTANT + i] + rows[at.ROW_NOT_HELD, i] * beta[at.NOT_HELD + i]
+    return total + rows[at.ROW_GIVING, i] * beta[at.GIVING + i]
 
 
 @compiled
@@ -137,14 +140,14 @@ def learn(P, beta, Phi, y, variances):
 
 
 @compiled
-def look_back(drives, planned, beside, filtered, actual, deviation, hung, P, beta, variance, doubt, most):
+def look_back(drives, planned, beside, rows, actual, deviation, hung, P, beta, variance, doubt, most):
     """Learns from one planned instant that has passed; see `DriveModel.look_back`.
 
     Args:
         drives: `Drives`.
         planned: position, velocity and acceleration of the motors, (6,) each.
         beside: what was commanded beside the plan because of what was learnt, rad, (6,).
-        filtered: as of `features`.
+        rows: as of `features`.
         actual: positions of the motors, rad, (6,).
         deviation: (6, 6) rad, of `deviate`.
         hung: rad, (2, 6), by which motors were off when they were slow, fading, and are if they are; is
@@ -159,7 +162,7 @@ def look_back(drives, planned, beside, filtered, actual, deviation, hung, P, bet
     """
     theta, v, a = planned
     Phi, y, variances = np.zeros((6, len(beta))), np.empty(6), np.empty(6)
-    features(v, a, filtered, Phi)
+    features(v, a, rows, Phi)
     largest, fading = 0.0, math.exp(-drives.period / _FORGOTTEN)
     for i in range(6):
         hung[0, i] *= fading
@@ -169,10 +172,10 @@ def look_back(drives, planned, beside, filtered, actual, deviation, hung, P, bet
             hung[0, i] = max(hung[0, i], abs(hung[1, i]))
         variances[i] = variance + (doubt * hung[0, i]) ** 2
         # Rotors and friction go by how motors move, not by how they should.
-        for k in range(4):
-            Phi[i, 13 + 4 * i + k] += deviation[1 + k, i]
-        Phi[i, 48 + i] += deviation[5, i]
-        Phi[i, 69 + i] += deviation[5, i]
+        for k in range(at.OF_FRICTION):
+            Phi[i, at.FRICTION + at.OF_FRICTION * i + k] += deviation[1 + k, i]
+        Phi[i, at.SHARP + i] += deviation[5, i]
+        Phi[i, at.THIRD + i] += deviation[5, i]
         y[i] = theta[i] - actual[i] + beside[i] - deviation[0, i]
         unexplained = y[i]
         for j in range(len(beta)):
@@ -219,15 +222,15 @@ def _filter(step, z, last, w):
 @inner
 def _missing(z, beta, i):
     """The following error of a joint by the torques that nobody gives."""
-    return z[0, 1] + z[9, 1] * beta[54 + i]
+    return z[at.W_MISSING, 1] + z[at.W_NOT_HELD, 1] * beta[at.NOT_HELD + i]
 
 
 @inner
 def _learnt(z, beta, i):
     """The following error of a joint by what has been learnt of its rotor and friction."""
-    total = z[10, 1] * beta[48 + i] + z[11, 1] * beta[69 + i]
-    for k in range(4):
-        total += z[1 + k, 1] * beta[13 + 4 * i + k]
+    total = z[at.W_SHARP, 1] * beta[at.SHARP + i] + z[at.W_THIRD, 1] * beta[at.THIRD + i]
+    for k in range(at.OF_FRICTION):
+        total += z[at.W_ROTOR + k, 1] * beta[at.FRICTION + at.OF_FRICTION * i + k]
     return total
 
 
@@ -246,7 +249,7 @@ def _log_cosh(x):
 
 
 @compiled
-def command(drives, arm, masses, memory, motion, loads, mass, limits, out, filtered):
+def command(drives, arm, masses, memory, motion, loads, mass, limits, out, rows):
     """What to command so that motors move as planned, see `DriveModel.command`.
 
     Args:
@@ -260,15 +263,10 @@ def command(drives, arm, masses, memory, motion, loads, mass, limits, out, filte
             may add to the speed of a joint in rad/s.
         out: (4, 6), position, velocity, torque, and what of the position is beside the plan because of what
             was learnt; is written.
-        filtered: (102,), what `features` takes, of rotor, viscous and Coulomb friction and its hump, of a
-            kilogram and of a kg m along each axis, of a kilogram that is not held; the accelerations that a
-            planner smooths, how fast the command runs away from the plan in rad/s, of what friction turns
-            over at once, of all that the motion needs and is not given as a torque, with the gains and by
-            how much more with three others, and of what friction turns over within a third of the believed
-            width; is written.
+        rows: (17, 6), what `features` takes, in the order of `drive_columns`; is written.
     """
     theta, v, a = motion
-    X_WE, frames, w = np.empty((4, 4)), np.empty((7, 4, 4)), np.empty(12)
+    X_WE, frames, w = np.empty((4, 4)), np.empty((7, 4, 4)), np.empty(at.NUM_TORQUES)
     held, with_more = np.empty(6), np.empty(6)
     place_links(arm, theta, X_WE, frames)
     hold(masses, drives.payload, frames, theta, held)
@@ -282,28 +280,29 @@ def command(drives, arm, masses, memory, motion, loads, mass, limits, out, filte
     follow(memory.beta, limits[0], drives.period, led, rate)
     # Periods that a torque has to be sent ahead: it arrives late by what was learnt, and is held for a period
     # in whose middle it should be right. A dead time that is wrong by more is corrected by the plan.
-    late = drives.period * min(max(led[0] / drives.period, -_MOST_PERIODS), _MOST_PERIODS)
+    late = drives.period * min(max(led[at.DEAD_TIME] / drives.period, -_MOST_PERIODS), _MOST_PERIODS)
     ahead = 0.5 + late / drives.period
     for i in range(6):
-        w[1], w[2] = drives.rotor[i] * a[i], drives.viscous[i] * v[i]
+        w[at.W_ROTOR], w[at.W_VISCOUS] = drives.rotor[i] * a[i], drives.viscous[i] * v[i]
         # Torques change evenly from one instant to the next: so does the mean of the period about each.
         turn = drives.period * a[i]
-        w[3] = drives.coulomb[i] * _mean_sign(v[i] - 0.5 * turn, turn, drives.width[i])
-        w[4] = w[3] * math.exp(-abs(v[i]) / drives.slow)
+        coulomb = drives.coulomb[i] * _mean_sign(v[i] - 0.5 * turn, turn, drives.width[i])
+        w[at.W_COULOMB], w[at.W_HUMP] = coulomb, coulomb * math.exp(-abs(v[i]) / drives.slow)
         for k, width in enumerate((_SHARP_WIDTH * drives.width[i], _THIRD_WIDTH * drives.width[i])):
-            w[10 + k] = drives.coulomb[i] * _mean_sign(v[i] - 0.5 * turn, turn, width) - w[3]
+            w[at.W_SHARP + k] = drives.coulomb[i] * _mean_sign(v[i] - 0.5 * turn, turn, width) - coulomb
         for k in range(4):
-            w[5 + k] = loads[1 + k, i]
-        w[9] = with_more[i] - held[i]
-        w[0] = needed = w[1] + w[2] + w[3] + loads[0, i] + mass * loads[1, i] - held[i]
+            w[at.W_LOADS + k] = loads[1 + k, i]
+        w[at.W_NOT_HELD] = with_more[i] - held[i]
+        own = w[at.W_ROTOR] + w[at.W_VISCOUS] + coulomb
+        w[at.W_MISSING] = needed = own + loads[0, i] + mass * loads[1, i] - held[i]
         z, last = memory.z[0, :, i], memory.w[:, i]
-        filtered[60 + i] = 0.0
+        rows[at.ROW_RATE, i] = 0.0
         out[0, i], out[1, i], out[2, i] = theta[i], v[i], 0.0
-        even = needed - w[3]  # what changes evenly
+        even = needed - coulomb  # what changes evenly
         if drives.takes_torque:
             turned = drives.coulomb[i] * _mean_sign(v[i] + late * a[i], turn, drives.width[i])
-            out[2, i] = needed if is_first else even + ahead * (even - last[0]) + turned
-            last[0] = w[0] = 0.0  # nothing is missing
+            out[2, i] = needed if is_first else even + ahead * (even - last[at.W_MISSING]) + turned
+            last[at.W_MISSING] = w[at.W_MISSING] = 0.0  # nothing is missing
         if is_first:
             for gains in range(4):
                 for k in range(len(w)):
@@ -313,30 +312,32 @@ def command(drives, arm, masses, memory, motion, loads, mass, limits, out, filte
             for gains in range(1, 4):
                 _filter(drives.step[gains, i], memory.z[gains, :, i], last, w)
         if not drives.takes_torque:
-            integral, e = z[0, 0], z[0, 1]
-            filtered[60 + i] = (needed - drives.kp[i] * e - drives.ki[0, i] * integral) / drives.kd[i]
+            integral, e = z[at.W_MISSING, 0], z[at.W_MISSING, 1]
+            rate = (needed - drives.kp[i] * e - drives.ki[0, i] * integral) / drives.kd[i]
+            rows[at.ROW_RATE, i] = rate
             out[0, i] += e
-            out[1, i] += filtered[60 + i]
-        last[0] = even if drives.takes_torque else needed
-        for k in range(1, 10):
-            last[k], filtered[6 * (k - 1) + i] = w[k], z[k, 1]
-        for k, at in enumerate((66, 96)):
-            last[10 + k], filtered[at + i] = w[10 + k], z[10 + k, 1]
-        filtered[72 + i] = missing = _missing(z, led, i)
+            out[1, i] += rate
+        last[at.W_MISSING] = even if drives.takes_torque else needed
+        for k in range(at.W_ROTOR, at.NUM_TORQUES):
+            last[k] = w[k]
+        for k in range(at.W_ROTOR, at.W_SHARP):
+            rows[at.ROW_FRICTION + k - at.W_ROTOR, i] = z[k, 1]
+        rows[at.ROW_SHARP, i], rows[at.ROW_THIRD, i] = z[at.W_SHARP, 1], z[at.W_THIRD, 1]
+        rows[at.ROW_GIVING, i] = missing = _missing(z, led, i)
         for k in range(3):
             other = memory.z[1 + k, :, i]
-            filtered[78 + 6 * k + i] = _missing(other, led, i) - missing
+            rows[at.ROW_OTHER_GAINS + k, i] = _missing(other, led, i) - missing
             if drives.takes_torque:
-                filtered[78 + 6 * k + i] += _learnt(other, led, i) - _learnt(z, led, i)
+                rows[at.ROW_OTHER_GAINS + k, i] += _learnt(other, led, i) - _learnt(z, led, i)
         settled = a[i] / drives.following
         memory.smoothed[i] = settled + fading * (memory.smoothed[i] - settled)
-        filtered[54 + i] = memory.smoothed[i]
-        correction = _behind(v[i], a[i], filtered, led, i)
+        rows[at.ROW_SMOOTHED, i] = memory.smoothed[i]
+        correction = _behind(v[i], a[i], rows, led, i)
         before = correction if is_first else memory.correction[i]
         correction = before + min(max(correction - before, -most), most)
         memory.correction[i] = correction
         # Nobody tells both shapes apart at a stop, and a motor that creeps does not stay off.
-        off, sticks = memory.hung[1, i], led[48 + i] + led[69 + i]
+        off, sticks = memory.hung[1, i], led[at.SHARP + i] + led[at.THIRD + i]
         unwound, speed = _unwound(drives, v[i], a[i], off, sticks, memory.wound, i)
         out[3, i] = correction + unwound
         out[0, i] += out[3, i]

@@ -10,7 +10,7 @@ from diagrams.hardware_link import StationError
 from diagrams.runs.real_time import RealTimeRecord, RealTimeRun
 from diagrams.scenario.scenario import load_scenario
 from systems.samples import PoseSample
-from systems.servo.self_calibrating import SelfCalibrating
+from systems.servo.self_calibrating.law import SelfCalibrating
 from tests.diagrams.lockstep import Lockstep
 
 LEARNING = 1.5e-3  # s that it is made to take, on the clock of the wire

@@ -7,10 +7,11 @@ from robots.description.model import load_robot
 from systems.controller_model import ControllerModel
 from systems.estimation.drives.drive_config import DriveModelConfig
 from systems.estimation.drives.drive_model import DriveModel
+from systems.estimation.kernels.drive_columns import ROW_FRICTION
 from tests.systems.estimation.drives.motors import LOADS, PERIOD, drives, motion
 
 SLOWLY = 0.01  # times the usual motion: friction turns over all the time, and motors are pulled off by it
-_FRICTION = slice(12, 18)  # of the columns of a command
+_COULOMB = ROW_FRICTION + 2  # of the regressors of a command
 STEPS = 20  # of the simulation in a period
 
 
@@ -50,10 +51,10 @@ def left_over(friction: float, is_known: bool) -> float:
     left = np.empty_like(off)
     for k, time in enumerate(times):
         theta, v, a = planned(time)
-        columns = model.command(memory, (theta, v, a), LOADS, 7.0).columns
+        regressors = model.command(memory, (theta, v, a), LOADS, 7.0).regressors
         model.deviate(memory, v, dv[k], da[k])
         beyond, _, _, coulomb, *_ = memory.deviation.out
-        left[k] = off[k] - beyond - share * (columns[_FRICTION] + coulomb)
+        left[k] = off[k] - beyond - share * (regressors[_COULOMB] + coulomb)
     return float(left[500:].std() / off[500:].std())
 
 
@@ -73,10 +74,10 @@ def test_friction_of_motors_off_their_plan_is_learnt():
     model._drives = model._drives._replace(slack=np.zeros(6))
     for k, time in enumerate(times):
         theta, v, a = planned(time)
-        columns = model.command(memory, (theta, v, a), LOADS, 7.0).columns
+        regressors = model.command(memory, (theta, v, a), LOADS, 7.0).regressors
         model.deviate(memory, v, dv[k], da[k])
         motion = theta, v, a
-        left[k] = model.look_back(memory, motion, columns, np.zeros(6), theta - off[k])
+        left[k] = model.look_back(memory, motion, regressors, np.zeros(6), theta - off[k])
     # It is an eighth: motors that hang are doubted, so that not all of it is learnt within five seconds.
     assert left[-250:].max() < 0.3 * np.abs(off[-250:]).max()
 

@@ -30,7 +30,7 @@ def run(model, memory, duration: float, beta: np.ndarray):
     worst = []
     for k in range(round(duration / PERIOD)):
         theta, v, a = motion(k * PERIOD)
-        columns = model.command(memory, (theta, v, a), LOADS, 7.0).columns
+        columns = model.command(memory, (theta, v, a), LOADS, 7.0).regressors
         Phi = model.features(v, a, columns)
         behind = Phi @ beta
         worst.append(np.abs(behind - memory.correction).max())
@@ -58,7 +58,7 @@ def test_a_load_that_turns_over_with_the_motion_is_not_taken_for_friction():
             theta, v, a = motion(k * PERIOD)
             loads = LOADS.copy()
             loads[2, :6] = 9.81 * np.sin(3.0 * theta)
-            columns = model.command(memory, (theta, v, a), loads, 7.0).columns
+            columns = model.command(memory, (theta, v, a), loads, 7.0).regressors
             Phi = model.features(v, a, columns)
             behind = 0.05 * Phi[:, MOMENT.start]
             Phi[:, last + 1 :] = 0.0  # columns that the model is to do without
@@ -90,7 +90,7 @@ def test_drives_that_give_way_unlike_belief_are_learnt_where_they_take_no_torque
     assert behind[-250:].max() < 0.05 * behind[:125].max()
     assert (np.abs(memory.beta[GIVING]) > 0.05).all()
     torques, memory = drives()  # what they are given as torques nobody has to make up for
-    columns = torques.command(memory, motion(1.0), LOADS, 7.0).columns
+    columns = torques.command(memory, motion(1.0), LOADS, 7.0).regressors
     assert not torques.features(*motion(1.0)[1:], columns)[:, GIVING.start :].any()
 
 
@@ -110,7 +110,7 @@ def test_gains_that_nobody_told_are_learnt_where_drives_take_no_torques(position
     behind = np.transpose([lsim(each, w, times)[1] for each, w in zip(filters, steps, strict=True)]) - known
     left = np.empty_like(behind)
     for k, instant in enumerate(planned):
-        columns = model.command(memory, instant, LOADS, 7.0).columns
+        columns = model.command(memory, instant, LOADS, 7.0).regressors
         left[k] = behind[k] - memory.correction
         model.learn(memory, model.features(*instant[1:], columns), behind[k])
     assert (left[-500:].std(axis=0) < 0.15 * behind[-500:].std(axis=0)).all()
@@ -119,7 +119,7 @@ def test_gains_that_nobody_told_are_learnt_where_drives_take_no_torques(position
 def test_with_torques_other_gains_show_by_a_load_alone_that_drives_do_not_hold():
     model, memory = drives()
     memory.beta[NOT_HELD] = memory.led[0, NOT_HELD] = 7.0
-    shown = [model.command(memory, motion(k * PERIOD), LOADS, 7.0).columns for k in range(50)]
+    shown = [model.command(memory, motion(k * PERIOD), LOADS, 7.0).regressors for k in range(50)]
     last = model.features(*motion(49 * PERIOD)[1:], shown[-1])
     weighed = slice(1, 5)  # joints that a load turns
     assert np.abs(last[weighed, OTHER_GAINS]).min() > 0.0
@@ -199,7 +199,7 @@ def test_of_a_dead_time_all_that_is_commanded_is_late_and_not_the_plan_alone():
         theta, v, a = motion(k * PERIOD)
         command = model.command(memory, (theta, v, a), LOADS, 7.0)
         sent.append(command.position)
-        columns.append(model.features(v, a, command.columns)[:, DEAD_TIME])
+        columns.append(model.features(v, a, command.regressors)[:, DEAD_TIME])
     rates = np.gradient(np.array(sent), PERIOD, axis=0)[100:-1]
     planned = np.array([motion(k * PERIOD)[1] for k in range(100, 299)])
     off = np.std(np.array(columns)[100:-1] - rates, axis=0)
@@ -214,7 +214,7 @@ def test_what_the_planner_of_egm_is_behind_is_a_multiple_of_its_column_at_any_fr
     egm.set_at_rest(context, motion(0.0)[0])
     for k in range(1000):
         theta, v, a = motion(k * PERIOD)
-        columns = model.command(memory, (theta, v, a), LOADS, 7.0).columns
+        columns = model.command(memory, (theta, v, a), LOADS, 7.0).regressors
         egm.GetInputPort("position_command").FixValue(context, theta)
         egm.GetInputPort("velocity_command").FixValue(context, v)
         behind.append(theta - egm.GetOutputPort("position_command").Eval(context))
@@ -245,7 +245,7 @@ def test_what_drives_are_ahead_that_know_their_speed_late_is_a_multiple_of_the_s
     column = []
     for time in times:
         instant = motion(time)
-        columns = model.command(memory, instant, LOADS, 7.0).columns
+        columns = model.command(memory, instant, LOADS, 7.0).regressors
         column.append(model.features(*instant[1:], columns)[joint, SMOOTHED])
     y, x = behind[200:], np.array(column[200:])
     lag = -(x @ y) / (x @ x)  # s
@@ -280,7 +280,7 @@ def test_confidence_is_honest_about_errors_that_last():
     for model, memory in (slow, quick):
         for k in range(250):
             theta, v, a = motion(k * PERIOD)
-            columns = model.command(memory, (theta, v, a), LOADS, 7.0).columns
+            columns = model.command(memory, (theta, v, a), LOADS, 7.0).regressors
             unknown = 2e-5 * np.sin(3.0 * k * PERIOD + np.arange(6))
             model.learn(memory, model.features(v, a, columns), unknown + 1e-6 * rng.normal(size=6))
     assert abs(slow[1].beta[MASS]) <= abs(quick[1].beta[MASS]) + 1e-12
@@ -318,7 +318,7 @@ def test_friction_that_is_larger_at_low_speeds_is_made_up_for(velocity):
     left = np.empty_like(behind)
     for k, time in enumerate(times):
         theta, rate, a = (0.3 * each for each in motion(time))
-        columns = model.command(memory, (theta, rate, a), LOADS, 7.0).columns
+        columns = model.command(memory, (theta, rate, a), LOADS, 7.0).regressors
         left[k] = behind[k] - memory.correction
         model.learn(memory, model.features(rate, a, columns), behind[k])
         if k == 250:  # motors keep to their plan from now on; nothing was said of humps before
@@ -333,7 +333,7 @@ def test_friction_that_is_off_by_a_third_is_not_taken_for_another_load(robot):
     """Whether the robot's file has it as two numbers or as a curve; of the wrists it is a milliradian."""
     model, memory = drives(robot=robot)
     theta, v, a = motion(1.0)
-    columns = model.command(memory, (theta, v, a), LOADS, 7.0).columns
+    columns = model.command(memory, (theta, v, a), LOADS, 7.0).regressors
     behind = 0.3 * load_robot("kr16").joint_coulomb_friction / model._drives.kp
     assert behind.max() > 1e-3
     left = [

@@ -27,9 +27,9 @@ def test_friction_that_turns_over_more_sharply_is_learnt_once_it_may(width, left
     model.open_low_speeds(memory)
     for k, time in enumerate(times):
         theta, rate, a = (0.05 * each for each in motion(time))
-        columns = model.command(memory, (theta, rate, a), LOADS, 7.0).columns
+        regressors = model.command(memory, (theta, rate, a), LOADS, 7.0).regressors
         remains[k] = behind[k] - memory.correction
-        model.learn(memory, model.features(rate, a, columns), behind[k])
+        model.learn(memory, model.features(rate, a, regressors), behind[k])
     assert remains[-1000:].std() < left * behind[-1000:].std()
     # Of the wrist; friction moves the heavy axes too little for all of it to be seen.
     np.testing.assert_allclose((memory.beta[SHARP] + memory.beta[THIRD])[3:], 1.0, atol=0.2)
@@ -53,8 +53,8 @@ def test_that_friction_sticks_one_joint_shows_for_all():
     model.open_low_speeds(memory)
     for k in range(1000):
         theta, v, a = (0.05 * each for each in motion(PERIOD * k))
-        columns = model.command(memory, (theta, v, a), LOADS, 7.0).columns
-        Phi = model.features(v, a, columns)
+        regressors = model.command(memory, (theta, v, a), LOADS, 7.0).regressors
+        Phi = model.features(v, a, regressors)
         Phi[np.arange(6) != 4] = 0.0
         model.learn(memory, Phi, Phi[:, SHARP][:, 4])
     np.testing.assert_allclose(memory.beta[SHARP][4], 1.0, atol=0.1)
@@ -91,7 +91,7 @@ def moved_with_sticking_friction(model, memory, is_hanging_known: bool = True) -
                 sum_of_e = sum_of_e + 0.1 * PERIOD * e
             if time < 0.3:
                 farthest[k] = np.maximum(farthest[k], np.abs(begin + turn - theta))
-            model.look_back(memory, (begin + turn, v, a), issued.columns, memory.correction.copy(), theta)
+            model.look_back(memory, (begin + turn, v, a), issued.regressors, memory.correction.copy(), theta)
         begin = begin + way
     return farthest
 
@@ -121,8 +121,8 @@ def test_motors_that_hung_are_doubted_but_where_friction_moves_them_by_milliradi
         model, memory = drives(robot=robot)
         memory.hung[0] = hung
         theta, v, a = motion(1.0)
-        columns = model.command(memory, (theta, v, a), LOADS, 7.0).columns
-        model.look_back(memory, (theta, v, a), columns, np.zeros(6), theta - 1e-4)
+        regressors = model.command(memory, (theta, v, a), LOADS, 7.0).regressors
+        model.look_back(memory, (theta, v, a), regressors, np.zeros(6), theta - 1e-4)
         return memory.P
 
     assert np.array_equal(learnt(1e-3), learnt(0.0)) != is_doubted

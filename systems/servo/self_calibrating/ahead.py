@@ -8,8 +8,9 @@ from systems.controller_model import ControllerModel
 from systems.estimation.memory import Layout
 from systems.estimation.probing.path_needs import PathNeeds
 from systems.reference.reference import PathAhead
-from systems.servo.self_calibrating_config import SelfCalibratingConfig
-from systems.servo.self_calibrating_learning import PLAN, Learning
+from systems.servo.self_calibrating.config import SelfCalibratingConfig
+from systems.servo.self_calibrating.learning import Learning
+from systems.servo.self_calibrating.motors import PLAN
 
 _CAREFUL = 0.25  # of the planned speed, while the dead time or the load is not what it was
 _BEFORE_PATH = 0.6  # s, at which it is held until the dead time is found; a slowed path needs time to stop

@@ -14,8 +14,8 @@ from systems.reference.path_time import PathTime
 from systems.reference.paths import make_path
 from systems.reference.reference import PathAhead
 from systems.samples import JointSample, PoseSample
-from systems.servo.self_calibrating import SelfCalibrating
-from systems.servo.self_calibrating_config import SelfCalibratingConfig
+from systems.servo.self_calibrating.config import SelfCalibratingConfig
+from systems.servo.self_calibrating.law import SelfCalibrating
 
 PERIOD = 4e-3
 STOPPED, SLOWED, LOST = range(60, 65), 110, (150, 151)  # ticks

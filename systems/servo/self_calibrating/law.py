@@ -23,12 +23,11 @@ from systems.guard.guard import GuardConfig
 from systems.reference.cartesian_path import CartesianPath
 from systems.reference.reference import PathAhead
 from systems.samples import JointSample, PoseSample
-from systems.servo.self_calibrating_ahead import NextCommand, Pace
-from systems.servo.self_calibrating_config import SelfCalibratingConfig
-from systems.servo.self_calibrating_learning import UNREST, Learning
+from systems.servo.self_calibrating.ahead import NextCommand, Pace
+from systems.servo.self_calibrating.config import SelfCalibratingConfig
+from systems.servo.self_calibrating.learning import UNREST, Learning
 
 _STARTING, _LED_IN = 1.5, 2.0  # s
-_SHARE_OF_DELAY = 0.3  # of 1 / T with a delay T, by which motors are brought back to their plan at most
 _FOLLOWED = 4.0  # rad of the lead's frequency, after which nine tenths of a step are followed
 
 
@@ -79,7 +78,8 @@ class SelfCalibrating(LeafSystem):
         self._forecast: Standing | None = None
         self.period = model.period
         self._learning = learning = Learning(model, config)
-        self.tip_model, self.estimator, self._drives = learning.tip_model, learning.estimator, learning.drives
+        self.tip_model, self.estimator = learning.tip_model, learning.estimator
+        self._motors, self._drives = learning.motors, learning.motors.drives
         self._lead = ParameterLead(self.tip_model.size, config.lead_frequency, config.lead_acceleration)
         self._pace = Pace(model, config, learning)
         self._planner = PreviewPlanner(self.tip_model, model.period)
@@ -162,7 +162,7 @@ class SelfCalibrating(LeafSystem):
             motion = plan.theta, plan.velocity, plan.acceleration
             command = self._drives.command(memory.drives, motion, plan.on_motors, self._model.payload)
         self._drives.deviate(memory.drives, still, still, still)
-        self._drives.look_back(memory.drives, motion, command.columns, still, q)
+        self._drives.look_back(memory.drives, motion, command.regressors, still, q)
         pair = Pair(q, plan.loads, plan.motion, plan.twist, X_WE)
         self._lead.step(memory.lead, model.mean, memory.columns, self.period)
         for _ in range(40):  # the first ones are only looked at
@@ -173,14 +173,14 @@ class SelfCalibrating(LeafSystem):
         for size in (0.0, 0.1):
             X_WE[0, 3] += size
             self.estimator.add(memory.estimator, pair._replace(X_WE=X_WE))
-        self._learning.steps.hear(memory.steps, q)
+        self._motors.steps.hear(memory.steps, q)
         self._learning.delay.search.rehearse(memory.delay.search)
         if self._drives.finds_gains:
             self._drives.search.rehearse(memory.gains.search)
         for time in (0.0, 1.0):
-            self._learning.encoders.append(memory.encoders, time, np.concatenate((q, still)))
-            self._learning.plan.append(memory.plan, time, memory.passed.all)
-        self._learning.encoders_at(memory, 0.5)
+            self._motors.encoders.append(memory.encoders, time, np.concatenate((q, still)))
+            self._motors.plan.append(memory.plan, time, memory.passed.all)
+        self._motors.encoders_at(memory, 0.5)
         self._learning.pair(memory, 0.5, X_WE)
 
     def memory(self, context: Context) -> SimpleNamespace:
@@ -228,7 +228,7 @@ class SelfCalibrating(LeafSystem):
             return None
         exposure = sample.time + self.estimator.clock_offset(memory.estimator, sample.time)
         time = min(exposure, float(memory.encoders.times.max()))  # as that of the pair
-        rounding = self._learning.steps.sigma(memory.steps)
+        rounding = self._motors.steps.sigma(memory.steps)
         still = pair._replace(twist=np.zeros(6), rounding=rounding)  # of the joints' clock alone
         X_WE = self.estimator.predict(memory.estimator, still).X_WE[0]
         return time, X_WE, self.estimator.tip_covariance(memory.estimator, still)
@@ -293,7 +293,7 @@ class SelfCalibrating(LeafSystem):
         else:
             commands = self._command(memory, reference, time, joints.position)
             if self._config.drive == "velocity":
-                commands = commands[0], commands[1] + self._to_plan(memory, joints), commands[2]
+                commands = commands[0], commands[1] + self._motors.to_plan(memory, joints), commands[2]
         for state, command in zip(self._outputs, commands, strict=False):
             discrete_state.set_value(int(state), command)
         ahead = float(memory.planned[0]) - time
@@ -313,7 +313,7 @@ class SelfCalibrating(LeafSystem):
             self._next.take_back(memory)
             self._work_out(memory, reference, time, position)
         coming.is_ready[0] = 0.0
-        self._learning.plan.append(memory.plan, float(memory.planned[0]), coming.row.all)
+        self._motors.plan.append(memory.plan, float(memory.planned[0]), coming.row.all)
         self._learning.delay.search.command(memory.delay.search, time, coming.row.theta)
         forecast = self._forecast
         if coming.begins_path[0] or coming.is_led_in[0]:
@@ -322,18 +322,6 @@ class SelfCalibrating(LeafSystem):
             event = Event(PATH_UNSEEN, forecast.sigma, forecast.sigma)
             self._learning.events.note(memory.events, time, event)
         return coming.commands
-
-    def _to_plan(self, memory: SimpleNamespace, joints: JointSample) -> np.ndarray:
-        """What brings motors back to their plan that follow speeds alone, rad/s, (6,): nothing else does."""
-        if not memory.first[0] <= joints.time:
-            return np.zeros(NUM_JOINTS)
-        planned = self._learning.plan.at(memory.plan, joints.time)
-        if planned is None:
-            return np.zeros(NUM_JOINTS)
-        gain = min(
-            self._config.drives.held_to_plan, _SHARE_OF_DELAY / max(float(memory.delay.delay[0]), self.period)
-        )
-        return np.nan_to_num(gain * (planned[:NUM_JOINTS] - joints.position))  # none where they are not known
 
     def _work_out(
         self, memory: SimpleNamespace, reference: PathAhead, time: float, position: np.ndarray | None = None
@@ -373,8 +361,8 @@ class SelfCalibrating(LeafSystem):
         memory.columns[:] = plan.columns[:, 18:]
         motion = plan.theta, plan.velocity, plan.acceleration
         command = self._drives.command(drives, motion, plan.on_motors, self._model.payload)
-        if self._learning.feedback.acts:
-            command = self._learning.feed_back(memory, command, instant)
+        if self._motors.feedback.acts:
+            command = self._motors.feed_back(memory, command, instant)
         is_starting = since_start < _STARTING and np.abs(memory.planner.start_error).max() > 1e-3
         unrest = 0.0 if self._learning.delay.is_settled(memory.delay, instant) and not is_starting else UNREST
         row = (
@@ -383,7 +371,7 @@ class SelfCalibrating(LeafSystem):
             plan.motion,
             plan.twist,
             lead.unrest + unrest,
-            command.columns,
+            command.regressors.ravel(),
             command.beside,
             command.torques.ravel(),
             command.position - plan.theta,

@@ -6,8 +6,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from systems.servo.self_calibrating_ahead import Pace
-from systems.servo.self_calibrating_config import SelfCalibratingConfig
+from systems.servo.self_calibrating.ahead import Pace
+from systems.servo.self_calibrating.config import SelfCalibratingConfig
 
 PERIOD, PATH_START = 4e-3, 4.0
 
