@@ -17,7 +17,6 @@ _COMPILED = (
     "history",
     "information",
     "innovations",
-    "instants",
     "keyframes",
     "loads",
     "plan",

@@ -151,7 +151,7 @@ class Learning:
         # As it would have been seen had the clock been right: the column stands for all of the offset.
         at.X_WE[:] = X_WE
         rows, ahead = (at.theta, then.all, now.all), exposure - stamp
-        off = kernels.instants.read(*rings, exposure, self._load_lag, *rows, now.twist, ahead, at.X_WE)
+        off = kernels.history.instant(*rings, exposure, self._load_lag, *rows, now.twist, ahead, at.X_WE)
         if memory.delay.known[0] and off > _ASTRAY:
             return None
         is_settling = exposure < memory.delay.settled[0] + _SETTLING or exposure < memory.paused_until[0]
