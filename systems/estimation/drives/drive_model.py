@@ -20,8 +20,8 @@ from systems.estimation.memory import Layout
 
 DEAD_TIME, MASS, SMOOTHED, SIZE = at.DEAD_TIME, at.MASS, at.SMOOTHED, at.SIZE
 MOMENT, OTHER_GAINS = (slice(k, k + 3) for k in (at.MOMENT, at.OTHER_GAINS))
-_ROTORS, _VISCOUS, _COULOMB, _HUMPS = (
-    slice(at.FRICTION + k, at.CONSTANT, at.OF_FRICTION) for k in range(at.OF_FRICTION)
+_VISCOUS, _COULOMB, _HUMPS = (
+    slice(at.FRICTION + k, at.CONSTANT, at.OF_FRICTION) for k in range(1, at.OF_FRICTION)
 )
 _CONSTANTS, SHARP, NOT_HELD, GIVING, THIRD = (
     slice(k, k + 6) for k in (at.CONSTANT, at.SHARP, at.NOT_HELD, at.GIVING, at.THIRD)
@@ -134,7 +134,6 @@ class DriveModel:
         self.finds_gains = not model.takes_torque  # where torques are sent, gains matter little
         self.search = GainSearch(gains, *self._gains, model.load_scale, period)
         self._hides_sticking = bool((self._drives.slack > _HIDING).any())
-        self._moved_by_friction = (self._drives.slack > _MOVED) & (not self._hides_sticking)
         # The arm as the drives know it, which hold it against gravity.
         drawn = ArmGeometry(robot, np.array([], dtype=int))
         self._held = drawn.constants(np.zeros(NUM_PARAMETERS)), ArmLoads(robot).masses
@@ -166,15 +165,10 @@ class DriveModel:
             coming=gains_layout,  # gains that were found and not taken yet; factors of 0: there are none
         )
 
-    def shares_fed_back(self, memory: SimpleNamespace) -> np.ndarray:
-        """By which share what motors are off by may be fed back, (6,), see `MotorFeedback`.
-
-        All of it where friction moves a motor first of all. Elsewhere a rotor that is not known yet makes it
-        ring with its drive, for which feedback is late and adds to it: as far as the rotor has become known.
-        """
-        sigma = np.sqrt(memory.P[_DIAGONAL[_ROTORS], _DIAGONAL[_ROTORS]])
-        shares = np.maximum(0.0, 1.0 - sigma / _ROTOR_SPREAD)
-        return np.maximum(shares, self._moved_by_friction)
+    @property
+    def moved_by_friction(self) -> np.ndarray:
+        """Which motors are off their plan by friction first of all, and show it, (6,)."""
+        return (self._drives.slack > _MOVED) & (not self._hides_sticking)
 
     def start(self, memory: SimpleNamespace) -> None:
         """Writes what is believed before anything moves."""

@@ -11,7 +11,6 @@ from systems.estimation.drives.drive_model import DriveCommand
 from systems.estimation.memory import Layout
 
 _SHARE_OF_DELAY = 0.3  # of 1 / T with a delay T, as the largest gain
-_LEAST_SHARE = 0.7  # of the gain; with less of it, late as it is, it would rather make drives ring
 _LATE = 2  # periods, until what an encoder says is in a command
 _HALF_A_STEP = math.sqrt(3.0)  # standard deviations of rounding: what a reading may be wrong by
 _MOST = 2e-3  # rad, of the largest; what is more has other reasons than those of drives
@@ -27,7 +26,9 @@ class MotorFeedback:
     of two in a row motors creep to and fro in friction that sticks, further each time.
     """
 
-    def __init__(self, config: DriveModelConfig, kind: str, has_play: bool, period: float) -> None:
+    def __init__(
+        self, config: DriveModelConfig, kind: str, has_play: bool, motors: np.ndarray, period: float
+    ) -> None:
         """Takes its gain.
 
         Args:
@@ -36,10 +37,13 @@ class MotorFeedback:
                 are brought back otherwise: of both nothing is fed back here.
             has_play: whether gears may have gaps. Then they err by more than their motors, and with feedback
                 robots came no nearer to their path: nothing is fed back either.
+            motors: of which something is fed back at all, (6,). Where friction moves them little, what was
+                learnt leaves little, and with feedback first laps were no better.
             period: between commands, s.
         """
         self._gain = config.feedback if kind == "cascade" and not has_play else 0.0
-        self.acts = self._gain > 0.0  # else it changes no command
+        self._motors = np.asarray(motors, dtype=float)
+        self.acts = self._gain > 0.0 and bool(self._motors.any())  # else it changes no command
         self._period = period
         self.layout = Layout(beside=(NUM_JOINTS,))  # rad
 
@@ -49,7 +53,6 @@ class MotorFeedback:
         command: DriveCommand,
         off: np.ndarray,
         rounding: np.ndarray,
-        shares: np.ndarray,
         delay: float,
     ) -> DriveCommand:
         """Goes on by a period; returns the command with what is fed back.
@@ -59,17 +62,14 @@ class MotorFeedback:
             command: what the drives are to be told without it.
             off: planned less actual positions as known last, rad, (6,), NaN where they are not known.
             rounding: standard deviation of these by steps of the encoders, rad, (6,).
-            shares: of the gain, of each motor, (6,), `DriveModel.shares_fed_back`.
             delay: from a command to the motion of a motor, s.
         """
         gain = min(self._gain, _SHARE_OF_DELAY / (delay + _LATE * self._period))
-        if gain < _LEAST_SHARE * self._gain:
-            gain = 0.0
         off = np.nan_to_num(off)
         # In proportion, as motors that are all late are on their way still.
         off *= _MOST / max(_MOST, float(np.abs(off).max()))
         off -= np.clip(off, -_HALF_A_STEP * rounding, _HALF_A_STEP * rounding)
-        speed = gain * shares * off - self._gain * memory.beside
+        speed = gain * self._motors * off - self._gain * memory.beside
         memory.beside += self._period * speed
         return command._replace(
             position=command.position + memory.beside,

@@ -72,8 +72,9 @@ class MotorLearning:
         self._period, self._delay, self._on_upset = model.period, delay, on_upset
         self._held_to_plan = config.drives.held_to_plan
         self._half = max(1, round(_DIFFERENCE / model.period))
-        self.drives = DriveModel(model, config.drives, config.drive, has_play)
-        self.feedback = MotorFeedback(config.drives, config.drive, has_play, model.period)
+        of_drives = config.drives, config.drive, has_play
+        self.drives = DriveModel(model, *of_drives)
+        self.feedback = MotorFeedback(*of_drives, self.drives.moved_by_friction, model.period)
         self.plan, self.encoders = History(PLAN.size, length), History(2 * NUM_JOINTS, length)
         self.steps = EncoderSteps()
         search = {"search": self.drives.search.layout, "looks": (1,), "taken": (1,)}  # and gains taken
@@ -151,8 +152,8 @@ class MotorLearning:
     def feed_back(self, memory: SimpleNamespace, command: DriveCommand, instant: float) -> DriveCommand:
         """A command for an instant with what encoders say of motors now."""
         off = memory.off[-1] if self.is_on_plan(memory, instant) else np.zeros(NUM_JOINTS)
-        of_motors = off, self.steps.sigma(memory.steps), self.drives.shares_fed_back(memory.drives)
-        return self.feedback.add(memory.feedback, command, *of_motors, float(memory.delay.delay[0]))
+        of_motors = off, self.steps.sigma(memory.steps), float(memory.delay.delay[0])
+        return self.feedback.add(memory.feedback, command, *of_motors)
 
     def to_plan(self, memory: SimpleNamespace, joints: JointSample) -> np.ndarray:
         """What brings motors back to their plan that follow speeds alone, rad/s, (6,): nothing else does."""
