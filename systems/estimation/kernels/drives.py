@@ -21,7 +21,7 @@ _MOST_PERIODS = 1.5  # by which torques are sent ahead or held back
 
 @compiled
 def features(v, a, rows, Phi):
-    """Rows of the regression, (6, 75), which are zero before; see `DriveModel.features`."""
+    """The equations of six joints, Phi (6, 75), zero before, from regressors; see `DriveModel.features`."""
     for i in range(6):
         Phi[i, at.DEAD_TIME] = Phi[i, at.LAG + i] = v[i] + rows[at.ROW_RATE, i]
         Phi[i, at.INERTIA + i] = 1e-2 * a[i]
@@ -147,7 +147,7 @@ def look_back(drives, planned, beside, rows, actual, deviation, hung, P, beta, v
         drives: `Drives`.
         planned: position, velocity and acceleration of the motors, (6,) each.
         beside: what was commanded beside the plan because of what was learnt, rad, (6,).
-        rows: as of `features`.
+        rows: of the regressors, (17, 6), as `command` writes them.
         actual: positions of the motors, rad, (6,).
         deviation: (6, 6) rad, of `deviate`.
         hung: rad, (2, 6), by which motors were off when they were slow, fading, and are if they are; is
@@ -263,7 +263,7 @@ def command(drives, arm, masses, memory, motion, loads, mass, limits, out, rows)
             may add to the speed of a joint in rad/s.
         out: (4, 6), position, velocity, torque, and what of the position is beside the plan because of what
             was learnt; is written.
-        rows: (17, 6), what `features` takes, in the order of `drive_columns`; is written.
+        rows: of the regressors, (17, 6), in the order of `drive_columns`; are written.
     """
     theta, v, a = motion
     X_WE, frames, w = np.empty((4, 4)), np.empty((7, 4, 4)), np.empty(at.NUM_TORQUES)
