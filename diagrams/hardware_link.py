@@ -7,7 +7,7 @@ from typing import Protocol
 
 import numpy as np
 
-from diagrams.host_lateness import HostLateness
+from diagrams.host_lateness import HostLateness, pause_before
 from diagrams.scenario.scenario import Scenario
 from robots.description.model import RobotModel
 from systems.guard.joint_limits import JointLimits
@@ -25,13 +25,12 @@ _ARRIVED = math.radians(0.02)  # how near the measured joints must come
 _PATIENCE, _NEARLY = 3.0, math.radians(0.5)  # s after which it is enough to come so near
 _LONGEST_APPROACH = 60.0  # s
 _APPROACH_GAIN = 2.0  # 1/s, where only speeds are sent
+_ELSEWHERE = math.radians(3.0)  # more than a robot moves while its controller begins a session anew
 _PHASE_SHARE = 0.02  # of the distance between a stamp and its tick, by which the phase follows
-_SLICE = 8e-4  # s between two looks at the camera
 _LATEST, _EARLIEST = 7e-4, 2e-3  # s before the next report is due, to prepare for it
 _MARGIN = 3e-4  # s, to be ready before it is due
 _SOONER, _LATER = 0.1, 0.01  # of the distance, by which the beginning follows what preparations take
 _CLOSE = 3e-4  # s about the time at which it is due: a frame of the camera would delay the reply
-_WATCH = 1e-3  # s after it was due, until which one looks all the time: who sleeps wakes late and cold
 _CYCLE_TOLERANCE = 5e-3  # relative
 _CLOCK_STEP = 0.02  # s by which stamps may run ahead of arrivals: jitter, and a stall before
 _SAME_COUNT = 1000  # messages; four seconds: whose number is further ahead is of another count
@@ -222,7 +221,7 @@ class HardwareLink:
         self._learn_clock()
         self._poll_camera()
         while True:
-            pause = _pause(now, expected - self._ahead, expected, deadline, prepared_for is not None)
+            pause = pause_before(now, expected - self._ahead, expected, deadline, prepared_for is not None)
             began, report = now, self._client.poll(pause)
             if report is not None:
                 break
@@ -345,7 +344,7 @@ class HardwareLink:
 
         Raises:
             EndedOnRequest: if somebody wanted an end.
-            StationError: if the controller stopped or the robot does not come there.
+            StationError: if the controller stopped, its joints jumped, or the robot does not come there.
         """
         deadline = self._now() + _LONGEST_APPROACH
         epoch, start, passed = -1, goal, 0.0
@@ -353,12 +352,16 @@ class HardwareLink:
             if self._is_asked_to_end():
                 self.stop_smoothly()
                 raise EndedOnRequest
-            report = self.next_report()
+            before, report = self.last, self.next_report()
             passed += self.passed
             if report is None or not report.is_ready:
                 report = self.wait_until_ready(self._link.connect)
                 if report is None:
                     raise StationError("the controller stopped while the robot was on its way")
+            elif self.epoch != epoch >= 0 and _is_elsewhere(before, report):
+                why = self.trouble  # which is over once it has stopped
+                self.stop_smoothly()
+                raise StationError(why)
             if self.epoch != epoch or self.was_interrupted:
                 epoch, start, passed = self.epoch, report.position, 0.0
             position, velocity, left = smooth_motion(start, goal, passed, speed_share * self._speed)
@@ -383,17 +386,6 @@ class HardwareLink:
         self.poses.poll(self._now())
 
 
-def _pause(now: float, begin: float, expected: float, deadline: float, is_prepared: bool) -> float:
-    """How long to sleep at most, in s; not at all between the end of the preparation and the report.
-
-    Args:
-        now: s, as all times of one clock.
-        begin: when the preparation shall begin.
-        expected: when the report is due.
-        deadline: until when it is waited for.
-        is_prepared: whether all is ready for it.
-    """
-    if is_prepared and now < expected + _WATCH:
-        return 0.0
-    longest = begin - now if 0.0 < begin - now < _SLICE else _SLICE
-    return min(longest, max(0.0, deadline - now))
+def _is_elsewhere(before: RobotReport | None, report: RobotReport) -> bool:
+    """Whether joints are not where they were in the report before."""
+    return before is not None and float(np.abs(report.position - before.position).max()) > _ELSEWHERE

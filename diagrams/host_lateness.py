@@ -1,10 +1,12 @@
-"""How late this machine itself was: a run that ends early may have ended for want of a processor."""
+"""When this machine wakes, and how late it was: a run may have ended early for want of a processor."""
 
 import math
 import os
 import time
 from pathlib import Path
 
+_SLICE = 8e-4  # s between two looks at the camera
+_WATCH = 1e-3  # s after a report was due, until which one looks all the time: who sleeps wakes late and cold
 _LATE = 1e-3  # s, above what a wake-up takes
 _WORTH_SAYING = 0.01  # s by which this machine was late
 _CROWDED = 0.5  # share of the time with processes that wait, above which others may be late, too
@@ -75,6 +77,22 @@ class HostLateness:
         if share < _CROWDED:
             return own
         return f"{own}; processes of this machine waited for a processor {100.0 * share:.0f} % of the time"
+
+
+def pause_before(now: float, begin: float, expected: float, deadline: float, is_prepared: bool) -> float:
+    """How long to sleep at most, in s; not at all between the end of the preparation and the report.
+
+    Args:
+        now: s, as all times of one clock.
+        begin: when the preparation shall begin.
+        expected: when the report is due.
+        deadline: until when it is waited for.
+        is_prepared: whether all is ready for it.
+    """
+    if is_prepared and now < expected + _WATCH:
+        return 0.0
+    longest = begin - now if 0.0 < begin - now < _SLICE else _SLICE
+    return min(longest, max(0.0, deadline - now))
 
 
 def _stolen() -> float:

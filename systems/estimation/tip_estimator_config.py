@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass, field
 
+from robots.configuration.quantity import positive, quantity
 from systems.estimation.tip_model import Spread
 
 
@@ -10,13 +11,14 @@ class TipEstimatorConfig:
     """What is known of robot and camera before anything is measured."""
 
     spread: Spread = field(default_factory=Spread)
-    position_sigma: float = 60e-6  # m, of a camera sample and of what no parameter describes
-    rotation_sigma: float = 2.1e-4  # rad
-    keyframe_step: float = 0.012  # rad, samples nearer than this in every joint are merged
-    keyframe_samples: int = 100  # the most samples in one
-    relinearise: float = 3e-4  # m or rad, a change of a parameter after which the past is read anew
-    geometry_step: float = 1e-4  # m or rad, within which poses are linear in the parameters
-    calm: float = 0.05  # m/s^2, of the tip by parameters that are led in: more makes samples count less
+    position_sigma: float = positive(60e-6, "m")  # of a camera sample and of what no parameter describes
+    rotation_sigma: float = positive(2.1e-4, "rad")
+    keyframe_step: float = positive(0.012, "rad")  # samples nearer than this in every joint are merged
+    keyframe_samples: int = quantity(100, 1)  # the most samples in one
+    relinearise: float = positive(3e-4)  # m or rad, a change of a parameter after which the past is read anew
+    geometry_step: float = positive(1e-4)  # m or rad, within which poses are linear in the parameters
+    # Of the tip by parameters that are led in: more makes samples count less
+    calm: float = positive(0.05, "m/s^2")
     # Events are looked for after so many samples, and where a camera is slow after so many seconds
-    test_after: int = 250
-    test_at_latest: float = 3.0
+    test_after: int = quantity(250, 1)
+    test_at_latest: float = quantity(3.0, 0.0, unit="s")

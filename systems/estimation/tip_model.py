@@ -6,6 +6,7 @@ from typing import NamedTuple
 import numpy as np
 
 from robots.calibration.identifiability import IdentifiableParameters, identifiable_parameters
+from robots.configuration.quantity import positive, quantity
 from robots.description.error_parameters import NUM_PARAMETERS, TOOL, error_parameters
 from robots.description.model import NUM_JOINTS, load_robot
 from systems.controller_model import ControllerModel
@@ -33,19 +34,18 @@ _STAYS = 0.02  # of the spread, by which what was measured of a robot may have c
 class Spread:
     """How far from its belief a robot may be: standard deviations before anything is measured."""
 
-    shift: float = 0.012  # m, of a frame
-    angle: float = 0.03  # rad, of a joint's zero, an axis or a frame
-    calibrated_shift: float = 1e-4  # m, the same of a calibrated robot whose file does not say
-    calibrated_angle: float = 2e-4  # rad
-    gear: float = 0.3  # of the compliance of a gear, as a factor
-    bearing: float = 0.5  # the same of a bearing
-    payload: float = 0.5  # kg, of a robot that carries 7 kg; of a larger one in proportion
-    payload_centre: float = 0.015  # m
-    clock: float = 5e-3  # s, between the stamps of the camera and those of the joints
-    clock_drift: float = 1e-4  # s/s, by which that changes: crystals differ by tens of ppm
-    gear_error: float = (
-        0.0  # rad, of a gear's waves, gap and hysteresis; 5e-5 is a good guess where there are
-    )
+    shift: float = positive(0.012, "m")  # of a frame
+    angle: float = positive(0.03, "rad")  # of a joint's zero, an axis or a frame
+    calibrated_shift: float = positive(1e-4, "m")  # the same of a calibrated robot whose file does not say
+    calibrated_angle: float = positive(2e-4, "rad")
+    gear: float = positive(0.3)  # of the compliance of a gear, as a factor
+    bearing: float = positive(0.5)  # the same of a bearing
+    payload: float = positive(0.5, "kg")  # of a robot that carries 7 kg; of a larger one in proportion
+    payload_centre: float = positive(0.015, "m")
+    clock: float = positive(5e-3, "s")  # between the stamps of the camera and those of the joints
+    clock_drift: float = positive(1e-4, "s/s")  # by which that changes: crystals differ by tens of ppm
+    # Of a gear's waves, gap and hysteresis; 5e-5 is a good guess where there are
+    gear_error: float = quantity(0.0, 0.0, unit="rad")
 
 
 class Pair(NamedTuple):

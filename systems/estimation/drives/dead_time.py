@@ -7,6 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from robots.configuration.quantity import positive, quantity
 from systems.estimation import kernels
 from systems.estimation.kernels.arrays import Ring
 from systems.estimation.memory import History, Layout
@@ -22,11 +23,12 @@ _CLEARER = 4.0  # times: by how much commands have to fit better when they are s
 class DeadTimeConfig:
     """What the search allows."""
 
-    longest: float = 0.32  # s, from a command to its motion
-    window: float = 0.4  # s of encoders that are compared while nothing is known
-    short_window: float = 0.1  # s, the same while the robot works
-    excitation: float = 1e-3  # rad, of the joint that moves most in the window: less shows nothing
-    residual: float = 0.05  # share of the motion that may be left at the best shift
+    longest: float = positive(0.32, "s")  # from a command to its motion
+    window: float = positive(0.4, "s")  # of encoders that are compared while nothing is known
+    short_window: float = positive(0.1, "s")  # the same while the robot works
+    # Of the joint that moves most in the window: less shows nothing
+    excitation: float = positive(1e-3, "rad")
+    residual: float = quantity(0.05, 0.0, 1.0)  # share of the motion that may be left at the best shift
 
 
 class Lateness(NamedTuple):

@@ -6,6 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from robots.configuration.quantity import choice, positive, quantity
 from robots.description.model import NUM_JOINTS, RobotModel
 
 _MARGIN = 0.8  # of the way to a limit
@@ -26,26 +27,27 @@ _USUAL_PERIOD, _MOST_GROWTH = 4e-3, 1.2  # s, of a camera for which both are eno
 class ProbeConfig:
     """Whether and how far the joints move before the path begins."""
 
-    kind: str = "smooth"  # or none
+    kind: str = choice("smooth", ("smooth", "none"))
     # Amplitudes in rad, at most, and how far the tip may go in m. If none are given, 0.19 rad of the first
     # three axes, 0.5 rad of the others, and 0.125 m; up to a fifth more with a camera that looks less
     # often than every 4 ms: what samples show goes with their number and the square of the motion. A
     # fifth less where gears have errors.
     amplitude: list[float] | None = None
-    largest_excursion: float | None = None
-    begin: float = 0.8  # s after the start
-    rest: float = 0.05  # s before the path begins: motors that stick wind up at rest
-    # s, for which the camera may see nothing on the path: what is needed then is shown before. Of 0.35, 0.5
+    largest_excursion: float | None = positive(None, "m")
+    begin: float = quantity(0.8, 0.0, unit="s")  # after the start
+    rest: float = quantity(0.05, 0.0, unit="s")  # before the path begins: motors that stick wind up at rest
+    # For which the camera may see nothing on the path: what is needed then is shown before. Of 0.35, 0.5
     # and 0.8 s this leaves least at worst, 0.052, 0.046 and 0.057 mm (`truetip robustness --laws
     # self_calibrating --cases drop-outs --first-seed 5001 --seeds 3`).
-    blind: float = 0.5
-    sharp: float = 3e-5  # m: a tip that will be known so well all along the path needs no oscillations
-    # m, standard deviation: where a camera that shows little, as it is slow or noisy, leaves the tip at the
+    blind: float = quantity(0.5, 0.0, unit="s")
+    # A tip that will be known so well all along the path needs no oscillations
+    sharp: float = quantity(3e-5, 0.0, unit="m")
+    # Standard deviation: where a camera that shows little, as it is slow or noisy, leaves the tip at the
     # begin of the path known less well than this, the oscillations are repeated and the path waits for them,
     # at most so often.
-    enough: float = 6e-5
-    repeats: int = 3
-    vague: float = 2.5e-4  # m: a tip that is known less well than this somewhere on the path is an event
+    enough: float = positive(6e-5, "m")
+    repeats: int = quantity(3, 0)
+    vague: float = positive(2.5e-4, "m")  # a tip that is known less well than this on the path is an event
 
 
 class Pattern(NamedTuple):

@@ -5,6 +5,7 @@ import re
 import numpy as np
 import pytest
 
+from diagrams.hardware_link import StationError
 from diagrams.runs.real_time import REQUESTED, RealTimeRecord, RealTimeRun
 from diagrams.scenario.scenario import Scenario, ScenarioError, load_scenario
 from diagrams.servo import Servo
@@ -295,6 +296,21 @@ def test_an_end_is_heard_on_the_way_to_the_start_too():
     assert record.ended == REQUESTED
     assert not len(record.stamps)
     assert not wire.sent
+
+
+def test_joints_that_jump_on_the_way_to_the_start_end_it_with_a_smooth_stop():
+    """Who led on from where they are said to be would drive the robot elsewhere."""
+    before = Lockstep(faulty())
+    RealTimeRun(faulty(), "open_loop").run(
+        before.link, before.camera(), now=before.now, is_asked_to_end=lambda: len(before.sent) > 50
+    )
+    at, _ = before.sent[50]
+    scenario = faulty(f"station.faults.joint_jump_at={at}")
+    wire = Lockstep(scenario)
+    with pytest.raises(StationError, match="a joint jumped by"):
+        RealTimeRun(scenario, "open_loop").run(wire.link, wire.camera(), now=wire.now)
+    assert_unsurprising(wire)
+    assert_stopped(wire, at)
 
 
 def test_a_camera_whose_first_sample_comes_after_the_stop_is_refused_beforehand():
