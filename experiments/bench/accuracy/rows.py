@@ -77,6 +77,11 @@ SECTIONS: dict[str, tuple[Row, ...]] = {
             "EGM before drives that give way 5.6 times as far as anybody told",
         ),
         Row(
+            "soft-cascades",
+            f"--cases plain --seeds 4 --first-seed 3000 --set station.drive.{_SOFT}",
+            "drives that give way as far and take torques",
+        ),
+        Row(
             "half-noise",
             f"--cases plain --seeds 4 --first-seed 3000 --set station.{_HALF}",
             "half of the camera's noise",

@@ -20,8 +20,8 @@ from systems.estimation.memory import Layout
 
 DEAD_TIME, MASS, SMOOTHED, SIZE = at.DEAD_TIME, at.MASS, at.SMOOTHED, at.SIZE
 MOMENT, OTHER_GAINS = (slice(k, k + 3) for k in (at.MOMENT, at.OTHER_GAINS))
-_VISCOUS, _COULOMB, _HUMPS = (
-    slice(at.FRICTION + k, at.CONSTANT, at.OF_FRICTION) for k in range(1, at.OF_FRICTION)
+_ROTORS, _VISCOUS, _COULOMB, _HUMPS = (
+    slice(at.FRICTION + k, at.CONSTANT, at.OF_FRICTION) for k in range(at.OF_FRICTION)
 )
 _CONSTANTS, SHARP, NOT_HELD, GIVING, THIRD = (
     slice(k, k + 6) for k in (at.CONSTANT, at.SHARP, at.NOT_HELD, at.GIVING, at.THIRD)
@@ -61,7 +61,7 @@ class DriveCommand(NamedTuple):
     torque: np.ndarray  # (6,) N m, joint side, on top of what the drives do for gravity
     beside: np.ndarray  # (6,) rad, of the position what is beside the plan because of what was learnt
     regressors: np.ndarray  # (17, 6), what `DriveModel.features` needs of this instant
-    torques: np.ndarray  # (4, 6) N m, what `GainSearch.follow` takes
+    torques: np.ndarray  # (9, 6) N m, what `GainSearch.follow` takes
 
 
 class DriveModel:
@@ -81,8 +81,8 @@ class DriveModel:
     Nor are the gains of a robot's controller known. A cascade makes G = s / (k_d (s + p) (s + i)) with the
     gain p of its position loop and the inverse i of its integral action time: columns of their own say by
     what e differs where that is i / 2, 2 i or 0.6 p, for the torques that nobody gives; where torques are
-    taken also for what was learnt of rotors and friction. Where they are not and gains are far from what is
-    believed, `GainSearch` finds others, see `prepare_gains` and `take_gains`.
+    taken also for what was learnt of rotors and friction. Where gains are far from what is believed,
+    `GainSearch` finds others, see `prepare_gains` and `take_gains`.
 
     Where drives take torques, these are sent ahead by the dead time that was learnt, as positions are; of
     Coulomb friction, which turns over in an instant, its mean over the period that they will last. Where they
@@ -131,9 +131,13 @@ class DriveModel:
         )
         self._rings = kind == "position"
         self._gains = config.position, config.integral
-        self.finds_gains = not model.takes_torque  # where torques are sent, gains matter little
-        self.search = GainSearch(gains, *self._gains, model.load_scale, period)
+        self.finds_gains = kind == "cascade"
+        self.search = GainSearch(gains, *self._gains, model.load_scale, period, model.takes_torque)
         self._hides_sticking = bool((self._drives.slack > _HIDING).any())
+        self._moved_by_friction = (self._drives.slack > _MOVED) & (not self._hides_sticking)
+        self.is_fed_back = bool(self._moved_by_friction.any()) or not (
+            model.takes_torque or self._hides_sticking
+        )
         # The arm as the drives know it, which hold it against gravity.
         drawn = ArmGeometry(robot, np.array([], dtype=int))
         self._held = drawn.constants(np.zeros(NUM_PARAMETERS)), ArmLoads(robot).masses
@@ -165,10 +169,19 @@ class DriveModel:
             coming=gains_layout,  # gains that were found and not taken yet; factors of 0: there are none
         )
 
-    @property
-    def moved_by_friction(self) -> np.ndarray:
-        """Which motors are off their plan by friction first of all, and show it, (6,)."""
-        return (self._drives.slack > _MOVED) & (not self._hides_sticking)
+    def shares_fed_back(self, memory: SimpleNamespace) -> np.ndarray:
+        """By which share what motors are off by may be fed back, (6,), see `MotorFeedback`.
+
+        All of it where friction moves a motor first of all, and shows it. Where no torques are sent, what is
+        commanded in their place goes through a controller that nobody knows well: as far as the rotor has
+        become known, without which a motor rings with its drive, and feedback, late as it is, adds to it.
+        Of other motors nothing: what was learnt leaves little, and with feedback first laps were no better.
+        """
+        shares = self._moved_by_friction.astype(float)
+        if self.is_fed_back and not (self._drives.takes_torque or shares.any()):
+            sigma = np.sqrt(memory.P[_DIAGONAL[_ROTORS], _DIAGONAL[_ROTORS]])
+            shares = np.maximum(shares, 1.0 - sigma / _ROTOR_SPREAD)
+        return shares
 
     def start(self, memory: SimpleNamespace) -> None:
         """Writes what is believed before anything moves."""
@@ -208,7 +221,10 @@ class DriveModel:
         drives = self._as_found(memory)
         kernels.drives.command(drives, *self._held, known, motion, loads, mass, limits, out, regressors)
         position, velocity, torque, beside = out
-        return DriveCommand(position, velocity, torque, beside, regressors, memory.w[_SEARCHED])
+        searched = memory.w[_SEARCHED]
+        if drives.takes_torque:
+            searched[0] = 0.0  # all that is needed is sent
+        return DriveCommand(position, velocity, torque, beside, regressors, searched)
 
     def features(self, v: np.ndarray, a: np.ndarray, regressors: np.ndarray) -> np.ndarray:
         """The equations of six joints, (6, 75), from motion and regressors (17, 6)."""
@@ -225,14 +241,14 @@ class DriveModel:
             dv, da: by how much speeds and accelerations were more, rad/s and rad/s^2, (6,).
 
         Returns:
-            Torques in N m that this needed beyond those planned, in the order of `TORQUES`, (4, 6); none of
+            Torques in N m that this needed beyond those planned, in the order of `TORQUES`, (9, 6); none of
             drives that follow positions alone, which ring faster than differences of positions show.
         """
         parts, needed = memory.deviation, np.zeros((len(TORQUES), 6))
         if self._rings:
             return needed
         kernels.drives.deviate(self._as_found(memory), v, dv, da, parts.last, parts.z, parts.out)
-        needed[:3] = parts.last[[0, 1, 3]]
+        needed[_DEVIATING] = parts.last[:4]
         return needed
 
     def look_back(
@@ -357,3 +373,5 @@ class DriveModel:
 
 
 _DIAGONAL, _SEARCHED = np.arange(SIZE), list(TORQUES)
+# In all, of the rotor, of viscous and of Coulomb friction
+_DEVIATING = [TORQUES.index(w) for w in (at.W_MISSING, at.W_ROTOR, at.W_VISCOUS, at.W_COULOMB)]

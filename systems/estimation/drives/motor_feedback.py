@@ -27,7 +27,7 @@ class MotorFeedback:
     """
 
     def __init__(
-        self, config: DriveModelConfig, kind: str, has_play: bool, motors: np.ndarray, period: float
+        self, config: DriveModelConfig, kind: str, has_play: bool, has_shares: bool, period: float
     ) -> None:
         """Takes its gain.
 
@@ -37,13 +37,11 @@ class MotorFeedback:
                 are brought back otherwise: of both nothing is fed back here.
             has_play: whether gears may have gaps. Then they err by more than their motors, and with feedback
                 robots came no nearer to their path: nothing is fed back either.
-            motors: of which something is fed back at all, (6,). Where friction moves them little, what was
-                learnt leaves little, and with feedback first laps were no better.
+            has_shares: whether there are motors of which something is fed back, ever.
             period: between commands, s.
         """
         self._gain = config.feedback if kind == "cascade" and not has_play else 0.0
-        self._motors = np.asarray(motors, dtype=float)
-        self.acts = self._gain > 0.0 and bool(self._motors.any())  # else it changes no command
+        self.acts = self._gain > 0.0 and has_shares  # else it changes no command
         self._period = period
         self.layout = Layout(beside=(NUM_JOINTS,))  # rad
 
@@ -53,6 +51,7 @@ class MotorFeedback:
         command: DriveCommand,
         off: np.ndarray,
         rounding: np.ndarray,
+        shares: np.ndarray,
         delay: float,
     ) -> DriveCommand:
         """Goes on by a period; returns the command with what is fed back.
@@ -62,6 +61,7 @@ class MotorFeedback:
             command: what the drives are to be told without it.
             off: planned less actual positions as known last, rad, (6,), NaN where they are not known.
             rounding: standard deviation of these by steps of the encoders, rad, (6,).
+            shares: of the gain, of each motor, (6,), `DriveModel.shares_fed_back`.
             delay: from a command to the motion of a motor, s.
         """
         gain = min(self._gain, _SHARE_OF_DELAY / (delay + _LATE * self._period))
@@ -69,7 +69,7 @@ class MotorFeedback:
         # In proportion, as motors that are all late are on their way still.
         off *= _MOST / max(_MOST, float(np.abs(off).max()))
         off -= np.clip(off, -_HALF_A_STEP * rounding, _HALF_A_STEP * rounding)
-        speed = gain * self._motors * off - self._gain * memory.beside
+        speed = gain * shares * off - self._gain * memory.beside
         memory.beside += self._period * speed
         return command._replace(
             position=command.position + memory.beside,

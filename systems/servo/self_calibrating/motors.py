@@ -1,5 +1,6 @@
 """What the self-calibrating law learns of motors: how far off their plan they are, and why."""
 
+import math
 from collections.abc import Callable
 from types import SimpleNamespace
 
@@ -74,7 +75,7 @@ class MotorLearning:
         self._half = max(1, round(_DIFFERENCE / model.period))
         of_drives = config.drives, config.drive, has_play
         self.drives = DriveModel(model, *of_drives)
-        self.feedback = MotorFeedback(*of_drives, self.drives.moved_by_friction, model.period)
+        self.feedback = MotorFeedback(*of_drives, self.drives.is_fed_back, model.period)
         self.plan, self.encoders = History(PLAN.size, length), History(2 * NUM_JOINTS, length)
         self.steps = EncoderSteps()
         search = {"search": self.drives.search.layout, "looks": (1,), "taken": (1,)}  # and gains taken
@@ -152,8 +153,8 @@ class MotorLearning:
     def feed_back(self, memory: SimpleNamespace, command: DriveCommand, instant: float) -> DriveCommand:
         """A command for an instant with what encoders say of motors now."""
         off = memory.off[-1] if self.is_on_plan(memory, instant) else np.zeros(NUM_JOINTS)
-        of_motors = off, self.steps.sigma(memory.steps), float(memory.delay.delay[0])
-        return self.feedback.add(memory.feedback, command, *of_motors)
+        of_motors = off, self.steps.sigma(memory.steps), self.drives.shares_fed_back(memory.drives)
+        return self.feedback.add(memory.feedback, command, *of_motors, float(memory.delay.delay[0]))
 
     def to_plan(self, memory: SimpleNamespace, joints: JointSample) -> np.ndarray:
         """What brings motors back to their plan that follow speeds alone, rad/s, (6,): nothing else does."""
@@ -169,8 +170,9 @@ class MotorLearning:
         """What motors needed beyond their plan, as they moved otherwise, `DriveModel.deviate`."""
         before, off, behind = memory.off[[0, self._half, -1]]
         span = self._half * self._period
-        dv = np.nan_to_num((before - behind) / (2.0 * span))
-        da = np.nan_to_num((2.0 * off - before - behind) / span**2)
+        dv, da = (before - behind) / (2.0 * span), (2.0 * off - before - behind) / span**2
+        if math.isnan(da[0]):  # encoders are known of all joints or of none
+            dv = da = np.zeros(NUM_JOINTS)
         return self.drives.deviate(memory.drives, memory.passed.velocity, dv, da)
 
     def _look_for_gains(self, memory: SimpleNamespace, instant: float, actual: np.ndarray) -> None:

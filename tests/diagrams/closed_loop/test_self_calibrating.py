@@ -283,19 +283,27 @@ def test_a_load_of_which_the_robot_alone_was_not_told_is_made_up_for(interface, 
 
 
 @pytest.mark.slow
-def test_gains_of_drives_that_nobody_knows_are_found_where_no_torques_are_taken():
-    """A robot's own controller gives way five times as far as believed; else the tip is 0.9 mm off."""
+@pytest.mark.parametrize(("interface", "times"), [("egm", 100 / 60 * 25 / 15 * 10 / 5), ("direct", None)])
+def test_gains_of_drives_that_nobody_knows_are_found(interface, times):
+    """A controller gives way five times as far as believed; else over EGM the tip is 0.9 mm off.
+
+    Where torques are sent, motors tell no more than that the drives are softer.
+    """
     cascade = zip(("velocity", "position", "integral"), (60, 15, 5), strict=True)
     soft = [f"station.drive.cascade.{name}={value}" for name, value in cascade]
     drawn = [f"{name}=3000" for name in ("seed", "station.errors.random.seed", "station.variation.seed")]
-    log = run(load_scenario("everything", ["station.interface=egm", *soft, *drawn]), "self_calibrating")
+    settings = [f"station.interface={interface}", *soft, *drawn]
+    log = run(load_scenario("everything", settings), "self_calibrating")
     laps = lap_metrics(log, pose_errors(log, "true"))
     assert log.learnt is not None
-    (event,) = log.learnt["events"]
-    assert event["kind"] == "drive gains unlike belief"
-    assert event["size"] == pytest.approx(100 / 60 * 25 / 15 * 10 / 5, rel=0.2)  # times as far
+    events = log.learnt["events"]
+    assert {event["kind"] for event in events} == {"drive gains unlike belief"}
+    assert len(events) <= 2
+    if times:
+        assert events[0]["size"] == pytest.approx(times, rel=0.2)  # as far
+    assert events[0]["size"] > 1.5
     assert log.path_start > 6.5  # s: the probe has begun anew, and the path has waited for it
-    assert laps[0]["max_norm_mm"] < 0.08
+    assert laps[0]["max_norm_mm"] < (0.08 if times else 0.05)
     assert tip_errors(log)[1].max() < 0.005e-3
     assert not any(log.guard_counts.values())
 

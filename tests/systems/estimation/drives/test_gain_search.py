@@ -5,23 +5,37 @@ import pytest
 from scipy.signal import TransferFunction, lsim
 
 from systems.estimation.drives.gain_search import TORQUES
+from systems.estimation.kernels import drive_columns as at
 from tests.systems.estimation.drives.motors import LOADS, PERIOD, drives, motion
 
 BELIEVED = np.array([25.0, 10.0])  # 1/s, of position and of the integral
+ARMS = np.random.default_rng(2).normal(0.0, (10.0, 10.0, 6.0, 1.0, 1.0, 0.3), (4, 6))  # N m
+# Where torques are sent: shares of rotor and friction that the file has wrong, kg not held, kg m
+UNLIKE = {at.W_ROTOR: 0.4, at.W_VISCOUS: -0.3, at.W_NOT_HELD: 3.0, at.W_LOADS: 0.4, at.W_LOADS + 1: 0.05}
 
 
-def searched(position: float, integral: float, give: float, friction: float = 0.2, noise: float = 0.0):
-    """What is found of motors with such factors of the gains, whose friction is more than believed."""
-    model, memory = drives(takes_torque=False)
+def searched(position, integral, give, friction=0.2, noise=0.0, unlike=None):
+    """What is found of motors with such factors of the gains.
+
+    Their friction is more than believed; where they take torques they lack what is unlike belief: that share
+    of a place of `TORQUES`.
+    """
+    model, memory = drives(takes_torque=unlike is not None)
     search = model.search
     sums = search.layout.view(np.zeros(search.layout.size))
     times = PERIOD * np.arange(900)
     torques = []
     for time in times:
-        command = model.command(memory, motion(time), LOADS, 7.0)
-        torques.append(memory.w.copy())
+        loads = LOADS.copy()
+        loads[1:, :6] = ARMS * np.roll(motion(time)[0], 1)  # of a kilogram, and of a kg m along x, y and z
+        command = model.command(memory, motion(time), loads, 7.0)
+        torques.append(command.torques)
     torques = np.array(torques)
-    missing = torques[:, 0] + friction * torques[:, 3]
+    factors = np.zeros(len(TORQUES))
+    factors[[0, 2]] = 1.0, friction
+    for place, share in (unlike or {}).items():
+        factors[TORQUES.index(place)] = share
+    missing = np.einsum("k,tkj->tj", factors, torques)
     behind = np.empty((len(times), 6))
     for j, kd in enumerate(model._drives.kd / give):
         p, i = BELIEVED * (position, integral)
@@ -29,7 +43,7 @@ def searched(position: float, integral: float, give: float, friction: float = 0.
         behind[:, j] = lsim(cascade, missing[:, j] - missing[0, j], times)[1]
     behind += np.random.default_rng(1).normal(0.0, noise, behind.shape)
     for time, w, each in zip(times, torques, behind, strict=True):
-        search.follow(sums, w[list(TORQUES)])
+        search.follow(sums, w)
         search.add(sums, np.array([motion(time)[1], np.zeros(6)]), each)
     assert command.torques.shape == (len(TORQUES), 6)
     return search.find(sums, 1.0, 1.0)
@@ -52,6 +66,22 @@ def test_gains_far_from_what_is_believed_are_found(position, integral, give):
 @pytest.mark.parametrize(("friction", "give"), [(0.0, 1.0), (0.5, 1.0), (0.2, 1.4), (0.2, 0.7)])
 def test_gains_as_believed_stay_whatever_else_is_wrong(friction, give):
     assert searched(1.0, 1.0, give, friction, noise=1e-5) is None
+
+
+@pytest.mark.parametrize(("position", "integral"), [(0.6, 0.5), (0.5, 0.5), (0.5, 1.0)])
+def test_they_are_found_where_torques_are_sent_from_what_these_leave(position, integral):
+    """Softer ones at least: what stiffer ones leave is next to nothing."""
+    found = searched(position, integral, 1.0, noise=1e-5, unlike=UNLIKE)
+    assert found
+    (p, i), true = BELIEVED * found[:2], BELIEVED * (position, integral)
+    assert p + i == pytest.approx(true.sum(), rel=0.3)
+    assert p * i == pytest.approx(true.prod(), rel=0.3)
+
+
+@pytest.mark.parametrize("share", [0.0, 1.0, -1.0])
+def test_where_torques_are_sent_gains_as_believed_stay_whatever_else_is_wrong(share):
+    unlike = {place: share * each for place, each in UNLIKE.items()}
+    assert searched(1.0, 1.0, 1.0, 0.3 * share, noise=1e-5, unlike=unlike) is None
 
 
 def test_motors_at_rest_do_not_leap_when_gains_are_taken():

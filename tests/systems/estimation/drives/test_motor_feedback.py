@@ -6,14 +6,14 @@ import pytest
 from systems.estimation.drives.drive_config import DriveModelConfig
 from systems.estimation.drives.drive_model import REGRESSORS, DriveCommand
 from systems.estimation.drives.motor_feedback import MotorFeedback
-from tests.systems.estimation.drives.motors import PERIOD, drives
+from tests.systems.estimation.drives.motors import LOADS, PERIOD, drives, motion
 
-STEP, STILL = 5e-4, np.zeros(6)  # s
+STEP, STILL, ALL = 5e-4, np.zeros(6), np.ones(6)  # s
 POSITION, SPEED, INTEGRAL = 25.0, 100.0, 10.0  # 1/s, of a cascade
 
 
 def part(kind="cascade", has_play=False, **config):
-    feedback = MotorFeedback(DriveModelConfig(**config), kind, has_play, STILL == 0.0, PERIOD)
+    feedback = MotorFeedback(DriveModelConfig(**config), kind, has_play, True, PERIOD)
     return feedback, feedback.layout.view(np.zeros(feedback.layout.size))
 
 
@@ -33,7 +33,7 @@ def behind_by(disturbance, delay, duration=2.0, planned_speed=0.0, sticks=0.0, *
     for k in range(round(duration / PERIOD)):
         now = planned_speed * PERIOD * k
         off.append(now - position)
-        told = feedback.add(memory, command, np.full(6, off[-2] if k else 0.0), STILL, delay)
+        told = feedback.add(memory, command, np.full(6, off[-2] if k else 0.0), STILL, ALL, delay)
         coming.append((told.position[0], told.velocity[0]))
         beside, rate = coming.pop(0)
         for i in range(round(PERIOD / STEP)):
@@ -83,7 +83,7 @@ def test_nothing_is_fed_back_that_encoders_do_not_show_nor_to_drives_that_ring_o
         (("velocity", False), behind, STILL),
     ):
         feedback, memory = part(*of_drives)
-        told = feedback.add(memory, command, off, rounding, 0.0)
+        told = feedback.add(memory, command, off, rounding, ALL, 0.0)
         np.testing.assert_array_equal(np.array(told[:4]), np.array(command[:4]))
 
 
@@ -92,7 +92,7 @@ def test_what_is_fed_back_counts_as_commanded_beside_the_plan_and_is_bounded():
     command = some_command()
     off = np.array([4.0, -2.0, 1.0, 0.0, 0.5, -4.0])  # rad, in proportion, so that all stay on their way
     for _ in range(1000):
-        told = feedback.add(memory, command, off, STILL, 0.0)
+        told = feedback.add(memory, command, off, STILL, ALL, 0.0)
     at_last = 0.5e-3 * off  # of more than 2 mrad drives are not the reason
     np.testing.assert_allclose(told.position - command.position, at_last, rtol=1e-6)
     np.testing.assert_allclose(told.beside - command.beside, at_last, rtol=1e-6)
@@ -100,16 +100,44 @@ def test_what_is_fed_back_counts_as_commanded_beside_the_plan_and_is_bounded():
     np.testing.assert_array_equal(told.torque, command.torque)
 
 
-def test_of_motors_that_friction_moves_less_than_all_else_nothing_is_fed_back():
+def test_of_motors_that_friction_moves_less_than_all_else_nothing_is_fed_back_where_torques_are_sent():
     """A PUMA 560 has most for the stiffness of its drives, a KR 16 so much that it hides the rest."""
-    fed_back = {
-        name: drives(robot=name)[0].moved_by_friction for name in ("puma560", "ur10", "irb1200", "kr16")
-    }
-    assert {name for name, motors in fed_back.items() if motors.any()} == {"puma560"}
-    assert fed_back["puma560"].sum() == 5
-    feedback = MotorFeedback(DriveModelConfig(), "cascade", False, fed_back["puma560"], PERIOD)
-    memory = feedback.layout.view(np.zeros(feedback.layout.size))
-    feedback.add(memory, some_command(), STILL + 1e-3, STILL, 0.0)
-    np.testing.assert_array_equal(memory.beside > 0.0, fed_back["puma560"])
-    assert feedback.acts
-    assert not MotorFeedback(DriveModelConfig(), "cascade", False, fed_back["ur10"], PERIOD).acts
+    for name, fed_back in (("puma560", 5), ("ur10", 0), ("irb1200", 0), ("kr16", 0)):
+        model, memory = drives(robot=name)
+        memory.P[:] = 0.0  # whatever is known of it
+        shares = model.shares_fed_back(memory)
+        assert np.isin(shares, (0.0, 1.0)).all()
+        assert shares.sum() == fed_back
+        acts = MotorFeedback(DriveModelConfig(), "cascade", False, model.is_fed_back, PERIOD).acts
+        assert acts == (fed_back > 0)
+
+
+@pytest.mark.parametrize("robot", ["ur10", "irb1200"])
+def test_where_no_torques_are_sent_it_is_fed_back_as_rotors_become_known(robot):
+    model, memory = drives(takes_torque=False, robot=robot)
+    assert model.is_fed_back
+    later = [model.shares_fed_back(memory)]
+    for k in range(500):
+        q, v, a = motion(PERIOD * k)
+        command = model.command(memory, (q, v, a), LOADS, 7.0)
+        model.look_back(memory, (q, v, a), command.regressors, command.beside, q)
+        later.append(model.shares_fed_back(memory))
+    np.testing.assert_array_equal(later[0], 0.0)
+    assert (np.diff(later, axis=0) >= -1e-9).all()
+    assert (later[-1] > 0.0).all()
+    assert later[-1][5] > 0.2  # whose rotor the motion shows best
+
+
+def test_robots_whose_friction_hides_what_motors_are_off_by_are_fed_back_nothing():
+    model, memory = drives(takes_torque=False, robot="kr16")
+    memory.P[:] = 0.0
+    assert not model.is_fed_back
+    np.testing.assert_array_equal(model.shares_fed_back(memory), 0.0)
+
+
+def test_what_is_fed_back_goes_by_the_shares():
+    (feedback, memory), shares = part(), np.array([0.0, 0.2, 0.4, 0.6, 0.8, 1.0])
+    told = feedback.add(memory, some_command(), STILL + 1e-3, STILL, shares, 0.0)
+    beside = told.position - some_command().position
+    np.testing.assert_allclose(beside, shares * beside[-1], atol=1e-15)
+    assert beside[-1] > 0.0
