@@ -1,5 +1,6 @@
 """``truetip design --program``: files beside the table, all at once, and what is refused."""
 
+import re
 from pathlib import Path
 
 import pytest
@@ -30,3 +31,20 @@ def test_refusals_come_before_the_search(options: list, message: str, tmp_path: 
     arguments = ["--write", tmp_path / "run.csv", "--report", tmp_path / "page.html"]
     assert message in refusal(truetip("design", *arguments, *options))
     assert files(tmp_path) == set()
+
+
+def test_a_table_that_somebody_has_filled_stays(tmp_path: Path):
+    """Before the search, where it holds places; after it, where it may hold joints as they were noted."""
+    design = ["design", "--count", 9, "--anywhere", "--program", "rapid"]
+    design += ["--write", tmp_path / "run.csv", "--report", tmp_path / "page.html"]
+    table = tmp_path / "run_measured.csv"
+    for _ in range(2):  # what is there and the same is no obstacle
+        assert truetip(*design).exit_code == 0
+    blank = table.read_text()
+    for filled, why in (
+        (blank.replace(",,,,,,\n", ",1,2,3,4,5,6\n", 1), "holds measurements"),
+        (re.sub(r"\n-?[\d.]+,", "\n1.5,", blank, count=1), "is there and is not the table of this run"),
+    ):
+        table.write_text(filled)
+        assert f"{table} {why}" in refusal(truetip(*design))
+        assert table.read_text() == filled
