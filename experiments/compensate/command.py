@@ -81,8 +81,11 @@ def compensate_command(
         believed = nominal or true.calibration.of
         if not believed:
             raise ValueError(f"--robot {robot} does not say which robot was calibrated; --nominal says it")
-        if out.resolve() == program.resolve():
-            raise ValueError(f"--write must be another file than the program, got {out}")
+        if not nominal and load_robot(believed).is_calibrated:
+            raise ValueError(
+                f"--robot {robot} was calibrated on {believed}, which is calibrated itself; --nominal says "
+                "what the controller computes with"
+            )
         new = stack.enter_context(staged_file(out, *_suffixes(program)))
         page = stack.enter_context(staged_file(report, *PAGE))
         stack.enter_context(output.staged())

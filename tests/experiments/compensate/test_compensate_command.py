@@ -2,6 +2,7 @@
 
 import json
 import re
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -75,6 +76,18 @@ def test_refusals_in_one_line_leave_nothing(folder: Path, tmp_path: Path, change
     named = {"out": tmp_path / "new.mod", "report": tmp_path / "page.html"} | change
     assert re.search(message, refusal(truetip("compensate", folder / "m.mod", *options(folder, **named))))
     assert not files(tmp_path)
+
+
+def test_what_was_calibrated_on_a_calibrated_robot_corrects_nothing(folder: Path, tmp_path: Path):
+    written = tmp_path / "robot.yaml"
+    robot = load_robot(str(folder / "robot.yaml"))
+    again = replace(robot, calibration=replace(robot.calibration, of=str(written)))
+    written.write_text(robot_text(again))  # of itself
+    named = {"robot": written, "out": tmp_path / "new.mod", "report": tmp_path / "page.html"}
+    assert "which is calibrated itself" in refusal(
+        truetip("compensate", folder / "m.mod", *options(folder, **named))
+    )
+    assert files(tmp_path) == {"robot.yaml"}
 
 
 def test_a_target_out_of_reach_is_named_by_its_line_and_nothing_is_written(folder: Path, tmp_path: Path):
