@@ -49,6 +49,8 @@ from robots.measurement_design.criteria import NAMES
 from robots.measurement_design.design import MeasurementDesign, design_measurements
 
 _COUNT, _CRITERION = 75, "b3"  # of a simulated calibration
+_TABLES = ("measurements.csv", "validation.csv")
+_RESULTS = ("report.html", *_TABLES)  # in the folder of --out
 
 
 def calibrate_command(
@@ -155,6 +157,7 @@ def calibrate_command(
         prepared = prepare(scenario, settings or [], robot, needs_path=not wanted.is_given)
         if compliance is None and not wanted.is_given:
             wanted = replace(wanted, compliance=prepared.scenario.station.elasticity == "structure")
+        _refuse_onto_nominal(write, prepared.scenario.robot)
         print_note(human, foreign_sources_note(prepared.robot) if wanted.is_given else prepared.note)
         baked = urdf_sag(urdf, urdf_payload, urdf_pose, wanted.compliance)
         if measurements and names_targets(measurements):
@@ -179,7 +182,7 @@ def calibrate_command(
             measure = "measure there (truetip design --program) and give the table with --measurements"
             simulated_only(prepared, "calibrate", measure)
             check(prepared, ["open_loop"])
-        stage = stack.enter_context(staged_folder(out))
+        stage = stack.enter_context(staged_folder(out, *_RESULTS))
         robot_file = stack.enter_context(staged_file(write, *YAML)) if write else None
         urdf_file = stack.enter_context(staged_file(urdf, ".urdf", ".xml")) if urdf else None
         stack.enter_context(output.staged())
@@ -331,6 +334,12 @@ def _path(scenario: Scenario, study: CalibrationStudy) -> dict[str, Any]:
 
 
 def _write_tables(stage: Path, sets: MeasuredSets) -> None:
-    write_text(stage / "measurements.csv", measurement_text(sets.calibration))
-    if sets.validation is not None:
-        write_text(stage / "validation.csv", measurement_text(sets.validation))
+    for name, table in zip(_TABLES, (sets.calibration, sets.validation), strict=True):
+        if table is not None:
+            write_text(stage / name, measurement_text(table))
+
+
+def _refuse_onto_nominal(write: str | None, robot: str) -> None:
+    """Raises ValueError if the calibrated robot would replace the one that it is the calibration of."""
+    if write and Path(write).resolve() == Path(robot).resolve():
+        raise ValueError(f"--write {write} is the nominal robot; the calibrated one needs a file of its own")

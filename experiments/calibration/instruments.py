@@ -83,7 +83,7 @@ def calibrate_with_instruments(
         unused += [(tables.validation, problem) for problem in problems]
     cell, note = _cell(tables, seen), ""
     with ExitStack() as stack:
-        stage = stack.enter_context(staged_folder(files.out))
+        stage = stack.enter_context(staged_folder(files.out, "report.html"))
         robot_file = stack.enter_context(staged_file(files.robot, *YAML)) if files.robot else None
         urdf_file = stack.enter_context(staged_file(files.urdf, ".urdf", ".xml")) if files.urdf else None
         stack.enter_context(output.staged())

@@ -7,6 +7,7 @@ from collections.abc import Iterator, Mapping
 from contextvars import ContextVar
 from functools import cache
 from importlib import import_module
+from pathlib import Path
 from typing import Any
 
 import typer
@@ -26,6 +27,27 @@ def option_with(value: str) -> str:
     context = _running.get()
     options = [each for each in context.command.params if each.param_type_name == "option"] if context else []
     return next((each.opts[0] for each in options if str(context.params.get(each.name)) == value), "")
+
+
+def naming(file: Path) -> list[str]:
+    """The options and arguments of the running command that were given this file, however it is spelled."""
+    context = _running.get()
+    params = context.command.params if context else []
+    found = []
+    for each in params:
+        given = context.params.get(each.name)
+        values = given if isinstance(given, list | tuple) else [given]
+        if any(isinstance(value, str | Path) and _is(file, value) for value in values):
+            found.append(each.opts[0] if each.param_type_name == "option" else _shown(each).strip("[]."))
+    return found
+
+
+def _is(file: Path, given: str | Path) -> bool:
+    """Whether a value that was given is this file; what no file can be called is not."""
+    try:
+        return Path(given).resolve() == file.resolve()
+    except (OSError, ValueError):
+        return False
 
 
 class PlainCommand(TyperCommand):

@@ -7,22 +7,33 @@ from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 
+from experiments.cli.command_table import naming
+
 PAGE = (".html", ".htm")
 YAML = (".yaml", ".yml")
 TABLE = (".csv", ".txt")
 
 
 @contextmanager
-def staged_folder(folder: str | Path) -> Iterator[Path]:
+def staged_folder(folder: str | Path, *names: str) -> Iterator[Path]:
     """Gives a temporary folder whose files move to ``folder`` when the block ends well.
 
     It is made on entry, inside ``folder`` or its nearest existing parent: where that fails, the results
     would have failed too, and one knows before the work begins. If the block raises, nothing remains.
 
+    Args:
+        folder: of the results.
+        names: of files that will be written into it, as far as they are known; none of them may be a file
+            that an option of the running command names, for whatever it is.
+
     Raises:
-        OSError: if the folder cannot be made or written; one line that says which and why.
+        OSError: if the folder cannot be made or written, or a file in it is named otherwise; one line that
+            says which and why.
     """
     folder = Path(folder)
+    for name in names:
+        if others := naming(folder / name):
+            raise OSError(f"{' and '.join(others)} {folder / name}: the results in {folder} would replace it")
     try:
         place = _nearest_existing(folder)
         stage = Path(tempfile.mkdtemp(prefix=".truetip-", dir=place))
@@ -49,12 +60,15 @@ def staged_file(path: str | Path, *suffixes: str) -> Iterator[Path]:
         suffixes: one of which its name must have, so that other programs know what it holds.
 
     Raises:
-        OSError: if the file cannot be written or has another suffix; one line that says which and why.
+        OSError: if the file cannot be written, has another suffix, or is also what another option of the
+            running command names, to be read or written; one line that says which and why.
     """
     path = Path(path)
     if path.is_dir():
         raise OSError(f"cannot write the file {path}: it is a folder")
     check_suffix(path, suffixes)
+    if len(options := naming(path)) > 1:
+        raise OSError(f"{' and '.join(options)} name the same file {path}: what is written needs its own")
     with staged_folder(path.parent) as stage:
         yield stage / path.name
 

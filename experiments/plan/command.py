@@ -24,7 +24,7 @@ from robots.kinematics.forward import Kinematics
 from robots.measurement_design.obstacles import read_obstacles
 from robots.planning.limits import DUTY, RESERVE, motion_limits
 from robots.planning.path_dynamics import DYNAMICS
-from robots.programs.planned_moves import MOVES
+from robots.programs.planned_moves import FILES, MOVES
 from systems.reference.planned_file import planned_text
 
 
@@ -130,7 +130,7 @@ def plan_command(
         )
         page = stack.enter_context(staged_file(report, *PAGE))
         table = stack.enter_context(staged_file(write, *TABLE)) if write else None
-        code = stack.enter_context(staged_folder(report.parent)) if program else None
+        code = stack.enter_context(staged_folder(report.parent, FILES[program])) if program else None
         written: list[Path] = []
         stack.enter_context(output.staged())
         with progress_bar(f"{objective}, {dynamics}") as progress:

@@ -14,6 +14,7 @@ from robots.programs.measurement_run import EXTERNAL, krl_axes, listed, spelled
 
 _FASTEST_KRL = 3.0  # m/s, the largest $VEL.CP
 _NAME = "plan"
+FILES = {"rapid": f"{_NAME}.mod", "krl": f"{_NAME}.src"}  # by language
 _TURN = 1e-4  # rad, of the tool along a line: less does not count
 
 
@@ -69,7 +70,7 @@ def rapid_moves(moves: Sequence[PlannedMove]) -> dict[str, str]:
     for number, move in enumerate(moves, 1):
         kind, to = ("MoveL", f"CalcRobT(p{number},tool0)") if move.is_straight else ("MoveAbsJ", f"p{number}")
         lines.append(f"        {kind} {to}, vmax\\T:={move.duration:.3f}, fine, tool0; ! {move.name}")
-    return {f"{_NAME}.mod": "\n".join([*lines, "    ENDPROC", "ENDMODULE", ""])}
+    return {FILES["rapid"]: "\n".join([*lines, "    ENDPROC", "ENDMODULE", ""])}
 
 
 def krl_moves(moves: Sequence[PlannedMove]) -> dict[str, str]:
@@ -106,7 +107,7 @@ def krl_moves(moves: Sequence[PlannedMove]) -> dict[str, str]:
             speed, acceleration = move.joint_speed.max(), move.joint_acceleration.max()
             lines += [f"BAS(#VEL_PTP,{_percent(speed)})", f"BAS(#ACC_PTP,{_percent(acceleration)})"]
             lines.append(f"PTP {krl_axes(np.rad2deg(move.q[1]))}")
-    return {f"{_NAME}.src": "\n".join([*lines, "END", ""])}
+    return {FILES["krl"]: "\n".join([*lines, "END", ""])}
 
 
 MOVES = {"rapid": rapid_moves, "krl": krl_moves}

@@ -1,6 +1,7 @@
 """truetip calibrate with tables of one's own: any robot, any instrument, and what is refused."""
 
 import json
+import shutil
 from pathlib import Path
 
 import numpy as np
@@ -187,3 +188,35 @@ def test_an_adjustment_is_validated_on_lines_of_its_own_and_written_as_urdf(tmp_
         "validation: instrument other is not in the calibration; there are camera, tracker, bar"
         in refusal(refused)
     )
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        (
+            "--measurements mine/measurements.csv --out mine",
+            "--measurements mine/measurements.csv: the results",
+        ),
+        (
+            "--measurements measured.csv --validation mine/validation.csv --out ./mine",
+            "--validation mine/valid",
+        ),
+        ("--measurements measured.csv --robot my.yaml --write my.yaml", "is the nominal robot"),
+        ("--measurements measured.csv --scenario cell.yaml --write ./my.yaml", "is the nominal robot"),
+        ("--measurements measured.csv --noise noise.yaml --write noise.yaml", "--noise and --write name"),
+    ],
+)
+def test_what_is_read_is_not_what_is_written(
+    options: str, message: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+):
+    monkeypatch.chdir(tmp_path)
+    tables(tmp_path, "irb1200")
+    (tmp_path / "mine").mkdir()
+    shutil.copy("measured.csv", "mine/measurements.csv")
+    shutil.copy("fresh.csv", "mine/validation.csv")
+    (tmp_path / "my.yaml").write_text("extends: irb1200\n")
+    (tmp_path / "cell.yaml").write_text("extends: misaligned\nrobot: my.yaml\n")
+    (tmp_path / "noise.yaml").write_text("{joint_deg: 0.1, position_mm: 0.1, rotation_deg: 0.1}")
+    before = {path: path.read_bytes() for path in tmp_path.rglob("*.*")}
+    assert message in refusal(truetip("calibrate", *options.split()))
+    assert {path: path.read_bytes() for path in tmp_path.rglob("*.*")} == before

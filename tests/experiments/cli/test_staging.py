@@ -5,7 +5,9 @@ from pathlib import Path
 import pytest
 
 from experiments.cli.staging import PAGE, keep_files, staged_file, staged_folder
-from tests.experiments.commands import files
+from systems.vision.camera_rig import load_cell
+from systems.vision.camera_rig_file import cell_text
+from tests.experiments.commands import files, refusal, truetip
 
 
 def test_files_appear_when_the_work_is_done_and_not_before(tmp_path: Path):
@@ -67,3 +69,31 @@ def test_a_place_where_nothing_can_be_written_is_refused_before_the_work(tmp_pat
     refused = pytest.raises(OSError, match=r"cannot write in folder .*file/results: not a directory")
     with refused, staged_folder(tmp_path / "file/results"):
         pytest.fail("the work began")
+
+
+@pytest.mark.parametrize(
+    ("command", "options"),
+    [
+        ("modes --report r.html --animation ./r.html", "--report and --animation name the same file"),
+        ("cameras calibrate --recording s.csv --write-recording s.csv", "--recording and --write-recording"),
+        ("cameras calibrate --cell c.yaml --write sub/../c.yaml", "--cell and --write name the same file"),
+        (
+            "compensate m.mod --robot r.yaml --nominal irb1200 --with n.mod --write n.mod",
+            "--write and --with",
+        ),
+        (
+            "plan --path plan.mod --program rapid --report page.html",
+            "--path plan.mod: the results in . would",
+        ),
+        ("robots import r.yaml --write r.yaml", "FILE.urdf and --write name the same file"),
+    ],
+)
+def test_what_is_written_is_named_by_one_option_alone(
+    command: str, options: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "c.yaml").write_text(cell_text(load_cell("probst")))
+    (tmp_path / "r.yaml").write_text("extends: irb1200\ncalibration: {of: irb1200, source: a table}\n")
+    before = files(tmp_path)
+    assert options in refusal(truetip(*command.split()))
+    assert files(tmp_path) == before
