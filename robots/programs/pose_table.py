@@ -116,8 +116,11 @@ def _row(
         payload = _literal(*fields[place], 1.0, separator) if place < len(fields) else None
         if payload is None:
             return Note(line, "payload_kg is not a number, row left alone")
+        if payload.value < 0.0:
+            return Note(line, f"payload_kg must not be negative, got {payload.value:g}, row left alone")
         payloads = (payload.value,)
-    name = fields[columns["name"]][1].strip().strip('"') if "name" in columns else ""
+    place = columns.get("name", len(fields))
+    name = fields[place][1].strip().strip('"') if place < len(fields) else ""
     return Target(name, line, numbers, payloads=payloads)
 
 

@@ -167,3 +167,16 @@ def test_krl_refuses_a_tool_that_is_not_declared():
 def test_a_table_without_targets_is_refused(text: str, refusal: str):
     with pytest.raises(ProgramError, match=refusal):
         parse_program(Source("m.csv", text))
+
+
+def test_a_row_may_end_before_its_name_and_one_with_an_impossible_load_is_named():
+    head = "q1_deg,q2_deg,q3_deg,q4_deg,q5_deg,q6_deg,payload_kg,name"
+    text = f"{head}\n1,2,3,4,5,6,3,one\n1,2,3,4,5,6,3\n1,2,3,4,5,6,-3\n"
+    program = parse_program(Source("t.csv", text))
+    assert [(each.line, each.name, each.payloads) for each in program.targets] == [
+        (2, "one", (3.0,)),
+        (3, "", (3.0,)),
+    ]
+    assert [(note.line, note.text) for note in program.notes] == [
+        (4, "payload_kg must not be negative, got -3, row left alone")
+    ]
