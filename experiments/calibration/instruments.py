@@ -20,8 +20,9 @@ from experiments.cli.console import print_files
 from experiments.cli.json_output import JsonOutput
 from experiments.cli.staging import YAML, staged_file, staged_folder
 from experiments.report.files import write_text
+from robots.calibration.instruments.cell_file import read_cell
 from robots.calibration.instruments.identify import InstrumentCalibration, identify_with_instruments
-from robots.calibration.instruments.observation_file import read_cell, read_observations
+from robots.calibration.instruments.observation_file import read_observations
 from robots.calibration.instruments.observations import MeasuringCell, Observations
 from robots.calibration.instruments.validation import FreshLines, validate_lines
 from robots.calibration.measurement_file import RowProblem
@@ -108,14 +109,22 @@ def calibrate_with_instruments(
 
 
 def _cell(tables: InstrumentTables, seen: Observations) -> MeasuringCell:
-    """What is known before, the noise included. Raises ValueError for names that no line has."""
+    """What is known before, the noise included. Raises ValueError for names that no line has in that role."""
     cell = read_cell(tables.cell) if tables.cell else MeasuringCell({}, {}, {}, {})
-    known = {*seen.targets, *seen.instruments}
-    for label in (*cell.places, *cell.frames, *cell.anchors, *cell.sigmas):
-        if label not in known:
-            raise ValueError(
-                f"cell {tables.cell}: no line is of {label}; there are {', '.join(sorted(known))}"
-            )
+    bars = [name for i, name in enumerate(seen.instruments) if seen.is_bar(i)]
+    others = [name for name in seen.instruments if name not in bars]
+    for key, labels, kind, known in (
+        ("targets", cell.places, "a target", seen.targets),
+        ("frames", cell.frames, "an instrument of coordinates", others),
+        ("anchors", cell.anchors, "an instrument of distances", bars),
+        ("sigma_mm", cell.sigmas, "an instrument", seen.instruments),
+    ):
+        for label in labels:
+            if label not in known:
+                raise ValueError(
+                    f"cell {tables.cell}: {key}.{label}: no line is of {kind} {label}; there are "
+                    f"{', '.join(sorted(known)) or 'none'}"
+                )
     if not tables.noise.is_known:
         return cell
     said = dict.fromkeys(seen.instruments, tables.noise.position_sigma) | cell.sigmas

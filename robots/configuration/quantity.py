@@ -98,6 +98,18 @@ def vector(
     return field(default_factory=lambda: np.array(default, dtype=float), metadata={_KEY: declaration})
 
 
+def named(
+    size: int = 0,
+    low: float = -math.inf,
+    high: float = math.inf,
+    unit: str = "",
+    is_open: bool = False,
+) -> Any:
+    """A field that holds a number by each of any names, or as many numbers as ``size`` says."""
+    declaration = Declaration(Limits(low, high, unit, is_open), (size,) if size else ())
+    return field(default_factory=dict, metadata={_KEY: declaration})
+
+
 def choice(default: str, names: Collection[str] | Callable[[], Collection[str]]) -> Any:
     """A field that holds one of the names; a function is asked for them when they are needed."""
     choices = names if callable(names) else lambda: names
@@ -145,8 +157,10 @@ def out_of_range(part: Any, keys: tuple[str | int, ...] = ()) -> tuple[tuple[str
     return None
 
 
-def _numbers(value: Any) -> list[tuple[tuple[int, ...], float]]:
-    """The numbers of a field, with their indices: of itself, of a list or of an array."""
+def _numbers(value: Any) -> list[tuple[tuple[str | int, ...], float]]:
+    """The numbers of a field, with what leads to them: of itself, of a list, an array or a mapping."""
+    if isinstance(value, dict):
+        return [((key, *inside), number) for key, each in value.items() for inside, number in _numbers(each)]
     if isinstance(value, np.ndarray):
         return [(tuple(map(int, index)), float(number)) for index, number in np.ndenumerate(value)]
     if isinstance(value, list) and all(isinstance(each, (int, float)) for each in value):

@@ -11,17 +11,14 @@ import math
 from pathlib import Path
 
 import numpy as np
-import yaml
 
-from robots.calibration.instruments.observations import MeasuringCell, Observations
+from robots.calibration.instruments.observations import Observations
 from robots.calibration.measurement_file import MeasurementFileError, RowProblem
 from robots.description.model import NUM_JOINTS
-from robots.pose import rotation_from_zyx
 from robots.text_table import TextTable, TextTableError, finite_number, parse_fields, read_text
 
 _UNITS = {"kg": 1.0, "rad": 1.0, "deg": math.pi / 180.0, "m": 1.0, "mm": 1e-3}
 _JOINTS = tuple(f"q{number}" for number in range(1, NUM_JOINTS + 1))
-_KEYS = {"targets": "places", "frames": "frames", "anchors": "anchors", "sigma_mm": "sigmas"}
 
 
 def names_targets(path: str | Path) -> bool:
@@ -152,44 +149,3 @@ class _Columns:
         if value is None:
             raise ValueError(f"{place[0]} is not a finite number: '{row[place[1]]}'")
         return value * place[2]
-
-
-def read_cell(path: str | Path) -> MeasuringCell:
-    """Reads what is known of targets and instruments from YAML.
-
-    ``targets: {A: [0, 0, 100]}`` places in mm on the tool; ``frames: {tracker: [x, y, z, alpha, beta,
-    gamma]}`` the world of the robot in the frame of the instrument, mm and degrees (ZYX); ``anchors: {bar:
-    [0, 0, 0]}`` in mm in the world; ``sigma_mm: {tracker: 0.05}``; ``joint_sigma_deg: 0.001``.
-
-    Raises:
-        MeasurementFileError: if it cannot be read, or says something else.
-    """
-    try:
-        found = yaml.safe_load(read_text(path))
-    except (TextTableError, yaml.YAMLError) as error:
-        raise MeasurementFileError(f"cell {' '.join(str(error).split())}") from error
-    allowed = (*_KEYS, "joint_sigma_deg")
-    if not isinstance(found, dict) or not set(found) <= set(allowed):
-        raise MeasurementFileError(f"cell {path}: may have {', '.join(allowed)}, there is {found!r:.80}")
-    lengths = {"targets": 3, "frames": 6, "anchors": 3, "sigma_mm": 1}
-    parts: dict[str, dict] = {name: {} for name in _KEYS.values()}
-    for key, name in _KEYS.items():
-        for label, value in (found.get(key) or {}).items():
-            numbers = np.atleast_1d(np.array(value, dtype=object))
-            if len(numbers) != lengths[key] or not all(isinstance(each, int | float) for each in numbers):
-                raise MeasurementFileError(
-                    f"cell {path}: {key}.{label} must be {lengths[key]} numbers, got {value}"
-                )
-            parts[name][str(label)] = _si(key, numbers.astype(float))
-    joint = found.get("joint_sigma_deg")
-    return MeasuringCell(**parts, joint_sigma=None if joint is None else math.radians(float(joint)))
-
-
-def _si(key: str, numbers: np.ndarray) -> np.ndarray | float:
-    if key == "sigma_mm":
-        return 1e-3 * float(numbers[0])
-    if key != "frames":
-        return 1e-3 * numbers
-    X = np.eye(4)
-    X[:3, :3], X[:3, 3] = rotation_from_zyx(np.deg2rad(numbers[3:])), 1e-3 * numbers[:3]
-    return X

@@ -220,3 +220,28 @@ def test_what_is_read_is_not_what_is_written(
     before = {path: path.read_bytes() for path in tmp_path.rglob("*.*")}
     assert message in refusal(truetip("calibrate", *options.split()))
     assert {path: path.read_bytes() for path in tmp_path.rglob("*.*")} == before
+
+
+@pytest.mark.parametrize(
+    ("cell", "message"),
+    [
+        (
+            "anchors: {tracker: [0, 0, 0]}",
+            "anchors.tracker: no line is of an instrument of distances tracker",
+        ),
+        ("frames: {bar: [0, 0, 0, 0, 0, 0]}", "frames.bar: no line is of an instrument of coordinates bar"),
+        (
+            "targets: {tracker: [0, 0, 0]}",
+            "targets.tracker: no line is of a target tracker; there are a, b, c",
+        ),
+        ("sigma_mm: {a: 1}", "sigma_mm.a: no line is of an instrument a; there are bar, camera, tracker"),
+    ],
+)
+def test_what_is_known_is_known_of_something_that_was_measured(
+    cell: str, message: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+):
+    monkeypatch.chdir(tmp_path)
+    write_lines(tmp_path / "m.csv", observed(count=20)[1], range(20))
+    (tmp_path / "cell.yaml").write_text(cell)
+    result = truetip("calibrate", "--measurements", "m.csv", "--instruments", "cell.yaml")
+    assert f"cell cell.yaml: {message}" in refusal(result)

@@ -7,16 +7,17 @@ import pytest
 
 from robots.calibration.error_model import ErrorModel
 from robots.calibration.identification import IdentificationError
+from robots.calibration.instruments.cell_file import read_cell
 from robots.calibration.instruments.identify import (
     InstrumentCalibration,
     _start,
     identify_with_instruments,
 )
-from robots.calibration.instruments.observation_file import read_cell, read_observations
+from robots.calibration.instruments.observation_file import read_observations
 from robots.calibration.instruments.observations import MeasuringCell, Observations
 from robots.calibration.instruments.problem import InstrumentProblem
 from robots.calibration.instruments.validation import validate_lines
-from robots.calibration.measurement_file import MeasurementFileError, read_measurements
+from robots.calibration.measurement_file import read_measurements
 from robots.description.model import load_robot
 from robots.kinematics.forward import Kinematics
 from robots.metrology.point_registration import register_points
@@ -198,6 +199,24 @@ def test_a_cell_says_what_is_known(tmp_path):
     np.testing.assert_allclose(cell.frames["tracker"][:3, :3] @ [1, 0, 0], [0, 1, 0], atol=1e-15)
     np.testing.assert_allclose(cell.anchors["bar"], ANCHOR)
     assert cell.sigmas == {"tracker": pytest.approx(5e-5)}
-    (tmp_path / "bad.yaml").write_text("targets: {a: [0, 0]}")
-    with pytest.raises(MeasurementFileError, match=r"targets\.a must be 3 numbers"):
+
+
+@pytest.mark.parametrize(
+    ("text", "refusal"),
+    [
+        ("targets: {a: [0, 0]}", r"line 1: targets\.a must be 3 numbers"),
+        ("targets: [1, 2]", r"line 1: targets must be a group of names, got \[1, 2\]"),
+        ("targets: {a: [0, 0, .nan]}", r"line 1: targets\.a\[2\] must be finite, in mm, got nan"),
+        ("anchors: {}\nsigma_mm: 0.05", "line 2: sigma_mm must be a group of names, got 0.05"),
+        ("sigma_mm:\n  t: 0", r"line 2: sigma_mm\.t must be positive, in mm, got 0"),
+        ("joint_sigma_deg: [1]", r"line 1: joint_sigma_deg must be a number, got \[1\]"),
+        ("joint_sigma_deg: abc", "line 1: joint_sigma_deg must be a number, got 'abc'"),
+        ("joint_sigma_deg: -1", "line 1: joint_sigma_deg must be zero or positive, in deg, got -1"),
+        ("targets:\n  a: [0, 0, 1]\n  a: [0, 0, 2]", "line 3: key 'a' is given twice"),
+        ("target: {}", "line 1: unknown key 'target'; known here: targets, .*did you mean targets"),
+    ],
+)
+def test_a_cell_that_cannot_be_used_is_refused_with_file_and_line(text: str, refusal: str, tmp_path):
+    (tmp_path / "bad.yaml").write_text(text)
+    with pytest.raises(ValueError, match=rf"bad\.yaml, {refusal}"):
         read_cell(tmp_path / "bad.yaml")
