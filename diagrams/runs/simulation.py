@@ -20,6 +20,7 @@ from diagrams.scenario.scenario import Scenario, ScenarioError
 from diagrams.servo import Servo, calibrated, law_name, learnt, predicted_tip
 from diagrams.station import SimulatedStation
 from diagrams.watching import Watch, make_watch
+from robots.description.calibration import is_same_robot
 from robots.description.model import RobotModel, load_robot
 from robots.dynamics.newton_inverse import inverse_kinematics
 from systems.cell.events.station_events import check_events
@@ -282,7 +283,7 @@ def nominal_robot(scenario: Scenario, robot: RobotModel | None) -> RobotModel:
     """
     if robot is not None and not robot.calibration.of:
         return robot
-    if robot is not None and robot.calibration.of != scenario.robot:
+    if robot is not None and not is_same_robot(robot.calibration.of, scenario.robot):
         raise ScenarioError(
             f"{robot.name} was calibrated on '{robot.calibration.of}', the scenario has '{scenario.robot}'"
         )

@@ -6,6 +6,7 @@ import numpy as np
 
 from diagrams.scenario.scenario import Scenario
 from diagrams.scenario.scenario_file import ScenarioError
+from robots.description.calibration import is_same_robot
 from robots.description.model import NUM_JOINTS, RobotModel, load_robot
 from robots.description.variation import Factors, varied
 from systems.controller_model import ControllerModel, ControllerModelConfig
@@ -65,7 +66,7 @@ def _named_robot(scenario: Scenario, robot: RobotModel | None) -> RobotModel:
     if not name:
         return robot or load_robot(scenario.robot)
     named = load_robot(name)
-    if named.calibration.of and named.calibration.of != scenario.robot:
+    if named.calibration.of and not is_same_robot(named.calibration.of, scenario.robot):
         raise ScenarioError(
             f"servo.model.robot: {named.name} was calibrated on '{named.calibration.of}', "
             f"the scenario has '{scenario.robot}'"

@@ -193,8 +193,8 @@ def calibrate_command(
         _write_tables(stage, measured.sets)
         title = prepared.robot.name if wanted.is_given else prepared.title  # tables have no scenario
         write_calibration_page(stage / "report.html", title, study, path, measured.problems)
-        if robot_file:
-            write_text(robot_file, robot_text(study.calibrated))
+        if robot_file and write:
+            write_text(robot_file, robot_text(study.calibrated, beside=Path(write)))
         if urdf_file:
             table = study.sets.calibration
             drawn, note = urdf_robot(study.calibrated, baked, table.q, table.payload)

@@ -97,8 +97,8 @@ def calibrate_with_instruments(
         calibrated = found.calibrated_robot(name)
         output.write(instruments_json(found, tables.measurements, unused, checked))
         write_instruments_page(stage / "report.html", found, checked)
-        if robot_file:
-            write_text(robot_file, robot_text(calibrated))
+        if robot_file and files.robot:
+            write_text(robot_file, robot_text(calibrated, beside=Path(files.robot)))
         if urdf_file:
             drawn, note = urdf_robot(calibrated, files.sag, seen.q, seen.loads)
             write_text(urdf_file, urdf_text(drawn, note))

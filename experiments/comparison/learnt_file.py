@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import ExitStack
+from pathlib import Path
 from typing import Annotated
 
 import typer
@@ -66,6 +67,6 @@ def robot_writer(
             return
         robot = logs[law][-1].calibrated
         assert robot is not None  # of a law that calibrates
-        write_text(path, robot_text(robot))
+        write_text(path, robot_text(robot, beside=Path(file)))
 
     return write

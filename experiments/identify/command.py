@@ -260,8 +260,8 @@ def identify_command(
             with progress_bar(f"searches from {count(search, 'start')}") as progress:
                 searches = compare_searches(study, search, search_evaluations, seed, where, progress)
         write_identify_page(page, study, searches)
-        if robot_file:
-            write_text(robot_file, robot_text(study.final))
+        if robot_file and write:
+            write_text(robot_file, robot_text(study.final, beside=Path(write)))
         output.write(identify_json(study) | ({"searches": search_json(searches)} if searches else {}))
     _print(human, study)
     if study.verdict is not None:

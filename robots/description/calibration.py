@@ -1,13 +1,16 @@
 """The results of a calibration in a robot file, with their uncertainties."""
 
 from dataclasses import dataclass, field
+from pathlib import Path
 
 import numpy as np
 
+from robots.configuration.nodes import Node
 from robots.configuration.quantity import numbers
 from robots.description.joint_errors import check_names
 
 _JOINTS = 6
+_FILES = (".yaml", ".yml", ".urdf", ".xacro")
 
 
 @dataclass
@@ -20,7 +23,7 @@ class Calibration:
     `robots.description.error_parameters`, and factors of the compliance of gears and bearings.
     """
 
-    of: str = ""  # the robot that was calibrated: what stood in its scenario
+    of: str = ""  # the robot that was calibrated: a shipped one, or a file as it is found from this one
     compliance: list[float] = numbers([0.0] * _JOINTS, (_JOINTS,), unit="rad / (N m)")  # of gravity
     source: str = ""  # the measurement; empty for a nominal robot
     names: list[str] = field(default_factory=list)  # of all parameters that were estimated
@@ -52,3 +55,35 @@ class Calibration:
         if lengths != list(range(1, len(lengths) + 1)):
             return f"calibration: covariance must be a lower triangle, got rows of {lengths} numbers"
         return ""
+
+
+def with_nominal_from(folder: Path, robot: Node) -> Node:
+    """The nodes of a robot file in which ``calibration.of``, where it is a file, is a whole path.
+
+    Args:
+        folder: of the robot file, from where the path begins. In older files it begins where their
+            calibration ran: one that is found only there is taken, too.
+        robot: nodes of the file.
+    """
+    calibration = robot.value.get("calibration") if isinstance(robot.value, dict) else None
+    of = calibration.value.get("of") if calibration and isinstance(calibration.value, dict) else None
+    if of is None or not names_file(of.value):
+        return robot
+    found = next((path for path in (folder / of.value, Path(of.value)) if path.is_file()), None)
+    if found is None:
+        return robot
+    entries = calibration.value | {"of": Node(str(found.resolve()), of.place)}
+    inside = Node(entries, calibration.place, calibration.tag, calibration.aside)
+    return Node(robot.value | {"calibration": inside}, robot.place, robot.tag, robot.aside)
+
+
+def names_file(robot: object) -> bool:
+    """Whether a robot is named by the path of its file, not by the name of a shipped one."""
+    return isinstance(robot, str) and robot.lower().endswith(_FILES)
+
+
+def is_same_robot(one: str, other: str) -> bool:
+    """Whether two names are of one robot: paths may be written in different ways."""
+    if names_file(one) and names_file(other):
+        return Path(one).resolve() == Path(other).resolve()
+    return one == other

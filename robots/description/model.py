@@ -23,7 +23,7 @@ from robots.configuration.quantity import numbers, positive, quantity
 from robots.configuration.suggestion import did_you_mean
 from robots.configuration.typed import typed
 from robots.description.beam import Beam, beam_surrogate
-from robots.description.calibration import Calibration
+from robots.description.calibration import Calibration, with_nominal_from
 from robots.description.counterbalance_spring import CounterbalanceSpring
 from robots.description.drive_train import DriveLimits, DriveTrain, Tilting, drive_trains
 from robots.description.measuring import MeasuringRange
@@ -272,7 +272,7 @@ def _robot_file() -> FileKind:
 def _read(path: Path, label: str) -> Node:
     if is_urdf(path.name):
         return read_urdf(path, label).nodes
-    return with_paths_from(path.parent, read_nodes(path, label))
+    return with_nominal_from(path.parent, with_paths_from(path.parent, read_nodes(path, label)))
 
 
 def _find(name: str, beside: Path) -> tuple[Path, str]:

@@ -4,11 +4,13 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
+import pytest
 from pydrake.multibody.parsing import Parser
 from pydrake.multibody.plant import MultibodyPlant
 
 from robots.calibration.identification import identify
 from robots.calibration.measurements import Measurements
+from robots.description.calibration import is_same_robot
 from robots.description.error_parameters import NUM_PARAMETERS, error_parameters
 from robots.description.model import RobotModel, load_robot
 from robots.description.robot_file import robot_text
@@ -42,6 +44,29 @@ def test_a_calibrated_robot_file_gives_the_same_kinematics(tmp_path: Path):
     assert read.calibration == robot.calibration
     assert len(read.calibration.names) == 54
     assert robot_text(read) == robot_text(robot)
+
+
+@pytest.mark.parametrize("said", ["nominal.yaml", "arms/nominal.yaml"], ids=["beside", "of an older version"])
+def test_the_robot_that_was_calibrated_is_found_from_anywhere_and_moves_with_its_file(
+    said: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+):
+    """A file of an older version names it from where its calibration ran."""
+    monkeypatch.chdir(tmp_path)
+    arms, written = tmp_path / "arms", Path("arms/robot.yaml")
+    arms.mkdir()
+    (arms / "nominal.yaml").write_text("extends: irb1200\n")
+    written.write_text(f"extends: irb1200\ncalibration: {{of: {said}, source: a table}}\n")
+    robot = load_robot(str(written))
+    assert is_same_robot(robot.calibration.of, "arms/../arms/nominal.yaml")
+    assert not is_same_robot(robot.calibration.of, "irb1200")
+    written.write_text(robot_text(robot, beside=written))
+    assert "  of: nominal.yaml\n" in written.read_text()
+    arms.rename(tmp_path / "moved")
+    monkeypatch.chdir(tmp_path / "moved")
+    assert load_robot("robot.yaml").calibration.of == str(tmp_path / "moved/nominal.yaml")
+    for away in (None, tmp_path / "away/robot.yaml"):
+        text = robot_text(load_robot("robot.yaml"), beside=away)
+        assert f"  of: {'../moved' if away else tmp_path / 'moved'}/nominal.yaml\n" in text
 
 
 def test_drake_reads_the_urdf_and_agrees():
