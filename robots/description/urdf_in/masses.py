@@ -15,6 +15,8 @@ from pydrake.math import RotationMatrix
 from robots.description.urdf_in.chain import UrdfText
 
 SHARES = (0.300, 0.252, 0.245, 0.140, 0.042, 0.017, 0.004)  # of base and links 1 to 6
+_MOMENTS = {"ixx": (0, 0), "iyy": (1, 1), "izz": (2, 2), "ixy": (0, 1), "ixz": (0, 2), "iyz": (1, 2)}
+_ROUNDING = 1e-6  # of the largest moment
 _DENSITY = 2500.0  # kg/m^3, of housings with motors and gears inside
 
 
@@ -39,6 +41,39 @@ def assumed_masses(known: Mapping[int, float], total: float) -> dict[int, float]
         )
     of_rest = rest / sum(SHARES[number] for number in missing)
     return {number: of_rest * SHARES[number] for number in missing}
+
+
+def refuse_impossible(text: UrdfText) -> None:
+    """Refuses a link that no body can be: Drake would take one of its own in its place.
+
+    Raises:
+        ConfigurationError: if a mass is negative or not finite, or a principal moment of inertia is negative
+            or larger than the sum of the two others; the message names the link.
+    """
+    for link in text.root.findall("link"):
+        name, mass = link.get("name", ""), _number(link.find("inertial/mass"), "value")
+        if not 0.0 <= mass < math.inf:
+            raise text.refuse(f"link '{name}': its mass must be zero or positive, in kg, got {mass:g}", name)
+        element = link.find("inertial/inertia")
+        inertia = np.zeros((3, 3))
+        for key, (i, j) in _MOMENTS.items():
+            inertia[i, j] = inertia[j, i] = _number(element, key)
+        moments = np.linalg.eigvalsh(inertia) if np.isfinite(inertia).all() else np.full(3, math.nan)
+        least = -_ROUNDING * np.abs(moments).max()
+        if mass > 0.0 and not (moments.min() >= least and moments.sum() - 2.0 * moments.max() >= least):
+            raise text.refuse(
+                f"link '{name}': its principal moments of inertia must not be negative, and none above the "
+                f"sum of the others, got {', '.join(f'{each:g}' for each in moments)} kg m^2",
+                name,
+            )
+
+
+def _number(element: ElementTree.Element | None, key: str) -> float:
+    """A number of an element, zero where there is none; what is no number is left for Drake to say."""
+    try:
+        return float("0" if element is None else element.get(key, "0"))
+    except ValueError:
+        return 0.0
 
 
 def add_inertia(text: UrdfText, link: str, mass: float, stretch: np.ndarray) -> None:
@@ -66,6 +101,5 @@ def add_inertia(text: UrdfText, link: str, mass: float, stretch: np.ndarray) -> 
     xyz = " ".join(repr(float(each)) for each in 0.5 * np.asarray(stretch))
     ElementTree.SubElement(inertial, "origin", xyz=xyz, rpy="0 0 0")
     ElementTree.SubElement(inertial, "mass", value=repr(mass))
-    names = {"ixx": (0, 0), "iyy": (1, 1), "izz": (2, 2), "ixy": (0, 1), "ixz": (0, 2), "iyz": (1, 2)}
-    moments = {name: repr(float(inertia[at])) for name, at in names.items()}
+    moments = {name: repr(float(inertia[at])) for name, at in _MOMENTS.items()}
     ElementTree.SubElement(inertial, "inertia", moments)

@@ -30,7 +30,7 @@ from robots.description.urdf_in.assumed import (
     assumed_tilting,
 )
 from robots.description.urdf_in.chain import NUM_AXES, Chain, UrdfText
-from robots.description.urdf_in.masses import add_inertia, assumed_masses
+from robots.description.urdf_in.masses import add_inertia, assumed_masses, refuse_impossible
 from robots.description.urdf_in.pictures import Pictures
 
 SUFFIXES = (".urdf", ".xacro")
@@ -79,10 +79,11 @@ def read_urdf(
         payload: the largest that it carries in kg; None for what robots of its mass carry.
 
     Raises:
-        ConfigurationError: if it is no such robot, or a link that moves has no mass or inertia, and no mass
-            is given.
+        ConfigurationError: if it is no such robot, a link is no possible body, or one that moves has no mass
+            or inertia, and no mass is given.
     """
     text = UrdfText(path, label)
+    refuse_impossible(text)
     chain = text.chain(base, tip)
     arm = _Arm(text, chain, payload)
     if mass is not None:

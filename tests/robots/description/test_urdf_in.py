@@ -1,5 +1,6 @@
 """Robots from URDF: the same frames and masses as Drake's and as the text's, and what is refused."""
 
+import re
 from dataclasses import replace
 from pathlib import Path
 
@@ -99,7 +100,8 @@ def test_a_robot_file_may_extend_a_urdf_and_hold_one(tmp_path: Path):
 def test_what_a_urdf_cannot_hold_is_assumed_in_proportion_to_the_inertia(tmp_path: Path):
     light, heavy = tmp_path / "light.urdf", tmp_path / "heavy.urdf"
     light.write_text(arm())
-    heavy.write_text(arm().replace('mass value="2"', 'mass value="200"').replace('="0.0', '="2.0'))
+    hundredfold = re.sub(r'(i[xyz]{2})="([-.\d]+)"', lambda m: f'{m[1]}="{100.0 * float(m[2])}"', arm())
+    heavy.write_text(hundredfold.replace('mass value="2"', 'mass value="200"'))
     gears = []
     for path in (light, heavy):
         robot = load_robot(str(path))
@@ -179,6 +181,13 @@ REFUSED = {
     "another format": ("<sdf/>", "a URDF begins with <robot>, got <sdf>"),
     "no range": (arm().replace('lower="-2" upper="2.5"', 'lower="1" upper="1"'), "joint 'j1': has no range"),
     "crossed limits": (arm().replace('lower="-2"', 'lower="3"'), "limit 3 is not below the upper 2.5"),
+    "a negative mass": (
+        arm(more=link("x").replace('"2"', '"-2"') + joint("k", "l2", "x", "fixed")),
+        r"line \d+: link 'x': its mass must be zero or positive, in kg, got -2",
+    ),
+    "no number": (arm().replace('value="2"', 'value="nan"'), "link 'l0': its mass must be zero or pos.* nan"),
+    "no body": (arm().replace('ixx="0.02"', 'ixx="100"'), "link 'l0': its principal .* above the sum"),
+    "a negative moment": (arm().replace('izz="0.04"', 'izz="-0.04"'), "link 'l0': its principal moments"),
 }  # fmt: skip
 
 
