@@ -62,13 +62,14 @@ def calibrate_with_wand(
     Args:
         run: what n cameras saw.
         kit: wand and frame.
-        guess: the lenses of the n cameras as their data sheets say; poses are not looked at.
+        guess: the lenses of the n cameras as their data sheets say; of poses it counts alone whether the
+            cameras are below the frame.
         names: of the cameras, for refusals.
         pixel_sigma: px, expected along u and v.
 
     Raises:
-        UndeterminedError: if cameras or points are too few, do not determine what is asked of them, or show
-            another ratio of wand and frame than the kit has.
+        UndeterminedError: if cameras or points are too few, do not determine what is asked of them, show
+            another ratio of wand and frame than the kit has, or a mirror image of the cell.
     """
     seen = ~np.isnan(run.wand_pixels[..., 0])  # (n, f, 2)
     _refuse_too_little(run, seen, names)
@@ -92,6 +93,7 @@ def calibrate_with_wand(
     _refuse_wrong_scale(cameras, scene)
     everything = ~np.isnan(pixels[..., 0])
     cameras = _once(cameras, scene, everything, with_lens=False)[0].cameras
+    _refuse_mirrored(cameras, guess, kit)
     found, used = _adjusted(cameras, scene, names)
     if found.sigma > _LARGEST_SIGMA:
         raise UndeterminedError(
@@ -129,6 +131,16 @@ def _refuse_wrong_scale(cameras: Cameras, scene: Scene) -> None:
         raise UndeterminedError(
             f"wand: its length is given as {1e3 * scene.wand_length:g} mm, but by the scale of the L-frame "
             f"it is about {1e3 * length:.0f} mm; is the unit right (mm), and is it the wand of this kit?"
+        )
+
+
+def _refuse_mirrored(cameras: Cameras, guess: Cameras, kit: CalibrationKit) -> None:
+    """Refuses cameras below the floor: a flat frame looks the same from there in mirrored images."""
+    height = kit.p_Q[:, 2]
+    is_flat = np.ptp(height) == 0.0
+    if is_flat and (cameras.p_WC[:, 2] < height[0]).all() and (guess.p_WC[:, 2] > height[0]).any():
+        raise UndeterminedError(
+            "frame: all cameras come out below it, as in a mirror image of the cell: are u and v exchanged?"
         )
 
 

@@ -159,6 +159,16 @@ def test_points_of_the_frame_that_are_exchanged_are_refused():
         calibrate_with_wand(run, KIT, GUESS, NAMES)
 
 
+def test_a_mirror_image_of_the_cell_is_refused():
+    """With u and v exchanged it fits as well as the cell itself, whichever way the lenses are said."""
+    run = waved(1, places=100)
+    swapped = replace(run, frame_pixels=run.frame_pixels[..., ::-1], wand_pixels=run.wand_pixels[..., ::-1])
+    guess = replace(GUESS, focal=GUESS.focal[:, ::-1], center=GUESS.center[:, ::-1])
+    for lenses in (GUESS, guess):
+        with pytest.raises(UndeterminedError, match=r"below it, .* mirror image .* are u and v exchanged"):
+            calibrate_with_wand(swapped, KIT, lenses, NAMES)
+
+
 def test_a_data_sheet_that_is_wrong_by_half_does_not_matter():
     found = calibrate_with_wand(waved(1), KIT, replace(GUESS, focal=1.5 * TRUE.focal), NAMES)
     np.testing.assert_allclose(lens(found.cameras), lens(calibrated(1).cameras), rtol=1e-4, atol=1e-4)
