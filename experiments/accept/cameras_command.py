@@ -69,6 +69,7 @@ def accept_cameras_command(
     human = human_console(json_file)
     with json_output(json_file) as output, refusing(ValueError, OSError), ExitStack() as stack:
         at_least("--count", LEAST_LENGTHS, count)
+        at_least("--seed", 0, seed)
         for name, value in (("--limit", limit), ("--cube", cube_mm), ("--pixel-sigma", pixel_sigma)):
             positive(name, value)
         probing = None

@@ -154,6 +154,7 @@ def calibrate_command(
     note = ""
     with json_output(json_file) as output, refusing(ValueError, OSError), ExitStack() as stack:
         wanted.check()
+        wanted.check_settings(settings or [])
         prepared = prepare(scenario, settings or [], robot, needs_path=not wanted.is_given)
         if compliance is None and not wanted.is_given:
             wanted = replace(wanted, compliance=prepared.scenario.station.elasticity == "structure")
@@ -235,13 +236,22 @@ class _Wanted:
             for option, value in (("--count", self.count), ("--criterion", self.criterion)):
                 if value is not None:
                     raise ValueError(
-                        f"{option} is for simulated measurements; with "
-                        f"{'--measurements' if self.measurements else '--recording'} it has no effect"
+                        f"{option} is for simulated measurements; with {self._source} it has no effect"
                     )
         one_of("--criterion", NAMES, self.criterion)
         at_least("--count", 5, self.count)
         noise_option(self.noise, has_rotation=False)  # what was measured is not known yet
         names_of(self.joint_errors)
+
+    def check_settings(self, settings: list[str]) -> None:
+        """Raises ValueError if a setting has no effect: what was measured depends on no scenario."""
+        for setting in settings if self.is_given else []:
+            if setting.partition("=")[0].strip() != "robot":
+                raise ValueError(f"--set {setting} has no effect with {self._source}; --set robot=... has")
+
+    @property
+    def _source(self) -> str:
+        return "--measurements" if self.measurements else "--recording"
 
     def check_instruments(self) -> None:
         """Raises ValueError if an option has no effect on tables of targets and instruments."""

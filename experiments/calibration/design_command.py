@@ -15,7 +15,7 @@ from rich.markup import escape
 from experiments.calibration.design_program import ProgramFiles
 from experiments.cli.console import print_files, progress_bar, refusing
 from experiments.cli.json_output import human_console, json_output
-from experiments.cli.option_limits import one_of
+from experiments.cli.option_limits import at_least, one_of
 from experiments.cli.options import JsonOption, PictureOption
 from experiments.cli.prepare import noted_robot
 from experiments.cli.staging import PAGE, TABLE, staged_file
@@ -106,6 +106,7 @@ def design_command(
     human = human_console(json_file)
     with json_output(json_file) as output, refusing(ValueError, OSError), ExitStack() as stack:
         one_of("--criterion", NAMES, criterion)
+        at_least("--seed", 0, seed)
         run = ProgramFiles(program, out, settle, trigger)
         page = stack.enter_context(staged_file(report, *PAGE))
         run_stage = run.staged(stack)
@@ -201,8 +202,12 @@ def _ranges(robot: RobotModel, texts: list[str]) -> tuple[AxisRange, ...]:
             raise ValueError(f"--range must be like 2=-45:90 with a joint from 1 to 6, got '{text}'")
         joint = int(found[1]) - 1
         low, high = float(found[2]), float(found[3])
+        if not low < high:
+            raise ValueError(
+                f"--range of joint {joint + 1}: its first end must be below the second, got '{text}'"
+            )
         limits = np.rad2deg([robot.lower[joint], robot.upper[joint]])
-        if not (limits[0] - _ROUNDING <= low < high <= limits[1] + _ROUNDING):
+        if not (limits[0] - _ROUNDING <= low and high <= limits[1] + _ROUNDING):
             raise ValueError(
                 f"--range of joint {joint + 1} must be within {limits[0]:g} to {limits[1]:g} deg, "
                 f"got '{text}'"

@@ -1,26 +1,33 @@
 """``--noise``: what is known of the noise of the rows, and what a simulation adds to them."""
 
 import math
+from dataclasses import dataclass
 from pathlib import Path
 
-import yaml
-
 from robots.calibration.measurements import SOURCE_NOISE, MeasurementNoise
+from robots.configuration.nodes import read_nodes
+from robots.configuration.quantity import positive, quantity
+from robots.configuration.typed import typed
 
 ESTIMATE = "estimate"
 _NAMED = {ESTIMATE: MeasurementNoise(), "source": SOURCE_NOISE}
-_ROTATION = "rotation_deg"
-_KEYS = ("joint_deg", "position_mm", _ROTATION)
+
+
+@dataclass
+class NoiseFile:
+    """Standard deviations, field for field as in the file."""
+
+    joint_deg: float | None = quantity(None, 0.0, unit="deg")
+    position_mm: float | None = positive(None, unit="mm")
+    rotation_deg: float | None = positive(None, unit="deg")  # where orientations are measured
 
 
 def noise_option(text: str, has_rotation: bool) -> MeasurementNoise:
     """The noise that is known; none where it is to be estimated.
 
     Args:
-        text: ``estimate``, ``source`` for that of Probst (2024), table 6.1, or the path of a YAML file with
-            the standard deviations ``joint_deg``, ``position_mm`` and, where orientations are measured,
-            ``rotation_deg``.
-        has_rotation: whether they are.
+        text: ``estimate``, ``source`` for that of Probst (2024), table 6.1, or the path of a `NoiseFile`.
+        has_rotation: whether orientations are measured.
 
     Raises:
         ValueError: if it is none of these, or the file does not hold these numbers, or no sensible ones.
@@ -30,21 +37,13 @@ def noise_option(text: str, has_rotation: bool) -> MeasurementNoise:
     path = Path(text)
     if not path.is_file():
         raise ValueError(f"--noise must be estimate, source or the path of a YAML file, got '{text}'")
-    try:
-        found = yaml.safe_load(path.read_text(encoding="utf-8"))
-    except (OSError, UnicodeDecodeError, yaml.YAMLError) as error:
-        raise ValueError(f"--noise {text}: cannot be read: {' '.join(str(error).split())}") from error
-    if not isinstance(found, dict) or {_ROTATION, *found} != set(_KEYS):
-        there = ", ".join(map(str, found)) if isinstance(found, dict) else "something else"
-        raise ValueError(f"--noise {text}: must have exactly {', '.join(_KEYS)}, there is {there}")
-    if has_rotation and _ROTATION not in found:
+    found = typed(read_nodes(path, f"--noise {text}"), NoiseFile)
+    if found.joint_deg is None or found.position_mm is None:
+        missing = "joint_deg" if found.joint_deg is None else "position_mm"
+        raise ValueError(f"--noise {text}: needs {missing}")
+    if has_rotation and found.rotation_deg is None:
         raise ValueError(
-            f"--noise {text}: needs {_ROTATION}, as orientations are measured; or give --position-only"
+            f"--noise {text}: needs rotation_deg, as orientations are measured; or give --position-only"
         )
-    for key, value in found.items():
-        is_number = isinstance(value, (int, float)) and not isinstance(value, bool) and math.isfinite(value)
-        if not is_number or value < 0.0 or (value == 0.0 and key != "joint_deg"):
-            least = "not be negative" if key == "joint_deg" else "be positive"
-            raise ValueError(f"--noise {text}: {key} must {least}, got {value}")
-    joint, position, rotation = (float(found.get(key, 0.0)) for key in _KEYS)
-    return MeasurementNoise(math.radians(joint), 1e-3 * position, math.radians(rotation))
+    rotation = math.radians(found.rotation_deg or 0.0)
+    return MeasurementNoise(math.radians(found.joint_deg), 1e-3 * found.position_mm, rotation)

@@ -14,7 +14,7 @@ from experiments.cameras.body_page import MovedBody, covariance, root_mean, writ
 from experiments.cameras.study import study_setup
 from experiments.cli.console import print_files, progress_bar, refusing
 from experiments.cli.json_output import human_console, json_output
-from experiments.cli.option_limits import at_least
+from experiments.cli.option_limits import at_least, not_negative
 from experiments.cli.options import JsonOption, PictureOption, ScenarioOption, SetOption
 from experiments.cli.prepare import prepare
 from experiments.cli.staging import PAGE, YAML, staged_file
@@ -45,6 +45,8 @@ def body_command(
     human = human_console(json_file)
     with json_output(json_file) as output, refusing(ValueError, OSError), ExitStack() as stack:
         at_least("--steps", 1, steps)
+        not_negative("--apart-mm", apart)
+        not_negative("--differ-mm", differ)
         prepared = prepare(scenario, [*(settings or []), "station.camera=images"])
         page = stack.enter_context(staged_file(report, *PAGE))
         file = stack.enter_context(staged_file(write, *YAML)) if write else None

@@ -25,7 +25,7 @@ from experiments.cli.cluster import executor
 from experiments.cli.command_app import command_app
 from experiments.cli.console import print_files, progress_bar, refusing
 from experiments.cli.json_output import human_console, json_output
-from experiments.cli.option_limits import at_least, positive
+from experiments.cli.option_limits import at_least, positive, without_effect
 from experiments.cli.options import (
     JobsOption,
     JsonOption,
@@ -67,15 +67,21 @@ def calibrate_cameras_command(
         float, typer.Option("--wand-length", metavar="MM", help="Length of the wand between its two spheres.")
     ] = CalibrationKit.wand_length_mm,
     places: Annotated[
-        int, typer.Option(metavar="N", help="Number of simulated wand poses.")
-    ] = SimulatedWandRun.places,
+        int | None,
+        typer.Option(
+            metavar="N", help="Number of simulated wand poses.", show_default=str(SimulatedWandRun.places)
+        ),
+    ] = None,
     pixel_sigma: Annotated[
         float,
         typer.Option(
             "--pixel-sigma", metavar="PX", help="Expected standard deviation of an image coordinate."
         ),
     ] = SimulatedWandRun.pixel_sigma,
-    seed: Annotated[int, typer.Option(metavar="N", help="Seed of the simulated noise and motion.")] = 0,
+    seed: Annotated[
+        int | None,
+        typer.Option(metavar="N", help="Seed of the simulated noise and motion.", show_default="0"),
+    ] = None,
     write_recording: Annotated[
         str | None,
         typer.Option(
@@ -93,6 +99,10 @@ def calibrate_cameras_command(
     with json_output(json_file) as output, refusing(ValueError, OSError), ExitStack() as stack:
         positive("--wand-length", wand_length)
         positive("--pixel-sigma", pixel_sigma)
+        at_least("--seed", 0, seed)
+        if recording != SIMULATED:
+            without_effect("--places", places, "--recording: nothing is simulated")
+            without_effect("--seed", seed, "--recording: nothing is simulated")
         nominal, kit = load_cell(cell), CalibrationKit(wand_length_mm=wand_length)
         names = [camera.name for camera in nominal.cameras]
         page = stack.enter_context(staged_file(out, *PAGE))
@@ -103,7 +113,10 @@ def calibrate_cameras_command(
         start, truth = nominal.camera_model(nominal.base.pose()), None
         if recording == SIMULATED:
             truth = start
-            run = _simulated(nominal, kit, truth, SimulatedWandRun(places, pixel_sigma=pixel_sigma), seed)
+            waved = SimulatedWandRun(
+                SimulatedWandRun.places if places is None else places, pixel_sigma=pixel_sigma
+            )
+            run = _simulated(nominal, kit, truth, waved, seed or 0)
             start = replace(start, radial=0.0 * start.radial, tangential=0.0 * start.tangential)
         else:
             run = read_observations(recording, names, len(kit.p_Q))

@@ -28,6 +28,26 @@ def at_least(option: str, least: int, given: int | None) -> None:
         raise ValueError(f"{option} must be at least {least}, got {given}")
 
 
+def not_negative(option: str, given: float) -> None:
+    """Refuses a number that is negative or not finite.
+
+    Raises:
+        ValueError: if it is negative, infinite or NaN.
+    """
+    if not 0.0 <= given < math.inf:
+        raise ValueError(f"{option} must be zero or positive, got {given:g}")
+
+
+def without_effect(option: str, given: object, beside: str) -> None:
+    """Refuses an option that is of no use beside another one; None was not given.
+
+    Raises:
+        ValueError: if it was given.
+    """
+    if given is not None:
+        raise ValueError(f"{option} has no effect with {beside}")
+
+
 def positive(option: str, given: float | None) -> None:
     """Refuses a number that is not positive and finite; None is an option that was not given.
 

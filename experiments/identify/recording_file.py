@@ -60,6 +60,8 @@ def read_recording(path: Path, columns: Path | None = None, needs_sensors: bool 
     check_map(plan, node, needs_sensors)
     table = read_columns(path)
     time = table.numbers([plan.time])[:, 0]
+    if not len(time):
+        raise RecordingError(f"{path}: no row but the header")
     names = table.texts(plan.case) if plan.case else ["1"] * len(time)
     stamps = table.numbers([plan.stamp])[:, 0] if plan.stamp else time
     theta = plan.angle_factor * table.numbers(plan.position)

@@ -62,7 +62,7 @@ def test_a_robot_without_analytic_inverse_is_calibrated_from_a_tracker(
         (["--urdf-payload", "3"], "--urdf-payload needs --urdf"),
         (["--urdf", "x.urdf", "--urdf-payload", "3"], "--urdf-payload needs --compliance"),
         (["--noise", "none"], "--noise must be estimate, source or the path of a YAML file, got 'none'"),
-        (["--noise", "noise.yaml"], "--noise noise.yaml: position_mm must be positive, got 0"),
+        (["--noise", "noise.yaml"], "--noise noise.yaml, line 1: position_mm must be positive, in mm, got 0"),
         (["--noise", "place.yaml"], "--noise place.yaml: needs rotation_deg, as orientations are measured"),
         (["--validation", "empty.csv"], "measurements empty.csv: no row but the header"),
         (["--validation", "heavy.csv"], "no usable row; payload_kg must not be negative, got -1"),
