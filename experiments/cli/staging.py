@@ -31,9 +31,7 @@ def staged_folder(folder: str | Path, *names: str) -> Iterator[Path]:
             says which and why.
     """
     folder = Path(folder)
-    for name in names:
-        if others := naming(folder / name):
-            raise OSError(f"{' and '.join(others)} {folder / name}: the results in {folder} would replace it")
+    refuse_replaced(folder, *names)
     try:
         place = _nearest_existing(folder)
         stage = Path(tempfile.mkdtemp(prefix=".truetip-", dir=place))
@@ -77,6 +75,13 @@ def check_suffix(path: str | Path, suffixes: Sequence[str]) -> None:
     """Raises OSError, one line, if there are suffixes and the name of a file ends in none of them."""
     if suffixes and Path(path).suffix.lower() not in suffixes:
         raise OSError(f"cannot write the file {path}: its name must end in {' or '.join(suffixes)}")
+
+
+def refuse_replaced(folder: Path, *names: str) -> None:
+    """Raises OSError if an option of the running command names a file that results in a folder would replace."""
+    for name in names:
+        if others := naming(folder / name):
+            raise OSError(f"{' and '.join(others)} {folder / name}: the results in {folder} would replace it")
 
 
 def keep_files(stage: Path, folder: Path) -> None:

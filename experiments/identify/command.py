@@ -22,7 +22,7 @@ from experiments.cli.options import (
     StudiedRobotOption,
 )
 from experiments.cli.prepare import noted_robot
-from experiments.cli.staging import PAGE, TABLE, YAML, staged_file
+from experiments.cli.staging import PAGE, TABLE, YAML, refuse_replaced, staged_file
 from experiments.cli.workers import Executor
 from experiments.feedforward.command import realistic_robot
 from experiments.identify.advice.report import ADVICE_HEAD, advice_rows
@@ -45,6 +45,7 @@ from experiments.identify.judge.report import SUMMARY_HEAD, judge_summary
 from experiments.identify.plots import table_head, table_rows, verdict, write_identify_page
 from experiments.identify.recording_file import RECORDINGS, read_recording, write_recording
 from experiments.identify.recording_map import Recording
+from experiments.identify.recording_mcap import MCAP
 from experiments.identify.search import (
     LEAST_EVALUATIONS,
     SEARCH_HEAD,
@@ -225,6 +226,8 @@ def identify_command(
         page = stack.enter_context(staged_file(report, *PAGE))
         robot_file = stack.enter_context(staged_file(write, *YAML)) if write else None
         table = stack.enter_context(staged_file(write_table, *RECORDINGS)) if write_table else None
+        if write_table and write_table.suffix.lower() != MCAP:  # a table has a map of its columns beside it
+            refuse_replaced(write_table.parent, f"{write_table.stem}.yaml")
         stack.enter_context(output.staged())
         if recording is not None:
             recorded = read_recording(recording, columns)

@@ -85,6 +85,10 @@ def test_a_place_where_nothing_can_be_written_is_refused_before_the_work(tmp_pat
             "plan --path plan.mod --program rapid --report page.html",
             "--path plan.mod: the results in . would",
         ),
+        (
+            "identify --write-recording seen.csv --write seen.yaml",
+            "--write seen.yaml: the results in . would",
+        ),
         ("robots import r.yaml --write r.yaml", "FILE.urdf and --write name the same file"),
     ],
 )
