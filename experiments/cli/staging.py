@@ -78,7 +78,7 @@ def check_suffix(path: str | Path, suffixes: Sequence[str]) -> None:
 
 
 def refuse_replaced(folder: Path, *names: str) -> None:
-    """Raises OSError if an option of the running command names a file that results in a folder would replace."""
+    """Raises OSError if an option of the running command names a file that results would replace."""
     for name in names:
         if others := naming(folder / name):
             raise OSError(f"{' and '.join(others)} {folder / name}: the results in {folder} would replace it")

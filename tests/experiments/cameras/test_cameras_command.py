@@ -40,8 +40,8 @@ def test_a_simulated_calibration_finds_the_cell_it_came_from(tmp_path: Path):
 @pytest.mark.slow
 def test_a_calibration_from_a_file_is_the_one_that_wrote_it(tmp_path: Path):
     table = tmp_path / "seen.csv"
-    arguments = ("calibrate", "--places=200", f"--report={tmp_path / 'c.html'}", "--json=-")
-    simulated = run(*arguments, f"--write-recording={table}")
+    arguments = ("calibrate", f"--report={tmp_path / 'c.html'}", "--json=-")
+    simulated = run(*arguments, "--places=200", f"--write-recording={table}")
     read = run(*arguments, f"--recording={table}")
     assert read.exit_code == 0, read.output
     one, other = json.loads(simulated.stdout), json.loads(read.stdout)
