@@ -66,7 +66,9 @@ def with_nominal_from(folder: Path, robot: Node) -> Node:
         robot: nodes of the file.
     """
     calibration = robot.value.get("calibration") if isinstance(robot.value, dict) else None
-    of = calibration.value.get("of") if calibration and isinstance(calibration.value, dict) else None
+    if calibration is None or not isinstance(calibration.value, dict):
+        return robot
+    of = calibration.value.get("of")
     if of is None or not names_file(of.value):
         return robot
     found = next((path for path in (folder / of.value, Path(of.value)) if path.is_file()), None)
