@@ -18,7 +18,7 @@ from robots.calibration.measurements import MeasurementNoise, Measurements
 from robots.calibration.prior import CENTRE_OF_MASS, MASS, not_to_be_believed, parameter_sizes
 from robots.calibration.reduction import ReducibleModel
 from robots.calibration.solver.levenberg_marquardt import Fit, minimise
-from robots.calibration.solver.noise_model import FLOOR, JOINT, POSITION, ROTATION, NoiseModel, row_shape
+from robots.calibration.solver.noise_model import FLOOR, JOINT, POSITION, ROTATION, NoiseModel, row_sigmas
 from robots.calibration.solver.problem import Problem
 from robots.calibration.solver.robust import CleanRows, lacks_something, least_distances
 from robots.calibration.solver.variance_components import (
@@ -153,15 +153,15 @@ class _Search:
     ) -> None:
         self._problem, self._config = problem, config
         self._yielding = yielding  # the same with compliances, where they can be told
-        self._shape, named = row_shape(problem.measurements)
-        given = config.noise
-        self._known = named | given.is_known
+        rows, given = row_sigmas(problem.measurements), config.noise
+        self._shape = rows.shape
+        self._known = rows.named | given.is_known
         self._theta = np.array([given.joint_sigma, given.position_sigma, given.rotation_sigma]) ** 2
         if not given.is_known:
-            self._theta = np.where(named, 1.0, [0.0, 1e-7, 1e-7])
+            self._theta = np.array([0.0, 1e-7, 1e-7])
         else:
             self._theta[[POSITION, ROTATION]] = np.maximum(self._theta[[POSITION, ROTATION]], FLOOR**2)
-            self._theta = np.where(named, 1.0, self._theta)
+        self._theta = np.where(rows.named, rows.theta, self._theta)
         self._has_rotation = problem.width == 6
         needed = [POSITION, ROTATION] if self._has_rotation else [POSITION]
         self._is_known = bool(self._known[needed].all())

@@ -4,7 +4,7 @@ import numpy as np
 
 from robots.calibration.error_model import ZEROS
 from robots.calibration.identified import Identified
-from robots.calibration.solver.noise_model import FLOOR, NoiseModel, row_shape
+from robots.calibration.solver.noise_model import FLOOR, NoiseModel, row_sigmas
 
 
 def standardised(found: Identified) -> np.ndarray:
@@ -17,8 +17,7 @@ def standardised(found: Identified) -> np.ndarray:
     noise = found.noise
     sigmas = np.array([noise.joint_sigma, noise.position_sigma, noise.rotation_sigma])
     sigmas[1:] = np.maximum(sigmas[1:], FLOOR)
-    shape, _ = row_shape(found.measurements)
-    W = NoiseModel(sigmas**2, shape).whitening(J)
+    W = NoiseModel(sigmas**2, row_sigmas(found.measurements).shape).whitening(J)
     return np.einsum("nij,nj->ni", W, found.residuals)
 
 

@@ -8,6 +8,7 @@ from scipy.special import chdtri
 from robots.calibration.error_model import ZEROS
 from robots.calibration.identified import Identified
 from robots.calibration.measurements import Measurements
+from robots.calibration.solver.noise_model import NoiseModel, row_sigmas
 from robots.description.model import RobotModel
 from robots.dynamics.compliant_kinematics import controller_kinematics
 from robots.pose import pose_error
@@ -66,16 +67,18 @@ def statistics(errors: np.ndarray) -> ErrorStatistics:
 def plausible_rows(identified: Identified, measurements: Measurements) -> np.ndarray:
     """The rows of a fresh table that a calibration predicts as well as it predicts the others, (n,) bool.
 
-    What is predicted is compared with what was measured in units of the noise that the calibration knows or
-    has found, and of the median over the table, which gross errors do not move.
+    What is predicted is compared with what was measured in units of the noise that the fresh table says, or
+    else the calibration knows or has found, and of the median over the table, which gross errors do not move.
     """
     errors = prediction_errors(identified.calibrated_robot(), measurements)
     _, Theta = identified.model.forward_and_regressor(measurements.q, identified.x)
-    width, noise = errors.shape[1], identified.noise
-    J = Theta[:, 6 - width :, ZEROS]
-    variances = np.repeat([noise.rotation_sigma**2, noise.position_sigma**2], 3)[6 - width :]
-    V = noise.joint_sigma**2 * J @ np.swapaxes(J, 1, 2) + np.diag(np.maximum(variances, _ROUNDING**2))
-    return explained_by_noise(np.sum(errors * np.linalg.solve(V, errors[..., None])[..., 0], axis=1), width)
+    J = Theta[:, 6 - errors.shape[1] :, ZEROS]
+    noise, rows = identified.noise, row_sigmas(measurements)
+    theta = np.array([noise.joint_sigma, noise.position_sigma, noise.rotation_sigma]) ** 2
+    theta = np.maximum(np.where(rows.named, rows.theta, theta), [0.0, _ROUNDING**2, _ROUNDING**2])
+    W = NoiseModel(theta, rows.shape).whitening(J)
+    squared = np.sum(np.einsum("nij,nj->ni", W, errors) ** 2, axis=1)
+    return explained_by_noise(squared, errors.shape[1])
 
 
 def explained_by_noise(squared: np.ndarray, numbers: np.ndarray | int) -> np.ndarray:

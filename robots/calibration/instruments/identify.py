@@ -157,21 +157,28 @@ def _anchor(p: np.ndarray, distance: np.ndarray) -> np.ndarray:
     return np.linalg.lstsq(A, squares - squares.mean(), rcond=None)[0]
 
 
+def _said(seen: Observations, instrument: int, known: float | None) -> tuple[float, bool]:
+    """How noisy an instrument is in m, and whether that is all there is to know of it.
+
+    Its lines say it (then it is the root of their mean square), or the cell does, ``known``. Where only some
+    lines say it, the others are as noisy as these to begin with.
+    """
+    sigmas = seen.sigma[seen.instrument == instrument]
+    says = np.isfinite(sigmas)
+    if known is not None and not says.all():
+        return known, True
+    return (float(np.sqrt(np.mean(sigmas[says] ** 2))) if says.any() else _FIRST_SIGMA), bool(says.all())
+
+
 class _Adjustment:
     """From a problem to its solution."""
 
     def __init__(self, problem: InstrumentProblem, cell: MeasuringCell) -> None:
         self._problem, self._everything, self._iterations = problem, problem.active, 0
         seen = problem.observations
-        said = [
-            bool(np.isfinite(seen.sigma[seen.instrument == i]).all()) for i in range(len(seen.instruments))
-        ]
-        given = [
-            1.0 if known else cell.sigmas.get(name)
-            for name, known in zip(seen.instruments, said, strict=True)
-        ]
-        self._estimated = [1 + i for i, sigma in enumerate(given) if sigma is None]
-        self._theta = np.array([cell.joint_sigma or 0.0, *(s if s else _FIRST_SIGMA for s in given)]) ** 2
+        given = [_said(seen, i, cell.sigmas.get(name)) for i, name in enumerate(seen.instruments)]
+        self._estimated = [1 + i for i, (_, is_known) in enumerate(given) if not is_known]
+        self._theta = np.array([cell.joint_sigma or 0.0, *(sigma for sigma, _ in given)]) ** 2
         redundancy = int(self._everything.sum()) - len(problem.columns)
         if cell.joint_sigma is None and self._estimated and redundancy >= _ENOUGH_FOR_JOINTS:
             self._estimated.insert(0, JOINT)

@@ -53,11 +53,11 @@ def instrument_noise(problem: InstrumentProblem, theta: np.ndarray, active: np.n
 
     Args:
         problem: with the lines.
-        theta: variances to begin with.
+        theta: variances to begin with; what lines say of themselves is relative to it.
         active: which numbers are compared, (m, 3) bool.
     """
     seen = problem.observations
-    known = np.where(np.isfinite(seen.sigma), np.maximum(seen.sigma, FLOOR) ** 2, 1.0)
-    shape = problem.spread(np.where(active, known[:, None], 1.0))
+    differs = np.maximum(seen.sigma, FLOOR) ** 2 / theta[1 + seen.instrument]
+    shape = problem.spread(np.where(active & np.isfinite(differs)[:, None], differs[:, None], 1.0))
     which = problem.spread(np.where(active, seen.instrument[:, None] + 1.0, 0.0)).astype(int) - 1
     return InstrumentNoise(theta, np.where(which < 0, 1.0, shape), which)

@@ -1,8 +1,8 @@
 """How the noise of an instrument reaches the rows of a table.
 
 V_n = theta_q s_q^2 J_n J_n^T + theta_p s_p^2 I_p + theta_r s_r^2 I_r: noise of the joint sensors reaches the
-tool through the Jacobian, that of the instrument adds to position and rotation. The s are one, or what the
-table says of each row; the theta are variances, known or to be found.
+tool through the Jacobian, that of the instrument adds to position and rotation. The s are one, or how the
+table says that rows differ, with a mean square of one; the theta are variances, known or to be found.
 """
 
 from dataclasses import dataclass, replace
@@ -94,10 +94,21 @@ class NoiseModel:
         return MeasurementNoise(*np.sqrt(self.theta).tolist())
 
 
-def row_shape(measurements: Measurements) -> tuple[np.ndarray, np.ndarray]:
-    """What a table says of its rows: variances (n, 3), one where it says nothing; which it names, (3,)."""
+@dataclass(frozen=True)
+class RowSigmas:
+    """What a table says of the noise of its n rows, component by component."""
+
+    shape: np.ndarray  # (n, 3) variances by their mean; one where it says nothing
+    theta: np.ndarray  # (3,) means of the variances in rad^2, m^2, rad^2; one where it says nothing
+    named: np.ndarray  # (3,) bool, which it says
+
+
+def row_sigmas(measurements: Measurements) -> RowSigmas:
+    """Divides what a table says of its rows into how noisy they are in the mean and how they differ."""
     sigmas = measurements.sigmas
     if not len(sigmas):
-        return np.ones((len(measurements), 3)), np.zeros(3, dtype=bool)
+        return RowSigmas(np.ones((len(measurements), 3)), np.ones(3), np.zeros(3, dtype=bool))
     named = np.asarray(np.all(np.isfinite(sigmas), axis=0))
-    return np.where(named, np.maximum(np.nan_to_num(sigmas), FLOOR) ** 2, 1.0), named
+    variances = np.where(named, np.maximum(np.nan_to_num(sigmas), FLOOR) ** 2, 1.0)
+    theta = variances.mean(axis=0)
+    return RowSigmas(variances / theta, theta, named)

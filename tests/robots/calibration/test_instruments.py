@@ -220,3 +220,17 @@ def test_a_cell_that_cannot_be_used_is_refused_with_file_and_line(text: str, ref
     (tmp_path / "bad.yaml").write_text(text)
     with pytest.raises(ValueError, match=rf"bad\.yaml, {refusal}"):
         read_cell(tmp_path / "bad.yaml")
+
+
+def test_noise_that_lines_say_is_shown_as_they_say_it():
+    """A tracker says it of all lines, a camera of none, a bar of half: as it says, found, and found."""
+    _, seen = observed(noise=5e-5)
+    sizes = 5e-5 * np.array([FACTORS[name] for name in seen.instruments])[seen.instrument]
+    numbers, names = np.arange(len(seen)), np.array(seen.instruments)[seen.instrument]
+    says = (names == "tracker") | ((names == "bar") & (numbers % 4 < 2))
+    seen = replace(seen, sigma=np.where(says, sizes, np.nan))
+    found = identify_with_instruments(load_robot("irb1200"), seen)
+    shown = dict(zip(seen.instruments, found.noise[1:].tolist(), strict=True))
+    assert shown["tracker"] == pytest.approx(5e-5, rel=1e-12)
+    assert shown["camera"] == pytest.approx(25e-5, rel=0.3)
+    assert shown["bar"] == pytest.approx(5e-6, rel=0.6)

@@ -10,6 +10,7 @@ from robots.calibration.identification import IdentificationConfig, identify
 from robots.calibration.identified import Identified
 from robots.calibration.measurements import SOURCE_NOISE, MeasurementNoise, Measurements
 from robots.calibration.reduction import ReducibleModel
+from robots.calibration.validation import plausible_rows
 from robots.description.model import load_robot
 from robots.kinematics.forward import Kinematics
 from tests.robots.calibration.matrix_robot import MatrixRobot
@@ -118,3 +119,18 @@ def test_a_radian_is_not_weighed_as_a_metre():
         with_rotation.append(error(identify(NOMINAL, table), true))
         alone.append(error(identify(NOMINAL, table.without_rotation()), true))
     assert np.mean(with_rotation) <= 1.05 * np.mean(alone)
+
+
+def test_noise_that_rows_say_is_shown_as_they_say_it_and_judges_fresh_rows():
+    """The root of the mean square of a table's own sigmas; a row 20 mm off stands out of them."""
+    table, _ = table_of(0)
+    sigmas = np.outer(np.where(np.arange(75) < 38, 1.0, 2.0), [*vars(SOURCE_NOISE).values()])
+    result = identify(NOMINAL, replace(table, sigmas=sigmas))
+    shown = [*vars(result.noise).values()]
+    np.testing.assert_allclose(shown, np.sqrt(np.mean(sigmas**2, axis=0)), rtol=1e-12)
+    fresh, _ = table_of(0, MeasurementNoise())
+    position = fresh.position.copy()
+    position[3] += 0.02
+    for says in (sigmas, np.zeros((0, 3))):  # the fresh table may say it, too
+        plausible = plausible_rows(result, replace(fresh, position=position, sigmas=says))
+        assert np.flatnonzero(~plausible).tolist() == [3]
