@@ -30,6 +30,17 @@ class TextTable:
         """File and line of a row."""
         return f"{self.name}, line {self.lines[row]}"
 
+    def refuse_longer_rows(self) -> None:
+        """Raises TextTableError if a row has more fields than the head: which of them belong where?
+
+        Decimal commas in a table with commas between its fields do that. Empty fields at the end, as
+        spreadsheets leave them, mean nothing.
+        """
+        width = len(self.rows[0])
+        for row, fields in enumerate(self.rows):
+            if any(fields[width:]):
+                raise TextTableError(f"{self.where(row)}: {len(fields)} fields, but the head has {width}")
+
 
 def read_text(path: str | Path) -> str:
     """The text of a file in UTF-8, with or without byte order mark.

@@ -46,8 +46,8 @@ def read_measurements(path: str | Path) -> tuple[Measurements, list[RowProblem]]
     """Reads a table. Rows that cannot be used are left out and named.
 
     Raises:
-        MeasurementFileError: if the file cannot be read, lacks a column, has a number that only another unit
-            explains, or has no usable row.
+        MeasurementFileError: if the file cannot be read, lacks a column, has a row with more fields than the
+            head or a number that only another unit explains, or has no usable row.
     """
     try:
         return parse_measurements(read_text(path), str(path))
@@ -59,6 +59,7 @@ def parse_measurements(text: str, name: str = "table") -> tuple[Measurements, li
     """Reads a table from its text, as `read_measurements`; ``name`` is where it came from."""
     try:
         table = parse_fields(text, name, has_head=True)
+        table.refuse_longer_rows()
     except TextTableError as error:
         raise MeasurementFileError(f"measurements {error}") from error
     try:

@@ -34,10 +34,12 @@ def read_observations(path: str | Path) -> tuple[Observations, list[RowProblem]]
     """Reads a table; lines that cannot be used are left out and named.
 
     Raises:
-        MeasurementFileError: if it cannot be read, lacks a column, or has no usable line.
+        MeasurementFileError: if it cannot be read, lacks a column, has a line with more fields than the head,
+            or no usable line.
     """
     try:
         table = parse_fields(read_text(path), str(path), has_head=True)
+        table.refuse_longer_rows()
     except TextTableError as error:
         raise MeasurementFileError(f"measurements {error}") from error
     columns = _Columns(table)

@@ -65,6 +65,7 @@ time_s;q1_deg;q2_deg;q3_deg;q4_deg;q5_deg;q6_deg;x_mm;y_mm;z_mm;alpha_deg;beta_d
         (f"{JOINTS},x_m,y_m,z_m\n0,45,0,0,0,0,0.5,0,0.5", r"line 2: q2_rad is 45, .* seems to hold degrees"),
         (f"{JOINTS},x_m,y_m,z_m\n0,0,0,0,0,0,500,0,0.5", r"line 2: x_m is 500, .* seems to hold millimetres"),
         (f"{JOINTS},x_m,y_m,z_m,x_m\n", "column x_m is there twice"),
+        (f"{JOINTS},x_m,y_m,z_m\n0,0,0,0,0,0,0,5,0,0,5", "line 2: 11 fields, but the head has 9"),
     ],
 )
 def test_a_table_that_cannot_be_used_is_refused(text: str, message: str):
