@@ -372,7 +372,8 @@ class _Search:
 
     def _refuse_the_implausible(self, residuals: np.ndarray, u: np.ndarray) -> None:
         model, x = self._problem.model, self._problem.parameters(u)
-        why = not_to_be_believed(model.names, x[: len(model)], np.linalg.norm(residuals[:, -3:], axis=1))
+        distances, angles = (np.linalg.norm(e, axis=1) for e in (residuals[:, -3:], residuals[:, :-3]))
+        why = not_to_be_believed(model.names, x[: len(model)], distances, angles)
         if why:
             raise IdentificationError(
                 f"no geometry near that of {model.robot.name} explains the measurements: {why}"

@@ -21,7 +21,12 @@ COMPLIANCES = 3.0  # times what the stiffness in the robot file says
 MASS = 0.05  # of the masses in a robot file and of a payload, relative
 CENTRE_OF_MASS = 10e-3  # m, of each coordinate
 _PLAUSIBLE = 0.03  # m: with half the rows farther off the table belongs to something else
+_TURNED = float(np.deg2rad(10.0))  # the same of orientations
 _REASONS = "is it another robot, another direction of a joint, another unit, more than one frame?"
+_TURNED_REASONS = (
+    "in what order do qw, qx, qy, qz stand, are they ZYX Euler angles, of the tool in the world and not the "
+    "reverse? --position-only does without them"
+)
 _NOT_TO_BE_BELIEVED = 10.0  # standard deviations: 100 mm or 20 degrees between two joints is another robot
 
 
@@ -59,7 +64,9 @@ def mass_sizes(mass: float = MASS, centre_of_mass: float = CENTRE_OF_MASS) -> np
     return np.concatenate([np.full(len(MASS_NAMES), mass), np.full(len(CENTRE_NAMES), centre_of_mass)])
 
 
-def not_to_be_believed(names: Sequence[str], x: np.ndarray, distances: np.ndarray) -> str:
+def not_to_be_believed(
+    names: Sequence[str], x: np.ndarray, distances: np.ndarray, angles: np.ndarray | None = None
+) -> str:
     """Why what was found is not the robot, in words.
 
     A search finds a geometry for much, such as one of no size for a table in metres that claims to be in
@@ -69,6 +76,7 @@ def not_to_be_believed(names: Sequence[str], x: np.ndarray, distances: np.ndarra
         names: as `robots.calibration.error_model` has them; others are passed over.
         x: their values in m and rad, shape (len(names),).
         distances: of the measured from the predicted positions in m, any shape; NaN where there is none.
+        angles: between measured and predicted orientations in rad, any shape; None where there are none.
 
     Returns:
         For example ``joint3_z would be 350 mm off`` with possible reasons; empty if all can be believed.
@@ -76,6 +84,10 @@ def not_to_be_believed(names: Sequence[str], x: np.ndarray, distances: np.ndarra
     distance = float(np.nanmedian(distances))
     if distance > _PLAUSIBLE:
         return f"half of the positions stay more than {1e3 * distance:.0f} mm off ({_REASONS})"
+    angle = 0.0 if angles is None or not angles.size else float(np.median(angles))
+    if angle > _TURNED:
+        far = f"{np.rad2deg(angle):.0f} degrees"
+        return f"half of the orientations stay more than {far} off ({_TURNED_REASONS})"
     sizes, worst, largest = parameter_sizes(names), "", _NOT_TO_BE_BELIEVED
     for name, value, size in zip(names, x.tolist(), sizes.tolist(), strict=True):
         part, _, kind = name.partition("_")

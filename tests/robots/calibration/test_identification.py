@@ -194,6 +194,18 @@ def test_rows_in_two_frames_are_refused_in_words():
         identify(load_robot("ur10"), Measurements(q, position, None))
 
 
+@pytest.mark.parametrize("count", [12, 30])
+def test_quaternions_in_another_order_are_refused_in_words(count: int):
+    """Positions fit, so that the orientations would look like noise of 80 degrees."""
+    drawn, rng = MatrixRobot("irb1200"), np.random.default_rng(0)
+    table = measured(drawn.displaced(rng), drawn.configurations(count, rng)).noisy(SOURCE_NOISE, rng)
+    assert table.rotation is not None
+    other = np.roll(Rotation.from_matrix(table.rotation).as_quat(), 1, axis=1)
+    wrong = Measurements(table.q, table.position, Rotation.from_quat(other).as_matrix())
+    with pytest.raises(IdentificationError, match="half of the orientations stay more than"):
+        identify(load_robot("irb1200"), wrong)
+
+
 def test_the_calibrated_robot_knows_its_parameters_and_their_covariance():
     """With these as the beginning of another calibration, no direction is free and none is known too well."""
     drawn, rng, nominal = MatrixRobot("irb1200"), np.random.default_rng(0), load_robot("irb1200")
