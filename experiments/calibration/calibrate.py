@@ -1,6 +1,7 @@
 """The chain of a calibration: design, measurement, identification, validation, path."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -172,7 +173,7 @@ def validate(identified: Identified, calibrated: RobotModel, fresh: Measurements
     """Compares nominal and calibrated robot at configurations that were not used to identify it.
 
     Raises:
-        ValueError: if the calibrated robot is worse there.
+        ValueError: if the calibrated robot is worse there, or the table cannot be of this robot.
     """
     position_only = identified.measurements.rotation is None
     left_out: tuple[int, ...] = ()
@@ -186,6 +187,17 @@ def validate(identified: Identified, calibrated: RobotModel, fresh: Measurements
     if before is not None and after is not None:
         refuse_the_harmful(before.mean_norm_mm, after.mean_norm_mm)
     return Validation(fresh, left_out, before, after)
+
+
+@contextmanager
+def validating(file: str | None) -> Iterator[None]:
+    """Says which table it is that a calibrated robot is refused for; None where rows were simulated."""
+    try:
+        yield
+    except ValueError as error:
+        if file is None:
+            raise
+        raise ValueError(f"--validation {file}: {error}") from error
 
 
 def refuse_the_harmful(before: float, after: float) -> None:

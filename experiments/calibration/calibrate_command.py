@@ -21,6 +21,7 @@ from experiments.calibration.calibrate import (
     true_values,
     validate,
     validated,
+    validating,
     validation_configurations,
 )
 from experiments.calibration.instruments import InstrumentTables, ResultFiles, calibrate_with_instruments
@@ -161,6 +162,7 @@ def calibrate_command(
         _refuse_onto_nominal(write, prepared.scenario.robot)
         print_note(human, foreign_sources_note(prepared.robot) if wanted.is_given else prepared.note)
         baked = urdf_sag(urdf, urdf_payload, urdf_pose, wanted.compliance)
+        wanted.check_validation()
         if measurements and names_targets(measurements):
             wanted.check_instruments()
             adjusted = InstrumentTables(
@@ -253,6 +255,19 @@ class _Wanted:
     def _source(self) -> str:
         return "--measurements" if self.measurements else "--recording"
 
+    def check_validation(self) -> None:
+        """Raises ValueError if fresh rows are of another kind than those that identify."""
+        if not self.validation:
+            return
+        kinds = ("poses or positions", "targets and instruments")
+        of_targets = bool(self.measurements) and names_targets(self.measurements or "")
+        fresh_of_targets = names_targets(self.validation)
+        if fresh_of_targets != of_targets:
+            raise ValueError(
+                f"--validation {self.validation}: a table of {kinds[fresh_of_targets]}, and the calibration "
+                f"is from {kinds[of_targets]}; both need the same columns"
+            )
+
     def check_instruments(self) -> None:
         """Raises ValueError if an option has no effect on tables of targets and instruments."""
         if self.position_only:
@@ -318,7 +333,8 @@ def _study(prepared: Prepared, wanted: _Wanted, measured: _Measured) -> Calibrat
     if wanted.compliance:
         rigid = identify(robot, table, replace(config, compliance=False)).calibrated_robot()
     is_simulated = measured.design is not None
-    checked = validate(identified, calibrated, sets.validation)
+    with validating(wanted.validation):
+        checked = validate(identified, calibrated, sets.validation)
     return CalibrationStudy(
         nominal=identified.robot,
         calibrated=calibrated,

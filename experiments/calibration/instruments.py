@@ -8,7 +8,7 @@ import numpy as np
 from rich.console import Console
 from rich.markup import escape
 
-from experiments.calibration.calibrate import refuse_the_harmful
+from experiments.calibration.calibrate import refuse_the_harmful, validating
 from experiments.calibration.instruments_report import (
     instruments_json,
     sentence,
@@ -91,9 +91,10 @@ def calibrate_with_instruments(
         found = identify_with_instruments(
             nominal, seen, cell, tables.joint_errors, tables.compliance, tables.fixed
         )
-        checked = validate_lines(found, fresh) if fresh else None
-        if checked:
-            refuse_the_harmful(*(1e3 * float(np.mean(each)) for each in checked.distances()))
+        with validating(tables.validation):
+            checked = validate_lines(found, fresh) if fresh else None
+            if checked:
+                refuse_the_harmful(*(1e3 * float(np.mean(each)) for each in checked.distances()))
         calibrated = found.calibrated_robot(name)
         output.write(instruments_json(found, tables.measurements, unused, checked))
         write_instruments_page(stage / "report.html", found, checked)

@@ -8,6 +8,7 @@ from scipy.special import chdtri
 from robots.calibration.error_model import ZEROS
 from robots.calibration.identified import Identified
 from robots.calibration.measurements import Measurements
+from robots.calibration.prior import not_to_be_believed
 from robots.calibration.solver.noise_model import NoiseModel, row_sigmas
 from robots.description.model import RobotModel
 from robots.dynamics.compliant_kinematics import controller_kinematics
@@ -69,8 +70,12 @@ def plausible_rows(identified: Identified, measurements: Measurements) -> np.nda
 
     What is predicted is compared with what was measured in units of the noise that the fresh table says, or
     else the calibration knows or has found, and of the median over the table, which gross errors do not move.
+
+    Raises:
+        ValueError: if most rows are farther off than any calibrated robot is.
     """
     errors = prediction_errors(identified.calibrated_robot(), measurements)
+    refuse_what_cannot_be(*(np.linalg.norm(part, axis=1) for part in (errors[:, -3:], errors[:, :-3])))
     _, Theta = identified.model.forward_and_regressor(measurements.q, identified.x)
     J = Theta[:, 6 - errors.shape[1] :, ZEROS]
     noise, rows = identified.noise, row_sigmas(measurements)
@@ -79,6 +84,20 @@ def plausible_rows(identified: Identified, measurements: Measurements) -> np.nda
     W = NoiseModel(theta, rows.shape).whitening(J)
     squared = np.sum(np.einsum("nij,nj->ni", W, errors) ** 2, axis=1)
     return explained_by_noise(squared, errors.shape[1])
+
+
+def refuse_what_cannot_be(distances: np.ndarray, angles: np.ndarray | None = None, of: str = "") -> None:
+    """Raises ValueError if half of the predictions are farther off than noise and errors of robots explain.
+
+    Args:
+        distances: of measured from predicted positions in m, any shape; NaN where there is none.
+        angles: between measured and predicted orientations in rad, any shape; None where there are none.
+        of: the instrument; empty where a table has one only.
+    """
+    why = not_to_be_believed((), np.zeros(0), distances, angles)
+    if why:
+        rows = f"fresh lines of {of}" if of else "fresh rows"
+        raise ValueError(f"the calibrated robot does not predict {rows}: {why}")
 
 
 def explained_by_noise(squared: np.ndarray, numbers: np.ndarray | int) -> np.ndarray:

@@ -8,7 +8,7 @@ from robots.calibration.instruments.identify import InstrumentCalibration
 from robots.calibration.instruments.noise import JOINT
 from robots.calibration.instruments.observations import MeasuringCell, Observations
 from robots.calibration.instruments.problem import InstrumentProblem, Setting, Start
-from robots.calibration.validation import explained_by_noise
+from robots.calibration.validation import explained_by_noise, refuse_what_cannot_be
 
 _ROUNDING = 1e-6  # m, below which nothing is a gross error
 
@@ -38,7 +38,8 @@ def validate_lines(found: InstrumentCalibration, fresh: Observations) -> FreshLi
     """Predicts lines at configurations that were not used.
 
     Raises:
-        ValueError: if a target or an instrument was not in the calibration, or measured something else there.
+        ValueError: if a target or an instrument was not in the calibration, or measured something else there,
+            or if most of its lines are farther off than any calibrated robot is.
     """
     seen = _in_order_of(found.observations, fresh)
     first, problem = (_problem(found, seen, at) for at in (found.nominal_setting, found.setting))
@@ -50,6 +51,10 @@ def validate_lines(found: InstrumentCalibration, fresh: Observations) -> FreshLi
         np.where(measured, each.gathered(each.residuals(at)), np.nan)
         for each, at in ((first, 0.0 * u), (problem, u))
     )
+    for number, name in enumerate(seen.instruments):
+        distances = np.sqrt(np.nansum(after[seen.instrument == number] ** 2, axis=1))
+        if len(distances):
+            refuse_what_cannot_be(distances, of=name)
     J = problem.gathered(problem.linearise(u).J)  # zero where nothing was measured
     sigma = np.where(np.isfinite(seen.sigma), seen.sigma, found.noise[1 + seen.instrument])
     V = found.noise[JOINT] ** 2 * J @ np.swapaxes(J, 1, 2)
@@ -74,14 +79,10 @@ def _in_order_of(known: Observations, fresh: Observations) -> Observations:
     ):
         strange = [name for name in names if name not in there]
         if strange:
-            raise ValueError(
-                f"validation: {kind} {strange[0]} is not in the calibration; there are {', '.join(there)}"
-            )
+            raise ValueError(f"{kind} {strange[0]} is not in the calibration; there are {', '.join(there)}")
     for number, name in enumerate(fresh.instruments):
         if fresh.is_bar(number) != known.is_bar(known.instruments.index(name)):
-            raise ValueError(
-                f"validation: {name} measured coordinates in one table and distances in the other"
-            )
+            raise ValueError(f"{name} measured coordinates in one table and distances in the other")
     targets = np.array([known.targets.index(name) for name in fresh.targets])
     instruments = np.array([known.instruments.index(name) for name in fresh.instruments])
     return replace(

@@ -65,6 +65,18 @@ def test_a_robot_without_analytic_inverse_is_calibrated_from_a_tracker(
         (["--noise", "noise.yaml"], "--noise noise.yaml, line 1: position_mm must be positive, in mm, got 0"),
         (["--noise", "place.yaml"], "--noise place.yaml: needs rotation_deg, as orientations are measured"),
         (["--validation", "empty.csv"], "measurements empty.csv: no row but the header"),
+        (
+            ["--validation", "targets.csv"],
+            "targets.csv: a table of targets and instruments, and the",
+        ),
+        (
+            ["--validation", "metres.csv"],
+            "metres.csv: the calibrated robot does not predict fresh rows: half",
+        ),
+        (
+            ["--validation", "turned.csv"],
+            "turned.csv: the calibrated robot does not predict fresh rows: half",
+        ),
         (["--validation", "heavy.csv"], "no usable row; payload_kg must not be negative, got -1"),
     ],
 )
@@ -77,6 +89,10 @@ def test_what_does_not_go_together_is_said_in_one_line(
     (tmp_path / "place.yaml").write_text("{joint_deg: 0.1, position_mm: 0.1}")
     header = (tmp_path / "fresh.csv").read_text().splitlines()[0]
     (tmp_path / "empty.csv").write_text(header)
+    (tmp_path / "targets.csv").write_text(f"{header},target\n0,0,0,0,0,0,0,0,0,1,0,0,0,0,a")
+    (tmp_path / "metres.csv").write_text((tmp_path / "fresh.csv").read_text().replace("_m,", "_mm,"))
+    turned = (tmp_path / "fresh.csv").read_text().replace("qw,qx,qy,qz", "qx,qy,qz,qw")
+    (tmp_path / "turned.csv").write_text(turned)
     (tmp_path / "heavy.csv").write_text(f"{header}\n0,0,0,0,0,0,0,0,0,1,0,0,0,-1")
     assert message in refusal(truetip("calibrate", "--measurements", "measured.csv", *options))
     assert not (tmp_path / "out").exists()
@@ -184,9 +200,8 @@ def test_an_adjustment_is_validated_on_lines_of_its_own_and_written_as_urdf(tmp_
     strange = (tmp_path / "v.csv").read_text().replace(";tracker;", ";other;")
     (tmp_path / "v.csv").write_text(strange)
     refused = truetip("calibrate", *tables, "--out", tmp_path / "no")
-    assert (
-        "validation: instrument other is not in the calibration; there are camera, tracker, bar"
-        in refusal(refused)
+    assert "v.csv: instrument other is not in the calibration; there are camera, tracker, bar" in refusal(
+        refused
     )
 
 

@@ -84,6 +84,8 @@ def test_fresh_lines_are_predicted_exactly_and_those_with_gross_errors_named(nam
     assert checked.outliers == (fresh.lines[7],)
     shifted = replace(fresh, position=fresh.position + 0.01)
     assert validate_lines(found, shifted).distances(0)[1].min() > 0.005
+    with pytest.raises(ValueError, match="not predict fresh lines of tracker: half of the positions"):
+        validate_lines(found, replace(seen, position=seen.position + 1.0))
 
 
 def test_a_fixed_parameter_stays_zero_and_no_other_takes_its_place():
