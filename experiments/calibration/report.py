@@ -14,6 +14,7 @@ from experiments.calibration.calibrate import CalibrationStudy
 from robots.calibration.identifiability import completeness
 from robots.calibration.identified import Identified
 from robots.calibration.measurement_file import RowProblem
+from robots.calibration.measurements import MeasurementNoise
 from robots.calibration.repeatability import repeatability
 from robots.calibration.validation import ErrorStatistics, prediction_errors, statistics
 from robots.pose import zyx_from_rotation
@@ -102,6 +103,7 @@ def noise_dict(found: Identified) -> dict[str, Any]:
     noise, has_rotation = found.noise, found.residuals.shape[1] == 6
     return {
         "estimated": not found.is_noise_known,
+        "believed": found.noise_belief is not None,  # the rows hardly tell it
         "joint_deg": float(np.rad2deg(noise.joint_sigma)),
         "position_mm": 1e3 * noise.position_sigma,
         "rotation_deg": float(np.rad2deg(noise.rotation_sigma)) if has_rotation else None,
@@ -182,17 +184,29 @@ def noise_sentence(found: Identified) -> str:
     noise = noise_dict(found)
     if noise["estimated"] and noise["position_mm"] < _NO_NOISE_MM:
         return " The rows are free of noise."
-    values = [f"{noise['joint_deg']:.2g} degrees of the joints" if noise["joint_deg"] else ""]
-    values += [f"{noise['position_mm']:.2g} mm"]
-    values += [f"{noise['rotation_deg']:.2g} degrees" if noise["rotation_deg"] is not None else ""]
+    if found.noise_belief is not None:
+        return (
+            f" {int(found.kept.sum())} measurements are too few to tell their noise: usually it is "
+            f"{_sizes(found, found.noise_belief)}, with what they leave {_sizes(found, found.noise)} are "
+            "taken. The intervals are as good as that; who knows the noise better may say it (--noise)."
+        )
     how = "Estimated" if noise["estimated"] else "Known"
-    text = f" {how} noise: {', '.join(filter(None, values))}."
+    text = f" {how} noise: {_sizes(found, found.noise)}."
     if not noise["estimated"] and found.misfit > _MISFIT:
         text += (
             f" Residuals are {found.misfit:.1f} times as large as this noise makes them: it is larger than "
             "believed, or the model lacks something, and the intervals are too small."
         )
     return text
+
+
+def _sizes(found: Identified, noise: MeasurementNoise) -> str:
+    """Of joints, if any, positions and, where they were measured, orientations."""
+    sizes = [f"{np.rad2deg(noise.joint_sigma):.2g} degrees of the joints"] if noise.joint_sigma else []
+    sizes += [f"{1e3 * noise.position_sigma:.2g} mm"]
+    if found.residuals.shape[1] == 6:
+        sizes += [f"{np.rad2deg(noise.rotation_sigma):.2g} degrees"]
+    return ", ".join(sizes)
 
 
 def unexplained_sentence(found: Identified) -> str:

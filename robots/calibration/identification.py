@@ -18,8 +18,9 @@ from robots.calibration.measurements import MeasurementNoise, Measurements
 from robots.calibration.prior import CENTRE_OF_MASS, MASS, not_to_be_believed, parameter_sizes
 from robots.calibration.reduction import ReducibleModel
 from robots.calibration.solver.levenberg_marquardt import Fit, minimise
+from robots.calibration.solver.noise_belief import BELIEVED, ENOUGH, WEIGHT, left_over
 from robots.calibration.solver.noise_model import FLOOR, JOINT, POSITION, ROTATION, NoiseModel, row_sigmas
-from robots.calibration.solver.problem import Problem
+from robots.calibration.solver.problem import Linearised, Problem
 from robots.calibration.solver.robust import CleanRows, lacks_something, least_distances
 from robots.calibration.solver.variance_components import (
     VarianceComponents,
@@ -167,6 +168,19 @@ class _Search:
         self._is_known = bool(self._known[needed].all())
         self._iterations = 0
         self._lacks_something = False
+        self._nominal = problem.linearise(np.zeros(len(problem.columns)))
+        belief = self._belief(np.ones(len(problem), dtype=bool))
+        self._is_believed = belief is not None  # what noise there is, to begin with
+        self._theta = self._theta if belief is None else belief
+
+    def _belief(self, kept: np.ndarray) -> np.ndarray | None:
+        """Variances (3,) that noise is believed to have; None where it is known or the rows tell it."""
+        problem = self._problem
+        if self._is_known or int(kept.sum()) * problem.width - len(problem.columns) >= ENOUGH:
+            return None
+        believed = np.where(self._known, self._theta, BELIEVED)
+        noise = NoiseModel(believed, self._shape[kept])
+        return believed if left_over(self._nominal.select(kept), noise) < ENOUGH else None
 
     def result(self, robot: RobotModel, frame: np.ndarray | None, reducible: ReducibleModel) -> Identified:
         """Searches. Raises IdentificationError."""
@@ -184,7 +198,8 @@ class _Search:
             )
         if clean.all() or self._config.leave_out_outliers:
             self._refuse_the_implausible(fit.at.residuals[kept], fit.u)
-        factor = self._factor(fit, noise, kept, found)
+        at, rows, belief = fit.at.select(kept), noise.select(kept), self._belief(kept)
+        factor = parameter_factor(at, rows, self._estimated(kept), found)
         self._refuse_what_is_hidden(fit, kept, reducible)
         return Identified(
             robot=robot,
@@ -197,9 +212,10 @@ class _Search:
             residuals=fit.at.residuals,
             noise=noise.as_noise(),
             is_noise_known=self._is_known,
-            misfit=self._misfit(fit, noise, kept),
+            noise_belief=None if belief is None else NoiseModel(belief, self._shape).as_noise(),
+            misfit=_misfit(at, rows),
             lacks_something=self._lacks_something,
-            design=self._design(fit, noise, kept),
+            design=at.triangle(rows),
             outliers=tuple(map(int, problem.measurements.rows[~clean])),
             kept=kept,
             iterations=self._iterations,
@@ -223,7 +239,7 @@ class _Search:
         if fit.is_converged:
             if self._is_as_expected(fit, noise):
                 return everything, fit.u, self._theta
-            perfect = self._perfect(fit)
+            perfect = None if self._is_believed else self._perfect(fit)
             if perfect is not None:
                 return everything, *perfect
         if not self._config.search_outliers:
@@ -242,12 +258,13 @@ class _Search:
         """Rows that a problem's parameters explain, in turns with these and with the noise."""
         least, theta = least_distances(problem)
         u = least
-        theta = self._theta if self._is_known else np.where(self._known, self._theta, theta)
+        is_given = self._is_known or self._is_believed
+        theta = self._theta if is_given else np.where(self._known, self._theta, theta)
         kept = np.ones(len(problem), dtype=bool)
         for turn in range(_ROBUST_ROUNDS):
             noise = NoiseModel(theta, self._shape)
             at = problem.linearise(u)
-            rows = CleanRows(at, u, noise)
+            rows = CleanRows(at, u, noise, WEIGHT if self._is_believed else 0.0)
             if not rows.num_directions:
                 self._refuse_the_implausible(at.residuals, u)
                 break
@@ -259,8 +276,9 @@ class _Search:
             self._iterations += fit.iterations
             u = fit.u
             if not self._is_known:
-                at = _selected(problem.linearise(u), kept)
-                theta = variance_components(at, u, noise.select(kept), self._estimated(kept)).theta
+                at = problem.linearise(u).select(kept)
+                estimated, belief = self._estimated(kept), self._belief(kept)
+                theta = variance_components(at, u, noise.select(kept), estimated, belief).theta
         return _RobustRows(kept, least, u, theta)
 
     def _explained_by_springs(self, rows: _RobustRows) -> np.ndarray | None:
@@ -285,7 +303,7 @@ class _Search:
     def _is_as_expected(self, fit: Fit, noise: NoiseModel) -> bool:
         """Whether residuals are what known noise makes them: then no row needs to be tested."""
         e = fit.at.residuals
-        if not self._is_known:
+        if not (self._is_known or self._is_believed):
             return False
         squares = np.sum(np.einsum("nij,nj->ni", noise.whitening(fit.at.J), e) ** 2, axis=1)
         n, k = e.shape
@@ -324,23 +342,24 @@ class _Search:
         fit = self._minimise(start, noise, kept, is_rough=not self._is_known)
         if self._is_known:
             return fit, noise, None
-        estimated, before = self._estimated(kept), np.inf
+        estimated, before, belief = self._estimated(kept), np.inf, self._belief(kept)
         for _ in range(_ROUNDS):
             theta = noise.theta.copy()
             if theta[POSITION] * self._shape[:, POSITION].max() <= 1.01 * FLOOR**2:
                 break  # down to rounding
             rms = float(np.sqrt(np.mean(fit.at.residuals[kept] ** 2)))
             is_settled = False
-            if rms < _PERFECT and noise.theta[JOINT] == 0.0 and rms > 0.5 * before:
+            if belief is None and rms < _PERFECT and noise.theta[JOINT] == 0.0 and rms > 0.5 * before:
                 break  # the prior weighs nothing any more, and what is left is rounding
             before = rms
-            if rms < _PERFECT or rms < _NO_NOISE * np.sqrt(theta[POSITION]):
+            if belief is None and (rms < _PERFECT or rms < _NO_NOISE * np.sqrt(theta[POSITION])):
                 theta = np.array([0.0, 1.0, 1.0]) * max(_PRIOR_FADES * rms, FLOOR) ** 2
             else:
                 if theta[JOINT] == 0.0 and JOINT in estimated:
                     theta[JOINT] = 0.01 * theta[POSITION]
-                at = _selected(fit.at, kept)
-                found = variance_components(at, fit.u, NoiseModel(theta, self._shape[kept]), estimated)
+                at = fit.at.select(kept)
+                rows = NoiseModel(theta, self._shape[kept])
+                found = variance_components(at, fit.u, rows, estimated, belief)
                 change = np.abs(found.theta - theta)[estimated]
                 is_settled = bool(np.all(change < _SETTLED * np.sqrt(np.diag(found.covariance))))
                 theta = found.theta
@@ -351,24 +370,6 @@ class _Search:
         else:
             fit = replace(fit, is_converged=False)
         return fit, noise, found
-
-    def _factor(
-        self, fit: Fit, noise: NoiseModel, kept: np.ndarray, found: VarianceComponents | None
-    ) -> np.ndarray:
-        """Of the covariance of the free parameters in units of the prior."""
-        at, rows = _selected(fit.at, kept), noise.select(kept)
-        return parameter_factor(at, rows, self._estimated(kept), found)
-
-    def _design(self, fit: Fit, noise: NoiseModel, kept: np.ndarray) -> np.ndarray:
-        """The triangle of the whitened derivatives by the free parameters in units of the prior."""
-        at, rows = _selected(fit.at, kept), noise.select(kept)
-        A = (rows.whitening(at.J) @ at.A).reshape(-1, at.A.shape[2])
-        return np.asarray(np.linalg.qr(A, mode="r"))
-
-    def _misfit(self, fit: Fit, noise: NoiseModel, kept: np.ndarray) -> float:
-        at = _selected(fit.at, kept)
-        whitened = np.einsum("nij,nj->ni", noise.select(kept).whitening(at.J), at.residuals)
-        return float(np.sqrt(np.sum(whitened**2) / max(whitened.size - _REDUNDANCY_OF_A_POSE, 1)))
 
     def _refuse_the_implausible(self, residuals: np.ndarray, u: np.ndarray) -> None:
         model, x = self._problem.model, self._problem.parameters(u)
@@ -393,5 +394,6 @@ class _Search:
             )
 
 
-def _selected(at, rows: np.ndarray):
-    return replace(at, residuals=at.residuals[rows], A=at.A[rows], J=at.J[rows])
+def _misfit(at: Linearised, noise: NoiseModel) -> float:
+    whitened = np.einsum("nij,nj->ni", noise.whitening(at.J), at.residuals)
+    return float(np.sqrt(np.sum(whitened**2) / max(whitened.size - _REDUNDANCY_OF_A_POSE, 1)))

@@ -34,6 +34,7 @@ class Identified:
     residuals: np.ndarray  # (n, 6 or 3) measured less predicted pose: rad, m; rotation first
     noise: MeasurementNoise  # known or estimated
     is_noise_known: bool
+    noise_belief: MeasurementNoise | None  # what estimated noise leans on, where the rows hardly tell it
     misfit: float  # size of the residuals in units of the noise: about one where the noise explains them
     lacks_something: bool  # whether rows that fit together are not explained by these parameters
     design: np.ndarray  # triangle of the whitened derivatives by the free parameters in units of the prior

@@ -8,6 +8,7 @@ import numpy as np
 from robots.calibration.error_model import ZEROS, ErrorModel
 from robots.calibration.loads import Loads
 from robots.calibration.measurements import Measurements
+from robots.calibration.solver.noise_model import Noise
 from robots.calibration.yielding_joints import YIELDING_NAMES, Sag, YieldingJoints
 from robots.pose import pose_error
 
@@ -19,6 +20,16 @@ class Linearised:
     residuals: np.ndarray  # (n, k) measured less predicted: rad, m; rotation first
     A: np.ndarray  # (n, k, m) derivative of the prediction by the scaled parameters
     J: np.ndarray  # (n, k, 6) derivative of the prediction by the joint positions
+
+    def select(self, rows: np.ndarray) -> "Linearised":
+        """Some of the rows, by a mask or by indices."""
+        return Linearised(self.residuals[rows], self.A[rows], self.J[rows])
+
+    def triangle(self, noise: Noise) -> np.ndarray:
+        """R with R^T R = A^T V^-1 A, the information of rows with this noise, (any, m)."""
+        return np.asarray(
+            np.linalg.qr((noise.whitening(self.J) @ self.A).reshape(-1, self.A.shape[2]), mode="r")
+        )
 
 
 class Predicted(Protocol):

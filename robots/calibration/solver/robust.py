@@ -82,7 +82,16 @@ def _distances(problem: Problem, u: np.ndarray) -> np.ndarray:
 class CleanRows:
     """The rows of one linearisation, in the directions that they show."""
 
-    def __init__(self, at: Linearised, u: np.ndarray, noise: NoiseModel) -> None:
+    def __init__(self, at: Linearised, u: np.ndarray, noise: NoiseModel, believed: float = 0.0) -> None:
+        """Finds the directions.
+
+        Args:
+            at: the rows.
+            u: parameters where they are, in units of the prior, (m,).
+            noise: their variances.
+            believed: how many numbers more this noise counts as, where the rows hardly tell it.
+        """
+        self._believed = believed
         W = noise.whitening(at.J)
         A, self._e = W @ at.A, at.residuals
         R = np.linalg.qr(A.reshape(-1, A.shape[2]), mode="r")
@@ -160,8 +169,8 @@ class CleanRows:
         is_controlled = ~clean | (np.linalg.eigvalsh(S)[:, 0] > 1e-6)
         S = np.where(is_controlled[:, None, None], S, np.eye(k))
         squared = np.sum(rest * np.linalg.solve(S, rest[..., None])[..., 0], axis=1)
-        total = float(np.sum(rest[clean] ** 2))
-        freedom = float(clean.sum() * k - (r - np.trace(H)))
+        total = float(np.sum(rest[clean] ** 2)) + self._believed
+        freedom = float(clean.sum() * k - (r - np.trace(H))) + self._believed
         inside = np.maximum(total - squared, 0.0) / max(freedom - k, 1.0)
         spread = np.where(clean, inside, total / max(freedom, 1.0))
         ratio = squared / k / np.maximum(spread, 1e-300)

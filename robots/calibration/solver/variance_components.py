@@ -17,6 +17,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.linalg import solve_triangular
 
+from robots.calibration.solver.noise_belief import WEIGHT
 from robots.calibration.solver.noise_model import JOINT, POSITION, ROTATION, Noise
 from robots.calibration.solver.problem import Linearised
 
@@ -47,7 +48,7 @@ class _Likelihood:
 
 
 def variance_components(
-    at: Linearised, u: np.ndarray, noise: Noise, estimated: list[int]
+    at: Linearised, u: np.ndarray, noise: Noise, estimated: list[int], belief: np.ndarray | None = None
 ) -> VarianceComponents:
     """The most likely variances where residuals change linearly with the parameters.
 
@@ -56,12 +57,13 @@ def variance_components(
         u: the parameters where they are, in units of the prior, (m,).
         noise: variances to start from.
         estimated: which components are not known.
+        belief: variances (3,), each as if one more number of its kind had been seen; see `noise_belief`.
     """
     y = at.residuals + at.A @ u  # what the parameters and the noise have to explain
     least = noise.floors(at.residuals)[estimated]
     theta = noise.theta.copy()
     theta[estimated] = np.maximum(theta[estimated], least)
-    now, damping = _likelihood(at, y, noise.with_variances(theta), estimated), 0.0
+    now, damping = _likelihood(at, y, noise.with_variances(theta), estimated, belief), 0.0
     for _ in range(_STEPS):
         before = theta[estimated]
         free = np.flatnonzero((before > least) | (now.score > 0.0))
@@ -72,7 +74,7 @@ def variance_components(
         step[free] = np.linalg.solve(F + damping * np.diag(np.diagonal(F)), now.score[free])
         tried = theta.copy()
         tried[estimated] = np.maximum(before + step, np.maximum(_LEAST * before, least))
-        there = _likelihood(at, y, noise.with_variances(tried), estimated)
+        there = _likelihood(at, y, noise.with_variances(tried), estimated, belief)
         change = np.abs(tried[estimated] - before)[free]
         is_last = bool(np.all(change < _SETTLED * np.sqrt(2.0 * np.diagonal(np.linalg.inv(F)))))
         if there.value <= now.value + _ROUNDING * abs(now.value):
@@ -84,7 +86,9 @@ def variance_components(
     return VarianceComponents(theta, 2.0 * np.linalg.inv(now.information))
 
 
-def _likelihood(at: Linearised, y: np.ndarray, noise: Noise, estimated: list[int]) -> _Likelihood:
+def _likelihood(
+    at: Linearised, y: np.ndarray, noise: Noise, estimated: list[int], belief: np.ndarray | None
+) -> _Likelihood:
     n, k, m = at.A.shape
     W = noise.whitening(at.J)
     A, y = (W @ at.A).reshape(-1, m), np.einsum("nij,nj->ni", W, y).ravel()
@@ -109,7 +113,14 @@ def _likelihood(at: Linearised, y: np.ndarray, noise: Noise, estimated: list[int
             F[i, j] = np.sum(square[i] * square[j]) - 2.0 * np.sum(HB[i] * HB[j]) + np.sum(M[i] * M[j].T)
             F[j, i] = F[i, j]
         F[i, i] += _BELIEVED * np.sum(square[i] ** 2)
-    return _Likelihood(value, np.array(score), F)
+    if belief is None:
+        return _Likelihood(value, np.array(score), F)
+    theta = noise.theta[estimated]
+    ratio = belief[estimated] / theta  # of WEIGHT numbers with this mean square
+    value += WEIGHT * float(np.sum(np.log(theta) + ratio))
+    return _Likelihood(
+        value, np.array(score) + WEIGHT * (ratio - 1.0) / theta, F + np.diag(WEIGHT / theta**2)
+    )
 
 
 def parameter_factor(

@@ -104,7 +104,13 @@ def test_a_file_of_known_noise_is_believed(tmp_path: Path):
     arguments = ["--measurements", tmp_path / "measured.csv", "--noise", tmp_path / "noise.yaml"]
     result = truetip("calibrate", *arguments, "--out", tmp_path / "out", "--json", "-")
     assert result.exit_code == 0, result.output
-    known = {"estimated": False, "joint_deg": 0.01, "position_mm": 0.1, "rotation_deg": 0.05}
+    known = {
+        "estimated": False,
+        "believed": False,
+        "joint_deg": 0.01,
+        "position_mm": 0.1,
+        "rotation_deg": 0.05,
+    }
     assert json.loads(result.stdout)["noise"] == pytest.approx(known)
 
 

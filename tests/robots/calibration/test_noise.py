@@ -21,11 +21,13 @@ REDUCIBLE = ReducibleModel(ErrorModel(NOMINAL))
 NAMED = REDUCIBLE.independent(np.zeros(54))  # one set for all tables
 
 
-def table_of(seed: int, noise: MeasurementNoise = SOURCE_NOISE) -> tuple[Measurements, MatrixRobot]:
-    """75 poses of a robot with errors of 6 mm and 0.9 degrees."""
+def table_of(
+    seed: int, noise: MeasurementNoise = SOURCE_NOISE, count: int = 75
+) -> tuple[Measurements, MatrixRobot]:
+    """Poses of a robot with errors of 6 mm and 0.9 degrees."""
     rng = np.random.default_rng(seed)
     true = DRAWN.displaced(rng)
-    q = DRAWN.configurations(75, rng)
+    q = DRAWN.configurations(count, rng)
     X_WE = true.forward(q)
     return Measurements(q, X_WE[:, :3, 3], X_WE[:, :3, :3]).noisy(noise, rng), true
 
@@ -134,3 +136,34 @@ def test_noise_that_rows_say_is_shown_as_they_say_it_and_judges_fresh_rows():
     for says in (sigmas, np.zeros((0, 3))):  # the fresh table may say it, too
         plausible = plausible_rows(result, replace(fresh, position=position, sigmas=says))
         assert np.flatnonzero(~plausible).tolist() == [3]
+
+
+def errors_by_sigmas(result: Identified, true: MatrixRobot) -> float:
+    """Root mean square over fresh positions of what is wrong with them, in units of what is said to be."""
+    q = DRAWN.configurations(100, np.random.default_rng(7))
+    X_WE, Theta = result.model.forward_and_regressor(q, result.x)
+    A = Theta[:, 3:, result.free]
+    variances = np.einsum("nij,jk,nik->ni", A, result.free_covariance, A)
+    return float(np.sqrt(np.mean((X_WE - true.forward(q))[:, :3, 3] ** 2 / variances)))
+
+
+@pytest.mark.parametrize(("count", "position_only"), [(9, True), (12, True), (5, False), (6, False)])
+def test_rows_that_leave_nothing_over_are_not_taken_for_exact(count: int, position_only: bool):
+    """Parameters explain as many numbers as there are of them; the usual noise keeps intervals honest."""
+    usual = replace(SOURCE_NOISE, joint_sigma=0.0)
+    ratios = []
+    for seed in range(6):
+        table, true = table_of(seed, usual, count)
+        result = identify(NOMINAL, table.without_rotation() if position_only else table)
+        assert result.noise_belief is not None
+        assert 0.2 < result.noise.position_sigma / usual.position_sigma < 3.0
+        ratios.append(errors_by_sigmas(result, true))
+    assert 0.5 < np.sqrt(np.mean(np.square(ratios))) < 1.6
+
+
+def test_rows_that_leave_numbers_over_tell_their_noise():
+    """15 positions without noise are still known to have none."""
+    table, true = table_of(0, MeasurementNoise(), 15)
+    result = identify(NOMINAL, table.without_rotation())
+    assert result.noise_belief is None
+    assert error(result, true) < 1e-6
