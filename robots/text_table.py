@@ -30,6 +30,15 @@ class TextTable:
         """File and line of a row."""
         return f"{self.name}, line {self.lines[row]}"
 
+    def copies(self) -> set[int]:
+        """Lines whose fields are all those of an earlier one: a table pasted twice, and no news."""
+        first: dict[tuple[str, ...], int] = {}
+        return {
+            line
+            for line, fields in zip(self.lines, self.rows, strict=True)
+            if first.setdefault(tuple(fields), line) != line
+        }
+
     def refuse_longer_rows(self) -> None:
         """Raises TextTableError if a row has more fields than the head: which of them belong where?
 

@@ -15,6 +15,7 @@ from experiments.calibration.instruments_report import (
     validation_sentence,
     write_instruments_page,
 )
+from experiments.calibration.report import problem_lines
 from experiments.calibration.urdf_option import Sag, urdf_robot
 from experiments.cli.console import print_files
 from experiments.cli.json_output import JsonOutput
@@ -142,8 +143,8 @@ def _print(
     console.print(escape(sentence(found)))
     if checked:
         console.print(escape(validation_sentence(checked)))
-    for file, problem in unused:
-        console.print(f"[yellow]{escape(f'{file}, line {problem.row}: {problem.what}; left out')}[/yellow]")
+    for line in problem_lines(unused):
+        console.print(f"[yellow]{escape(line)}[/yellow]")
     for what, lines in (
         ("left out", found.outliers),
         ("left out of the validation", checked.outliers if checked else ()),

@@ -76,6 +76,28 @@ def calibration_json(
     }
 
 
+def problem_lines(problems: Problems) -> list[str]:
+    """What is wrong with rows that cannot be used; those of a file with the same fault share a line."""
+    rows: dict[tuple[str, str], list[int]] = {}
+    for name, problem in problems:
+        rows.setdefault((name, problem.what), []).append(problem.row)
+    return [
+        f"{name}, line{'s' if len(numbers) > 1 else ''} {_in_a_row(numbers)}: {what}; left out"
+        for (name, what), numbers in rows.items()
+    ]
+
+
+def _in_a_row(numbers: list[int]) -> str:
+    """Rising numbers as a list: 3, 7 to 9."""
+    runs: list[list[int]] = []
+    for number in numbers:
+        if runs and number == runs[-1][-1] + 1:
+            runs[-1].append(number)
+        else:
+            runs.append([number])
+    return ", ".join(f"{run[0]} to {run[-1]}" if len(run) > 1 else str(run[0]) for run in runs)
+
+
 def rows_left_out(study: CalibrationStudy, problems: Problems) -> list[dict[str, Any]]:
     """Rows that were not used: where they stand and why."""
     left_out = [{"file": name, "row": problem.row, "why": problem.what} for name, problem in problems]
@@ -114,10 +136,8 @@ def print_calibration(
     console: Console, study: CalibrationStudy, path: Mapping[str, Any] | None, problems: Problems
 ) -> None:
     """Tables 6.3 and 6.4 of Probst (2024) for this calibration."""
-    for name, problem in problems:
-        console.print(
-            f"[yellow]{escape(name)}, line {problem.row}: {escape(problem.what)}; left out[/yellow]"
-        )
+    for line in problem_lines(problems):
+        console.print(f"[yellow]{escape(line)}[/yellow]")
     if study.identified.outliers:
         rows = ", ".join(map(str, study.identified.outliers))
         console.print(f"[yellow]Outliers, left out of the identification: rows {rows}[/yellow]")

@@ -6,7 +6,8 @@ with # are comments. Columns:
 ``qw``, ``qx``, ``qy``, ``qz``, or the ZYX Euler angles ``alpha_deg``, ``beta_deg``, ``gamma_deg`` (also in
 ``_rad``), or none of them; ``payload_kg`` if there is one; standard deviations of the row as
 ``sigma_joint_deg``, ``sigma_position_mm``, ``sigma_rotation_deg`` (or ``_rad``, ``_m``) as far as they are
-known. Other columns are left alone. A configuration may be there more than once.
+known. Other columns are left alone. A configuration may be there more than once, but a row with all the same
+numbers as an earlier one is a copy and left out.
 """
 
 import math
@@ -21,6 +22,7 @@ from robots.description.model import NUM_JOINTS
 from robots.pose import rotation_from_zyx
 from robots.text_table import TextTable, TextTableError, finite_number, parse_fields, read_text
 
+COPY = "a copy of an earlier line, not another measurement"
 _JOINTS = tuple(f"q{number}" for number in range(1, NUM_JOINTS + 1))
 _AXES, _QUATERNION, _EULER = ("x", "y", "z"), ("qw", "qx", "qy", "qz"), ("alpha", "beta", "gamma")
 _UNITS = {"rad": 1.0, "deg": math.pi / 180.0, "m": 1.0, "mm": 1e-3}
@@ -71,7 +73,7 @@ def parse_measurements(text: str, name: str = "table") -> tuple[Measurements, li
 def _measurements(table: TextTable) -> tuple[Measurements, list[RowProblem]]:
     columns = _Columns(table.rows[0])
     problems: list[RowProblem] = []
-    rows, numbers = [], []
+    rows, numbers, copies = [], [], table.copies()
     for line, row in zip(table.lines[1:], table.rows[1:], strict=True):
         try:
             values = columns.numbers(row, table.separator)
@@ -79,6 +81,9 @@ def _measurements(table: TextTable) -> tuple[Measurements, list[RowProblem]]:
             problems.append(RowProblem(line, str(error)))
             continue
         columns.refuse_wrong_units(values, line)
+        if line in copies:
+            problems.append(RowProblem(line, COPY))
+            continue
         rows.append(values)
         numbers.append(line)
     if not rows:

@@ -13,7 +13,7 @@ from pathlib import Path
 import numpy as np
 
 from robots.calibration.instruments.observations import Observations
-from robots.calibration.measurement_file import MeasurementFileError, RowProblem
+from robots.calibration.measurement_file import COPY, MeasurementFileError, RowProblem
 from robots.description.model import NUM_JOINTS
 from robots.text_table import TextTable, TextTableError, finite_number, parse_fields, read_text
 
@@ -43,10 +43,12 @@ def read_observations(path: str | Path) -> tuple[Observations, list[RowProblem]]
     except TextTableError as error:
         raise MeasurementFileError(f"measurements {error}") from error
     columns = _Columns(table)
-    q, loads, kept, problems = [], [], [], []
+    q, loads, kept, problems, copies = [], [], [], [], table.copies()
     for line, row in zip(table.lines[1:], table.rows[1:], strict=True):
         try:
             found = columns.values(row), columns.joints(row), columns.payload(row)
+            if line in copies:
+                raise ValueError(COPY)
             kept.append((line, *found[0]))
             q.append(found[1])
             loads.append(found[2])

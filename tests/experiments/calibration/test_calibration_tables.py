@@ -8,8 +8,9 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
+from experiments.calibration.report import problem_lines
 from robots.calibration.instruments.observations import Observations
-from robots.calibration.measurement_file import measurement_text
+from robots.calibration.measurement_file import RowProblem, measurement_text
 from robots.calibration.measurements import Measurements
 from robots.description.model import load_robot
 from robots.kinematics.forward import Kinematics
@@ -266,3 +267,12 @@ def test_what_is_known_is_known_of_something_that_was_measured(
     (tmp_path / "cell.yaml").write_text(cell)
     result = truetip("calibrate", "--measurements", "m.csv", "--instruments", "cell.yaml")
     assert f"cell cell.yaml: {message}" in refusal(result)
+
+
+def test_rows_with_the_same_fault_share_a_line():
+    faults = [(2, "empty"), (4, "copy"), (5, "copy"), (6, "copy"), (9, "copy")]
+    problems = [("m.csv", RowProblem(row, what)) for row, what in faults]
+    assert problem_lines(problems) == [
+        "m.csv, line 2: empty; left out",
+        "m.csv, lines 4 to 6, 9: copy; left out",
+    ]

@@ -91,10 +91,20 @@ def test_bad_rows_are_named_and_the_others_used():
 
 
 def test_a_configuration_may_be_measured_again():
-    lines = measurement_text(table(6)).splitlines()
-    read, problems = parse_measurements("\n".join([*lines, lines[1]]))
+    lines = measurement_text(replace(table(6), position=table(6).position + 1e-5)).splitlines()
+    again = measurement_text(table(6)).splitlines()[1]
+    read, problems = parse_measurements("\n".join([*lines, again]))
     assert problems == []
     np.testing.assert_array_equal(read.q[-1], read.q[0])
+
+
+def test_a_table_pasted_twice_tells_no_more_than_once():
+    """Intervals would be too small by the root of two."""
+    lines = measurement_text(table(6)).splitlines()
+    read, problems = parse_measurements("\n".join([*lines, *lines[1:]]))
+    np.testing.assert_array_equal(read.q, table(6).q)
+    assert [problem.row for problem in problems] == [8, 9, 10, 11, 12, 13]
+    assert {problem.what for problem in problems} == {"a copy of an earlier line, not another measurement"}
 
 
 def test_standard_deviations_of_rows_come_back_in_any_unit():
