@@ -24,6 +24,7 @@ AXES = ("Δx mm", "Δy mm", "Δz mm", "ρx °", "ρy °", "ρz °")
 _WEAK = 0.5  # share of the data in what is known of a parameter, below which it is said
 _MISFIT = 1.3  # of residuals, in units of the known noise, from which it is said
 _NO_NOISE_MM = 1e-6
+_ENCODERS_DEG = 0.03  # noise of joints, estimated, that is ten times that of encoders
 
 
 def calibration_json(
@@ -230,16 +231,25 @@ def _sizes(found: Identified, noise: MeasurementNoise) -> str:
 
 
 def unexplained_sentence(found: Identified) -> str:
-    """That the rows agree on something that the parameters cannot describe; empty if they do not."""
-    if not found.lacks_something:
+    """That the rows agree on something that the parameters cannot describe; empty if they do not.
+
+    Where no row is told apart by it, it is taken for noise of the joints, larger than encoders have.
+    """
+    joint_deg = 0.0 if found.is_noise_known else float(np.rad2deg(found.noise.joint_sigma))
+    if not found.lacks_something and joint_deg < _ENCODERS_DEG:
         return ""
-    position = float(np.sqrt(np.mean(np.sum(found.residuals[found.kept, -3:] ** 2, axis=1))))
     has_springs = len(found.parameters) > len(found.model)
     cause = (
         "do bearings yield, or joints err (--joint-errors)"
         if has_springs
         else "do joints yield (--compliance)"
     )
+    if not found.lacks_something:
+        return (
+            f" Noise of {joint_deg:.2g} degrees of the joints is far more than encoders have: most of it "
+            f"may be what these parameters do not explain; {cause}?"
+        )
+    position = float(np.sqrt(np.mean(np.sum(found.residuals[found.kept, -3:] ** 2, axis=1))))
     return (
         f" These parameters do not explain the measurements: {1e3 * position:.2g} mm (rms) are left that are "
         f"not noise alone; {cause}?"

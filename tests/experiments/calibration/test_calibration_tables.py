@@ -2,17 +2,23 @@
 
 import json
 import shutil
+
+
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from experiments.calibration.report import problem_lines
+from experiments.calibration.report import problem_lines, unexplained_sentence
+from robots.calibration.identification import identify
 from robots.calibration.instruments.observations import Observations
 from robots.calibration.measurement_file import RowProblem, measurement_text
-from robots.calibration.measurements import Measurements
+from robots.calibration.measurements import MeasurementNoise, Measurements
+from robots.description.calibration import Calibration
 from robots.description.model import load_robot
+from robots.dynamics.compliant_kinematics import CompliantKinematics
 from robots.kinematics.forward import Kinematics
 from tests.experiments.commands import refusal, truetip
 from tests.robots.calibration.matrix_robot import MatrixRobot, homogeneous
@@ -276,3 +282,16 @@ def test_rows_with_the_same_fault_share_a_line():
         "m.csv, line 2: empty; left out",
         "m.csv, lines 4 to 6, 9: copy; left out",
     ]
+
+
+def test_springs_that_are_taken_for_noise_of_the_joints_are_asked_for():
+    """A joint that yields moves its axis as a bad encoder does: ten times too soft it shows that."""
+    robot, rng = load_robot("irb1200"), np.random.default_rng(3)
+    q = MatrixRobot("irb1200").configurations(60, rng)
+    soft = Calibration(compliance=(10.0 / robot.joint_stiffness).tolist())
+    for yields, joint in ((soft, 0.0), (robot.calibration, np.deg2rad(0.003))):
+        X_WE = CompliantKinematics(replace(robot, calibration=yields), 3.0).forward(q)
+        table = Measurements(q, X_WE[:, :3, 3], None, np.full(60, 3.0))
+        found = identify(robot, table.noisy(MeasurementNoise(joint, 2e-5), rng))
+        is_asked = "far more than encoders have" in unexplained_sentence(found)
+        assert is_asked == (yields is soft)
