@@ -33,6 +33,9 @@ def sentence(found: InstrumentCalibration) -> str:
         text += (
             f"{name}: {before:.3f} to {after:.4g} mm (rms), noise {1e3 * found.noise[1 + number]:.2g} mm. "
         )
+    if found.is_noise_believed:
+        text += "The lines are too few to tell their noise: it leans on the usual 0.1 mm, and the intervals "
+        text += "are as good as that; who knows it better may say it (sigma_mm, --noise). "
     return text + f"Noise of the joints {np.rad2deg(found.noise[0]):.2g} degrees."
 
 
@@ -76,6 +79,7 @@ def instruments_json(
         "shares": found.shares.tolist(),
         "correlation": found.correlation.tolist(),
         "condition": found.condition,
+        "noise_believed": found.is_noise_believed,  # the lines hardly tell it
         "noise": {
             "joint_deg": float(np.rad2deg(found.noise[0])),
             **{name: 1e3 * float(s) for name, s in zip(seen.instruments, found.noise[1:], strict=True)},

@@ -18,7 +18,7 @@ from robots.calibration.measurements import MeasurementNoise, Measurements
 from robots.calibration.prior import CENTRE_OF_MASS, MASS, not_to_be_believed, parameter_sizes
 from robots.calibration.reduction import ReducibleModel
 from robots.calibration.solver.levenberg_marquardt import Fit, minimise
-from robots.calibration.solver.noise_belief import BELIEVED, ENOUGH, WEIGHT, left_over
+from robots.calibration.solver.noise_belief import BELIEVED, ENOUGH, WEIGHT, taken
 from robots.calibration.solver.noise_model import FLOOR, JOINT, POSITION, ROTATION, NoiseModel, row_sigmas
 from robots.calibration.solver.problem import Linearised, Problem
 from robots.calibration.solver.robust import CleanRows, lacks_something, least_distances
@@ -175,12 +175,12 @@ class _Search:
 
     def _belief(self, kept: np.ndarray) -> np.ndarray | None:
         """Variances (3,) that noise is believed to have; None where it is known or the rows tell it."""
-        problem = self._problem
-        if self._is_known or int(kept.sum()) * problem.width - len(problem.columns) >= ENOUGH:
+        numbers = int(kept.sum()) * self._problem.width
+        if self._is_known or numbers - len(self._problem.columns) >= ENOUGH:
             return None
         believed = np.where(self._known, self._theta, BELIEVED)
         noise = NoiseModel(believed, self._shape[kept])
-        return believed if left_over(self._nominal.select(kept), noise) < ENOUGH else None
+        return believed if numbers - taken(self._nominal.select(kept), noise) < ENOUGH else None
 
     def result(self, robot: RobotModel, frame: np.ndarray | None, reducible: ReducibleModel) -> Identified:
         """Searches. Raises IdentificationError."""

@@ -14,14 +14,16 @@ from robots.calibration.instruments.observations import MeasuringCell, Observati
 from robots.calibration.instruments.problem import InstrumentProblem, Setting, Start
 from robots.calibration.prior import not_to_be_believed
 from robots.calibration.solver.levenberg_marquardt import Fit, minimise
-from robots.calibration.solver.noise_model import FLOOR
+from robots.calibration.solver.noise_belief import BELIEVED, ENOUGH, taken
+from robots.calibration.solver.noise_model import FLOOR, POSITION
 from robots.calibration.solver.variance_components import parameter_factor, variance_components
 from robots.calibration.yielding_joints import COMPLIANCE_NAMES
 from robots.description.calibration import Calibration
 from robots.description.model import RobotModel
 from robots.metrology.least_squares import UndeterminedError
 
-_FIRST_SIGMA = 3e-4  # m, of an instrument of which nothing is known
+_FIRST_SIGMA = 3e-4  # m, of an instrument of which nothing is known, to begin with
+_BELIEVED = float(np.sqrt(BELIEVED[POSITION]))  # m, of such a one where lines are too few to tell it
 _L1_ROUNDS, _NEAREST = 8, 0.3  # of the median residual: no line weighs more than one at that distance
 _RISK = 1e-3  # that a clean table loses a line
 _MANY = 10  # numbers per parameter, from which a bad line cannot hide in a fit
@@ -52,6 +54,7 @@ class InstrumentCalibration:
     before: np.ndarray  # (m, 3) m, measured less predicted by it, NaN where nothing was
     residuals: np.ndarray  # (m, 3) m, with the calibrated one
     noise: np.ndarray  # standard deviations: of the joints in rad, of every instrument in m
+    is_noise_believed: bool  # whether it leans on what is usual, as the lines hardly tell it
     used: np.ndarray  # (m,) bool
     rank: int  # directions that the data show better than what was known before
     condition: float  # of these directions, in units of what was known before
@@ -158,7 +161,7 @@ def _anchor(p: np.ndarray, distance: np.ndarray) -> np.ndarray:
 
 
 def _said(seen: Observations, instrument: int, known: float | None) -> tuple[float, bool]:
-    """How noisy an instrument is in m, and whether that is all there is to know of it.
+    """How noisy an instrument is in m, zero if nobody says it, and whether that is all there is to know.
 
     Its lines say it (then it is the root of their mean square), or the cell does, ``known``. Where only some
     lines say it, the others are as noisy as these to begin with.
@@ -167,7 +170,7 @@ def _said(seen: Observations, instrument: int, known: float | None) -> tuple[flo
     says = np.isfinite(sigmas)
     if known is not None and not says.all():
         return known, True
-    return (float(np.sqrt(np.mean(sigmas[says] ** 2))) if says.any() else _FIRST_SIGMA), bool(says.all())
+    return (float(np.sqrt(np.mean(sigmas[says] ** 2))) if says.any() else 0.0), bool(says.all())
 
 
 class _Adjustment:
@@ -178,17 +181,32 @@ class _Adjustment:
         seen = problem.observations
         given = [_said(seen, i, cell.sigmas.get(name)) for i, name in enumerate(seen.instruments)]
         self._estimated = [1 + i for i, (_, is_known) in enumerate(given) if not is_known]
-        self._theta = np.array([cell.joint_sigma or 0.0, *(sigma for sigma, _ in given)]) ** 2
+        self._theta, self._believed = (
+            np.array([cell.joint_sigma or 0.0, *(sigma or usual for sigma, _ in given)]) ** 2
+            for usual in (_FIRST_SIGMA, _BELIEVED)
+        )
+        if self._belief() is not None:
+            self._theta = self._believed
         redundancy = int(self._everything.sum()) - len(problem.columns)
         if cell.joint_sigma is None and self._estimated and redundancy >= _ENOUGH_FOR_JOINTS:
             self._estimated.insert(0, JOINT)
+
+    def _belief(self) -> np.ndarray | None:
+        """Variances that noise is believed to have; None where it is known or the active lines tell it."""
+        problem = self._problem
+        numbers = int(problem.active.sum())
+        if not self._estimated or numbers - len(problem.columns) >= ENOUGH:
+            return None
+        noise = instrument_noise(problem, self._believed, problem.active)
+        at = problem.linearise(np.zeros(len(problem.columns)))
+        return self._believed if numbers - taken(at, noise) < ENOUGH else None
 
     def result(self, robot: RobotModel) -> InstrumentCalibration:
         """Searches. Raises IdentificationError."""
         problem = self._problem
         u, used = self._clean_lines()
         self._refuse_the_implausible(u)
-        fit, noise, found = self._solve(u, used)
+        fit, noise, found, is_believed = self._solve(u, used)
         if not fit.is_converged:
             rms = 1e3 * float(np.sqrt(np.mean(fit.at.residuals**2)))
             raise IdentificationError(
@@ -224,6 +242,7 @@ class _Adjustment:
             before=np.where(seen, before, np.nan),
             residuals=np.where(seen, problem.gathered(problem.residuals(fit.u)), np.nan),
             noise=np.sqrt(noise.theta),
+            is_noise_believed=is_believed,
             used=used,
             rank=rank,
             condition=float(s[0] / s[rank - 1]) if rank else float("inf"),
@@ -270,6 +289,7 @@ class _Adjustment:
         noise = instrument_noise(problem, self._theta, self._everything)
         u = self._fit(np.zeros(len(problem.columns)), noise, is_rough=True).u
         scale = problem.gathered(np.sqrt(noise.shape * np.append(noise.theta[1:], 1.0)[noise.instrument]))
+        is_believed = self._belief() is not None
         is_long = self._everything.sum() > _MANY * len(problem.columns)
         for _ in range(0 if is_long else _L1_ROUNDS):
             size = self._sizes(u, scale)
@@ -283,6 +303,8 @@ class _Adjustment:
         for _ in range(_SEARCHES):
             size = self._sizes(u, scale)
             typical = self._medians(np.where(used, size, np.nan))[problem.observations.instrument]
+            if is_believed:  # a fit through few lines leaves less of them than their noise
+                typical = np.maximum(typical, np.sqrt(chdtri(count, 0.5)))
             limit = np.sqrt(chdtri(count, _RISK / len(size)) / chdtri(count, 0.5))
             now = size <= np.maximum(2.0 * limit * typical, 1e-5 / scale[:, 0])
             problem.active = self._everything & now[:, None]
@@ -309,21 +331,24 @@ class _Adjustment:
         problem = self._problem
         problem.active = self._everything & used[:, None]
         noise, found, before = instrument_noise(problem, self._theta, problem.active), None, np.inf
-        fit = self._fit(u, noise)
+        fit, belief = self._fit(u, noise), self._belief()
         for _ in range(_ROUNDS if self._estimated else 0):
             theta = noise.theta.copy()
             e = fit.at.residuals[noise.instrument >= 0]
             rms = float(np.sqrt(np.mean(e**2)))
-            if theta[1:].max() <= 1.01 * FLOOR**2 or (rms < _ROUNDING and rms > 0.5 * before):
+            is_rounding = theta[1:].max() <= 1.01 * FLOOR**2 or (rms < _ROUNDING and rms > 0.5 * before)
+            if belief is None and is_rounding:
                 break
             before, is_settled = rms, False
-            if rms < _ROUNDING or rms < _NO_NOISE * np.sqrt(theta[self._estimated].max()):
+            is_exact = rms < _ROUNDING or rms < _NO_NOISE * np.sqrt(theta[self._estimated].max())
+            if belief is None and is_exact:
                 theta[self._estimated] = max(_PRIOR_FADES * rms, FLOOR) ** 2
                 theta[JOINT] = 0.0 if JOINT in self._estimated else theta[JOINT]
             else:
                 if JOINT in self._estimated and theta[JOINT] == 0.0:
                     theta[JOINT] = 0.01 * theta[1:].max()
-                found = variance_components(fit.at, fit.u, noise.with_variances(theta), self._estimated)
+                there = noise.with_variances(theta)
+                found = variance_components(fit.at, fit.u, there, self._estimated, belief)
                 change = np.abs(found.theta - theta)[self._estimated]
                 is_settled = bool(np.all(change < _SETTLED * np.sqrt(np.diag(found.covariance))))
                 theta = found.theta
@@ -333,4 +358,4 @@ class _Adjustment:
                 fit = replace(fit, is_converged=True)  # nothing is left to explain
             if is_settled:
                 break
-        return fit, noise, found
+        return fit, noise, found, belief is not None

@@ -236,3 +236,15 @@ def test_noise_that_lines_say_is_shown_as_they_say_it():
     assert shown["tracker"] == pytest.approx(5e-5, rel=1e-12)
     assert shown["camera"] == pytest.approx(25e-5, rel=0.3)
     assert shown["bar"] == pytest.approx(5e-6, rel=0.6)
+
+
+@pytest.mark.parametrize("count", [9, 11])
+def test_few_lines_are_not_taken_for_exact(count: int):
+    """As many numbers as parameters leave nothing over: that shows neither exactness nor gross errors."""
+    for seed in range(3):
+        _, seen = observed(count=count, seed=seed, noise=5e-5, instruments=("tracker",))
+        seen = part_of(seen, seen.target == 0)
+        found = identify_with_instruments(load_robot("irb1200"), replace(seen, targets=("a",)))
+        assert found.is_noise_believed
+        assert found.noise[1] > 3e-5
+        assert found.outliers == ()
