@@ -396,4 +396,4 @@ class _Search:
 
 def _misfit(at: Linearised, noise: NoiseModel) -> float:
     whitened = np.einsum("nij,nj->ni", noise.whitening(at.J), at.residuals)
-    return float(np.sqrt(np.sum(whitened**2) / max(whitened.size - _REDUNDANCY_OF_A_POSE, 1)))
+    return float(np.sqrt(np.sum(whitened**2) / max(whitened.size - taken(at, noise), 1.0)))
