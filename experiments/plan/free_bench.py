@@ -14,7 +14,7 @@ from statistics import median
 import numpy as np
 
 from experiments.feedforward.rectangle import working_position
-from experiments.plan.legs import Leg, legs_between
+from experiments.plan.legs import Leg, Stop, legs_between
 from experiments.plan.study import LegResult, Plan, study_legs
 from robots.description.model import RobotModel, load_robot
 from robots.kinematics.forward import Kinematics
@@ -50,7 +50,8 @@ def drawn_legs(robot: RobotModel, pairs: int, seed: int) -> Iterator[Leg]:
         if np.linalg.norm(goal[:3, 3] - start[:3, 3]) < _APART * size:
             continue
         try:
-            (leg,) = legs_between(robot, [("start", start), (f"pose {found + 1}", goal)], home)
+            stops = [Stop("start", start, True), Stop(f"pose {found + 1}", goal, True)]
+            (leg,) = legs_between(robot, stops, home)
             require_in_range(robot, leg.path)
         except PathError:
             continue

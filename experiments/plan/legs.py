@@ -8,8 +8,10 @@ import numpy as np
 from experiments.feedforward.rectangle import rectangle, working_position
 from robots.configuration.suggestion import did_you_mean
 from robots.description.model import NUM_JOINTS, RobotModel
+from robots.dynamics.compliant_kinematics import CompliantKinematics, controller_kinematics
 from robots.dynamics.newton_inverse import InverseSolver, inverse_kinematics
 from robots.kinematics.analytic_inverse import JointLimitError, UnreachableError
+from robots.kinematics.forward import Kinematics
 from robots.planning.joint_path import (
     Curve,
     PathError,
@@ -17,7 +19,7 @@ from robots.planning.joint_path import (
     smooth_curve,
     straight_joint_path,
 )
-from robots.programs.program import Target
+from robots.programs.program import Move, Program, Target
 from robots.programs.read import SUFFIXES, read_program
 from systems.reference.segment import Segment, line, weights
 
@@ -42,6 +44,21 @@ class Leg:
     is_straight: bool
 
 
+@dataclass(frozen=True)
+class Stop:
+    """A place at which the robot rests.
+
+    Attributes:
+        name: for people.
+        place: pose of the tool in the world (4, 4), or joint positions in rad (6,).
+        is_straight: whether the tool goes there along a straight line, or the joints in proportion.
+    """
+
+    name: str
+    place: np.ndarray
+    is_straight: bool
+
+
 def legs_of(robot: RobotModel, path: str) -> list[Leg]:
     """The legs of a path.
 
@@ -57,7 +74,7 @@ def legs_of(robot: RobotModel, path: str) -> list[Leg]:
     elif path == RECTANGLE:
         home = working_position(robot)
         poses = [corner.pose() for corner in rectangle(robot, home)]
-        legs = legs_between(robot, [(f"corner {i}", pose) for i, pose in enumerate(poses, 1)], home)
+        legs = legs_between(robot, [Stop(f"corner {i}", pose, True) for i, pose in enumerate(poses, 1)], home)
     elif path.lower().endswith(SUFFIXES):
         legs = _program_legs(robot, path)
     else:
@@ -75,12 +92,23 @@ def legs_of(robot: RobotModel, path: str) -> list[Leg]:
 
 def _program_legs(robot: RobotModel, path: str) -> list[Leg]:
     program = read_program(path)
-    if len(program.targets) < 2:
-        raise ValueError(f"{path}: a motion needs at least two targets, got {len(program.targets)}")
-    first = program.targets[0]
-    home = first.q if first.has_joints else working_position(robot)
-    named = [(f"{path}, line {each.line}", _place(each)) for each in program.targets]
-    return legs_between(robot, named, home)
+    moves = program.moves or tuple(Move(each.line, each, not each.has_joints) for each in program.targets)
+    stops = [_stop(program, move) for move in moves]
+    if len(stops) < 2:
+        raise ValueError(f"{path}: a motion needs at least two targets, got {len(stops)}")
+    first = stops[0].place
+    return legs_between(robot, stops, first if first.ndim == 1 else working_position(robot))
+
+
+def _stop(program: Program, move: Move) -> Stop:
+    """Where a move ends; a move that is left out would be another way in space."""
+    where = f"{program.name}, line {move.line}"
+    if move.why_not or move.target is None:
+        raise ValueError(f"{where}: {move.why_not}")
+    place = _place(move.target)
+    if not np.isfinite(place).all():
+        raise ValueError(f"{where}: a number is infinite")
+    return Stop(where, place, move.is_straight)
 
 
 def _place(target: Target) -> np.ndarray:
@@ -90,22 +118,36 @@ def _place(target: Target) -> np.ndarray:
     return target.base.X @ target.X_BT @ np.linalg.inv(X_tool)
 
 
-def legs_between(robot: RobotModel, places: list[tuple[str, np.ndarray]], home: np.ndarray) -> list[Leg]:
-    """Legs between places: poses (4, 4), or joint positions (6,) in rad."""
-    inverse, legs, q = inverse_kinematics(robot), [], home
-    is_first = True
-    for (before, start), (name, goal) in pairwise(places):
-        if is_first:
-            q = start if start.ndim == 1 else _reached(inverse, start, q, before)
-            is_first = False
-        if goal.ndim == 1 or start.ndim == 1:
-            end = goal if goal.ndim == 1 else _reached(inverse, goal, q, name)
-            path, is_straight = straight_joint_path(q, end), False
+def legs_between(robot: RobotModel, stops: list[Stop], home: np.ndarray) -> list[Leg]:
+    """Legs between stops, the first of which is where the robot begins.
+
+    Args:
+        robot: that moves.
+        stops: two or more.
+        home: joint positions in rad, shape (6,), near which the robot begins if it does so at a pose.
+
+    Raises:
+        PathError: if a stop or a line to one cannot be reached; with its name.
+    """
+    inverse, kinematics, legs = inverse_kinematics(robot), controller_kinematics(robot), []
+    q = _joints(inverse, stops[0], home)
+    for before, stop in pairwise(stops):
+        if stop.is_straight:
+            start, goal = (_pose_of(kinematics, each.place) for each in (before, stop))
+            path = _line_path(inverse, line(start, goal), q, stop.name)
         else:
-            path, is_straight = _line_path(inverse, line(start, goal), q, name), True
-        legs.append(Leg(f"to {name}", path, is_straight))
+            path = straight_joint_path(q, _joints(inverse, stop, q))
+        legs.append(Leg(f"to {stop.name}", path, stop.is_straight))
         q = path.at(np.array([1.0]))[0]
     return legs
+
+
+def _pose_of(kinematics: Kinematics | CompliantKinematics, place: np.ndarray) -> np.ndarray:
+    return kinematics.forward(place) if place.ndim == 1 else place
+
+
+def _joints(inverse: InverseSolver, stop: Stop, near: np.ndarray) -> np.ndarray:
+    return stop.place if stop.place.ndim == 1 else _reached(inverse, stop.place, near, stop.name)
 
 
 def _line_path(inverse: InverseSolver, segment: Segment, q_start: np.ndarray, name: str) -> Curve:

@@ -15,6 +15,7 @@ from robots.programs.program import (
     JOINTS,
     MILLIMETRE,
     Literal,
+    Move,
     Note,
     Program,
     ProgramContext,
@@ -26,6 +27,7 @@ from robots.programs.program import (
 _UNITS = {"mm": MILLIMETRE, "m": 1.0, "deg": DEGREE, "rad": 1.0, "": 1.0}
 _POSITION, _QUATERNION, _EULER = ("x", "y", "z"), ("qw", "qx", "qy", "qz"), ("alpha", "beta", "gamma")
 _NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?")
+_LEFT = ", row left alone"
 _COMMA = re.compile(r"[+-]?(\d+,\d*|,\d+)([eE][+-]?\d+)?")
 
 
@@ -38,7 +40,7 @@ def read_pose_table(source: Source, context: ProgramContext) -> Program:
     if context.others or context.tool or context.base:
         raise ProgramError(f"{source.name}: a table knows the tool of the robot file only, and the world")
     header: dict[str, int] = {}
-    separator, targets, notes = ",", [], []
+    separator, targets, notes, moves = ",", [], [], []
     for match in re.finditer(r"[^\r\n]+", source.text):
         line, text = source.line(match.start()), match.group()
         if not text.strip() or text.lstrip("\ufeff\xef\xbb\xbf ").startswith("#"):
@@ -47,14 +49,17 @@ def read_pose_table(source: Source, context: ProgramContext) -> Program:
             separator = next((each for each in ";,\t" if each in text), ",")
             header = _header(source, line, text.lstrip("\xef\xbb\xbf"), separator)
             continue
-        target = _row(line, _fields(text, match.start(), separator), header, separator)
+        fields = _fields(text, match.start(), separator)
+        target = _row(line, fields, header, separator)
         if isinstance(target, Note):
             notes.append(target)
+            moves.append(Move(line, None, why_not=target.text.removesuffix(_LEFT)))
         else:
             targets.append(target)
+            moves.append(Move(line, target, not target.has_joints, _surplus(fields, header)))
     if not targets:
         raise ProgramError(f"{source.name}: no row of numbers; {notes[0].text if notes else 'it is empty'}")
-    return Program(source.name, source.text, tuple(targets), tuple(notes))
+    return Program(source.name, source.text, tuple(targets), tuple(notes), tuple(moves))
 
 
 def _header(source: Source, line: int, text: str, separator: str) -> dict[str, int]:
@@ -106,22 +111,30 @@ def _row(
         literal = _literal(*fields[place], unit, separator) if place < len(fields) else None
         if literal is None:
             text = fields[place][1] if place < len(fields) else ""
-            return Note(line, f"{role} is not a number: '{text.strip()}', row left alone")
+            return Note(line, f"{role} is not a number: '{text.strip()}'{_LEFT}")
         numbers[role] = literal
     if "qw" in numbers and not any(numbers[role].value for role in _QUATERNION):
-        return Note(line, "the quaternion is zero, row left alone")
+        return Note(line, f"the quaternion is zero{_LEFT}")
     payloads: tuple[float, ...] = ()
     if "payload_kg" in columns:
         place = columns["payload_kg"]
         payload = _literal(*fields[place], 1.0, separator) if place < len(fields) else None
         if payload is None:
-            return Note(line, "payload_kg is not a number, row left alone")
+            return Note(line, f"payload_kg is not a number{_LEFT}")
         if payload.value < 0.0:
-            return Note(line, f"payload_kg must not be negative, got {payload.value:g}, row left alone")
+            return Note(line, f"payload_kg must not be negative, got {payload.value:g}{_LEFT}")
         payloads = (payload.value,)
     place = columns.get("name", len(fields))
     name = fields[place][1].strip().strip('"') if place < len(fields) else ""
     return Target(name, line, numbers, payloads=payloads)
+
+
+def _surplus(fields: list[tuple[int, str]], columns: Mapping[str, int]) -> str:
+    """What a row has beyond the columns: it may be that a decimal comma has shifted all of it."""
+    count = max(columns.values()) + 1
+    if not any(text.strip() for _, text in fields[count:]):
+        return ""
+    return f"there are {len(fields)} values for {count} columns"
 
 
 def _literal(start: int, text: str, unit: float, separator: str) -> Literal | None:

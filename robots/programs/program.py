@@ -146,6 +146,16 @@ class Target:
 
 
 @dataclass(frozen=True)
+class Move:
+    """One motion of a program, to a target or to what cannot be read."""
+
+    line: int
+    target: Target | None
+    is_straight: bool = False  # whether the tool goes along a line, or the joints in proportion
+    why_not: str = ""  # it cannot be followed; empty where it can
+
+
+@dataclass(frozen=True)
 class Program:
     """A program and the places in it that can be corrected, in the order of the text."""
 
@@ -153,6 +163,7 @@ class Program:
     text: str  # one character a byte
     targets: tuple[Target, ...]
     notes: tuple[Note, ...]  # what is left alone, and why
+    moves: tuple[Move, ...] = ()  # in the order in which they are made; of a table its rows
 
 
 @dataclass(frozen=True)
