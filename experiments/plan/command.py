@@ -35,9 +35,13 @@ def plan_command(
             "--path",
             metavar="rectangle|joints|FILE",
             help="A level rectangle; 20 degrees of axes 1 to 3 from the stretched arm; or a table, RAPID or "
-            "KRL, with a rest at each target.",
+            "KRL, with a rest at the end of each move.",
         ),
     ] = "rectangle",
+    others: Annotated[
+        list[Path] | None,
+        typer.Option("--with", metavar="FILE", help="Declares what a program does not. Repeatable."),
+    ] = None,
     objective: Annotated[
         str,
         typer.Option(
@@ -127,6 +131,7 @@ def plan_command(
             free,
             boxes,
             reserve > 0.0,
+            tuple(map(str, others or [])),
         )
         page = stack.enter_context(staged_file(report, *PAGE))
         table = stack.enter_context(staged_file(write, *TABLE)) if write else None

@@ -1,5 +1,6 @@
 """The legs of a path, from rest to rest: edges of a rectangle, a motion of joints, targets of a program."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 
@@ -59,12 +60,13 @@ class Stop:
     is_straight: bool
 
 
-def legs_of(robot: RobotModel, path: str) -> list[Leg]:
+def legs_of(robot: RobotModel, path: str, others: Sequence[str] = ()) -> list[Leg]:
     """The legs of a path.
 
     Args:
         robot: that moves.
         path: ``rectangle``, ``joints`` or a program or table of targets, at each of which the tool rests.
+        others: files that declare tools, frames and, in KRL, targets of the program.
 
     Raises:
         ValueError: if there is no such path, or the robot cannot follow it; with the place.
@@ -76,7 +78,7 @@ def legs_of(robot: RobotModel, path: str) -> list[Leg]:
         poses = [corner.pose() for corner in rectangle(robot, home)]
         legs = legs_between(robot, [Stop(f"corner {i}", pose, True) for i, pose in enumerate(poses, 1)], home)
     elif path.lower().endswith(SUFFIXES):
-        legs = _program_legs(robot, path)
+        legs = _program_legs(robot, path, others)
     else:
         raise ValueError(
             f"--path must be {RECTANGLE}, {JOINTS} or a file that ends in {', '.join(SUFFIXES)}, got '{path}'"
@@ -90,10 +92,14 @@ def legs_of(robot: RobotModel, path: str) -> list[Leg]:
     return legs
 
 
-def _program_legs(robot: RobotModel, path: str) -> list[Leg]:
-    program = read_program(path)
-    moves = program.moves or tuple(Move(each.line, each, not each.has_joints) for each in program.targets)
-    stops = [_stop(program, move) for move in moves]
+def _program_legs(robot: RobotModel, path: str, others: Sequence[str]) -> list[Leg]:
+    program = read_program(path, others)
+    if not program.moves:
+        raise ValueError(
+            f"{path}: no instruction moves, and what is declared has no order; give the program that moves "
+            "to it, or a table"
+        )
+    stops = [_stop(program, move) for move in program.moves]
     if len(stops) < 2:
         raise ValueError(f"{path}: a motion needs at least two targets, got {len(stops)}")
     first = stops[0].place

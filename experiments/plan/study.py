@@ -74,6 +74,7 @@ class Plan:
         is_free: whether the joints may go another way than the usual motion does.
         obstacles: that they keep clear of on it.
         is_for_law: whether a law follows the motion; else it runs open loop.
+        others: files that declare what the path, if it is a program, does not.
     """
 
     robot: RobotModel
@@ -88,6 +89,7 @@ class Plan:
     is_free: bool = False
     obstacles: tuple[Obstacle, ...] = ()
     is_for_law: bool = False
+    others: tuple[str, ...] = ()
 
     def sharpness(self, leg: Leg) -> tuple[int, float]:
         """Coefficients of a leg's spline, and times how much of the usual weight it is kept smooth."""
@@ -122,7 +124,7 @@ def study_plan(plan: Plan, progress: Callable[[float], None] | None = None) -> l
         ValueError: if something that is asked for does not exist, or a leg is impossible; with the place.
     """
     one_of("--objective", OBJECTIVES, plan.objective)
-    return study_legs(plan, legs_of(plan.robot, plan.path), progress)
+    return study_legs(plan, legs_of(plan.robot, plan.path, plan.others), progress)
 
 
 def study_legs(

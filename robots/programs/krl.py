@@ -12,6 +12,8 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from robots.pose import rotation_from_zyx
+from robots.programs.course import Course
+from robots.programs.krl_course import is_straight, not_followed, steer
 from robots.programs.program import (
     DEGREE,
     JOINTS,
@@ -114,6 +116,7 @@ class _Reader:
         self._places: dict[str, list[_Place]] = {}
         self._inline: list[_Place] = []
         self._state = _State()
+        self._course = Course()
 
     def program(self) -> Program:
         """The targets with their frames."""
@@ -124,12 +127,17 @@ class _Reader:
         for lines in files:
             self._state = _State()
             for line in lines:
+                if line.source is self._source:
+                    steer(self._course, line.number, line.code)
                 self._follow(line)
-        places = [place for group in self._places.values() for place in group] + self._inline
+        known = [place for group in self._places.values() for place in group] + self._inline
+        places = [place for place in known if place.line.source is self._source]
         places.sort(key=lambda place: min(each.start for each in place.numbers.values()))
         targets = [target for target in map(self._target, places) if target is not None]
         notes = sorted(set(self._notes), key=lambda note: note.line)
-        return Program(self._source.name, self._source.text, tuple(targets), tuple(notes))
+        return Program(
+            self._source.name, self._source.text, tuple(targets), tuple(notes), self._course.moves()
+        )
 
     def _note(self, line: _Line, text: str) -> None:
         if line.source is self._source:
@@ -142,7 +150,7 @@ class _Reader:
         name = re.sub(r"\s", "", match["name"]).upper()
         value = _aggregate(line, match.start("value"))
         self._values[name] = value
-        if line.source is not self._source or name.startswith("$") or "_DATA[" in name:
+        if name.startswith("$") or "_DATA[" in name:
             return
         kind = (match["type"] or "").strip().upper()
         roles = _roles(value)
@@ -167,6 +175,7 @@ class _Reader:
         match = _MOVE.match(line.code)
         if match and match["relative"]:
             self._note(line, "moves by a distance from where the robot is, left alone")
+            self._go(line, None, "moves by a distance from where the robot is, which is not followed")
         elif match:
             self._move(line, match.end())
 
@@ -187,6 +196,7 @@ class _Reader:
             self._state = self._of_fdat(self._values[value.upper()]) or self._state
         elif not value.startswith("{"):
             base = re.split(r"[.\[]", name)[0]
+            self._course.assign(base)
             for place in self._places.pop(base, []):
                 self._note(place.line, f"{place.name} is given another value by the program, left alone")
 
@@ -227,8 +237,9 @@ class _Reader:
 
     def _move(self, line: _Line, at: int) -> None:
         """The places that a motion names or holds; two of them in a circle."""
-        is_circle = "CIRC" in line.code[:at].upper()
-        for start, end in _parts(line.code, at, len(line.code))[: 2 if is_circle else 1]:
+        is_circle, arrival, why = "CIRC" in line.code[:at].upper(), None, ""
+        spans = _parts(line.code, at, len(line.code))
+        for start, end in spans[: 2 if is_circle else 1]:
             at = start + len(line.code[start:end]) - len(line.code[start:end].lstrip())
             places, name = [], _NAME.match(line.code, at, end)
             if line.code[at:end].startswith("{"):
@@ -237,21 +248,45 @@ class _Reader:
                     self._note(line, "gives parts of a pose, or expressions, left alone")
                 elif line.source is self._source:
                     self._inline.append(_Place("", line, roles))
-                    places = self._inline[-1:]
+                    arrival, places = self._inline[-1], self._inline[-1:]
             elif name:
                 at = name.end()
                 whole = name[1].upper()
                 places = self._places.get(whole) or self._places.get(whole.split("[")[0], [])
+                arrival = places[0] if len(places) == 1 and whole in self._places else None
             if line.code[at:end].lstrip().startswith(":"):
                 self._note(line, "moves beside the target, by a sum of frames: shifted with it, no more")
+                why = "moves beside the target, by a sum of frames, which is not followed"
             for place in places:
                 place.uses.append((line, self._state))
+        start, end = spans[0]
+        text = re.sub(r"\s+C_\w+\s*$", "", line.code[start:end])
+        self._go(line, arrival, why, text)
+
+    def _go(self, line: _Line, place: _Place | None, why: str, text: str = "") -> None:
+        """Takes a motion into the course of the file; ``text`` is where to, ``why`` it is not followed."""
+        if line.source is not self._source:
+            return
+        fdat = self._fdat(place) if place else None
+        state = self._of_fdat(fdat) if fdat else self._state
+        why = why or ("" if state else "belongs to a tool that stands still, which is not followed")
+        state = state or self._state
+        has_tool = place is not None and ("q1" in place.numbers or state.tool is not None)
+        why = why or not_followed(line.code, text, place is not None, has_tool)
+        numbers = place.numbers if place else {}
+        target = Target(place.name if place else "", line.number, numbers, state.tool, state.base or WORLD)
+        self._course.move(line.number, target if place else None, is_straight(line.code), why)
+
+    def _fdat(self, place: _Place) -> _Value | None:
+        """The frame data that belong to a taught target."""
+        name = place.name.upper()
+        value = self._values.get(f"F{name[1:]}") if name.startswith("X") else None
+        return value if value and "TOOL_NO" in value.numbers else None
 
     def _target(self, place: _Place) -> Target | None:
         """The target with its frames; None where nothing says its tool."""
-        name = place.name.upper()
-        fdat = self._values.get(f"F{name[1:]}") if name.startswith("X") else None
-        if fdat is not None and "TOOL_NO" in fdat.numbers:
+        fdat = self._fdat(place)
+        if fdat:
             state = self._of_fdat(fdat)
             if state is None:
                 self._note(place.line, f"{place.name} belongs to a tool that stands still, left alone")

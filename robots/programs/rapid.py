@@ -11,6 +11,7 @@ from itertools import pairwise
 import numpy as np
 from scipy.spatial.transform import Rotation
 
+from robots.programs.course import Course
 from robots.programs.program import (
     DEGREE,
     JOINTS,
@@ -26,6 +27,7 @@ from robots.programs.program import (
     Target,
     homogeneous,
 )
+from robots.programs.rapid_course import is_motion, is_straight, not_followed, note_call, steer
 from robots.programs.rapid_text import (
     KEYWORDS,
     Other,
@@ -82,6 +84,10 @@ class _Place:
     numbers: dict[str, Literal]
     uses: list[_Use] = field(default_factory=list)
 
+    def start(self) -> int:
+        """Where in the text its first number is."""
+        return min(each.start for each in self.numbers.values())
+
 
 def read_rapid(source: Source, context: ProgramContext) -> Program:
     """Reads a module.
@@ -103,6 +109,7 @@ class _Reader:
         self._places: dict[str, list[_Place]] = {}  # by the small letters of the name
         self._inline: list[_Place] = []
         self._gripped = 0.0
+        self._course = Course()
         self._parsed = [(each, list(statements(each))) for each in (source, *context.others)]
 
     def program(self) -> Program:
@@ -118,12 +125,17 @@ class _Reader:
         for source, found in self._parsed:
             self._gripped = 0.0
             for statement in found:
+                is_brief = source is self._source and steer(self._course, source, statement)
                 self._follow(source, statement)
+                if is_brief:
+                    self._course.close()
         places = [place for group in self._places.values() for place in group] + self._inline
-        places.sort(key=lambda place: min(each.start for each in place.numbers.values()))
+        places.sort(key=_Place.start)
         targets = [target for target in map(self._target, places) if target is not None]
         notes = sorted(set(self._notes), key=lambda note: note.line)
-        return Program(self._source.name, self._source.text, tuple(targets), tuple(notes))
+        return Program(
+            self._source.name, self._source.text, tuple(targets), tuple(notes), self._course.moves()
+        )
 
     def _note(self, source: Source, line: int, text: str) -> None:
         if source is self._source:
@@ -212,8 +224,11 @@ class _Reader:
             if is_argument and after.word not in KEYWORDS:
                 self._instruction(source, token, statement[at + 1 :])
                 return
+        if source is self._source:
+            note_call(self._course, source, statement)
 
     def _assigned(self, source: Source, name: Token) -> None:
+        self._course.assign(name.word)
         for place in self._places.pop(name.word, []):
             text = f"{place.name} is given another value by the program, left alone"
             self._note(self._source, place.line, text)
@@ -230,9 +245,13 @@ class _Reader:
         if name.word == "gripload" and positional:
             self._gripped = self._mass(positional[0][0].text, where)
         if name.word in _DISPLACING:
-            self._note(source, line, f"{name.text} displaces what follows, which is not taken into account")
+            text = f"{name.text} displaces what follows, which is not taken into account"
+            self._note(source, line, text)
+            if source is self._source:
+                self._course.move(line, None, why_not=text)
         places = [place for part in positional for place in self._moved_to(source, line, name.word, part)]
         if not places:
+            self._moves(source, line, name, positional, None)
             return
         tool = self._tool_of(name.word, positional, where)
         base, payload = WORLD, self._gripped
@@ -242,8 +261,35 @@ class _Reader:
             payload = self._mass(options["tload"][0].text, where)
         elif tool is not None:
             payload += self._mass(tool.name, where)
+        use = _Use(where, tool, base, payload)
         for place in places:
-            place.uses.append(_Use(where, tool, base, payload))
+            place.uses.append(use)
+        self._moves(source, line, name, positional, use)
+
+    def _moves(
+        self, source: Source, line: int, name: Token, positional: Sequence[Sequence[Token]], use: _Use | None
+    ) -> None:
+        """Takes an instruction into the course of the module; ``use`` is None if no target is in it."""
+        if source is not self._source:
+            return
+        if not is_motion(name.word) and use is None:
+            self._course.call(name.word, line, may_move=False)
+            return
+        part = positional[0] if positional else []
+        place = self._arrival(part)
+        tool, base = (use.tool, use.base) if use else (None, WORLD)
+        target = Target(place.name, line, place.numbers, tool, base) if place else None
+        self._course.move(line, target, is_straight(name.word), not_followed(name, part, target))
+
+    def _arrival(self, part: Sequence[Token]) -> _Place | None:
+        """The one target that an argument names, as it is or as the pose of a jointtarget, or holds."""
+        if len(part) > 3 and part[0].word == "calcrobt" and part[3].text == ",":
+            part = part[2:3]
+        if part and part[0].text == "[":
+            return next((each for each in self._inline[-1:] if each.start() > part[0].start), None)
+        name = "".join(token.word for token in part)
+        group = self._places.get(part[0].word, []) if part else []
+        return next((place for place in group if place.name.lower() == name), None)
 
     def _tool_of(self, name: str, positional: Sequence[Sequence[Token]], where: str) -> Frame | None:
         for part in positional:

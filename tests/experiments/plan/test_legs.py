@@ -2,11 +2,15 @@
 
 from pathlib import Path
 
+import numpy as np
 import pytest
 
-from experiments.plan.legs import legs_of
+from experiments.plan.legs import Leg, legs_of
 from robots.description.model import load_robot
+from robots.kinematics.forward import Kinematics
+from tests.robots.programs.test_languages import EXTERNAL
 
+KR16 = load_robot("kr16")
 HEAD = "q1_deg,q2_deg,q3_deg,q4_deg,q5_deg,q6_deg"
 POSES = "x_mm,y_mm,z_mm,qw,qx,qy,qz"
 UNREADABLE = {
@@ -29,5 +33,63 @@ def test_a_way_point_that_cannot_be_read_is_refused_and_never_passed_by(
     table = tmp_path / "way.csv"
     table.write_text("\n".join([head, first, row, last, ""]))
     with pytest.raises(ValueError, match="line 3") as refused:
-        legs_of(load_robot("kr16"), str(table))
+        legs_of(KR16, str(table))
     assert str(refused.value).startswith(f"{table}, line 3: {why}")
+
+
+A, C = [1.12, -0.377, 0.804], [1.195, 0.377, 1.257]  # m
+DECLARED = "\n".join(
+    f"CONST robtarget {name}:=[[{place}],[0,0,1,0],[0,0,0,0],{EXTERNAL}];"
+    for name, place in {"a": "1120,-377,804", "c": "1195,377,1257"}.items()
+)
+JOINTS = f"CONST jointtarget j:=[[10,-70,80,0,40,0],{EXTERNAL}];"
+
+
+def written(folder: Path, name: str, text: str) -> str:
+    (folder / name).write_text(text)
+    return str(folder / name)
+
+
+def places(legs: list[Leg]) -> np.ndarray:
+    ends = [legs[0].path.at(np.zeros(1)), *(leg.path.at(np.ones(1)) for leg in legs)]
+    return Kinematics(KR16).forward(np.concatenate(ends))[:, :3, 3]
+
+
+def test_a_program_is_planned_as_it_moves_not_as_it_declares(tmp_path: Path):
+    """A joint move to a pose ends there too, but not along a line; a line may begin where joints do."""
+    moves = ["MoveL c", "MoveL a", "MoveJ c", "MoveAbsJ j", "MoveL a", "MoveL CalcRobT(j,tool0)"]
+    body = "".join(f"{move},v100,fine,tool0;\n" for move in moves)
+    text = f"MODULE m\n{DECLARED}\n{JOINTS}\nPROC main()\n{body}ENDPROC\nENDMODULE\n"
+    legs = legs_of(KR16, written(tmp_path, "m.mod", text))
+    j = Kinematics(KR16).forward(np.deg2rad([10.0, -70.0, 80.0, 0.0, 40.0, 0.0]))[:3, 3]
+    assert places(legs) == pytest.approx(np.array([C, A, C, j, A, j]), abs=1e-6)
+    assert [leg.is_straight for leg in legs] == [True, False, False, True, True]
+    assert legs[0].name == f"to {tmp_path / 'm.mod'}, line 7"
+
+
+def test_krl_goes_to_the_targets_of_its_data_list(tmp_path: Path):
+    pose = "A 0,B 180,C 0}"
+    a, c = f"{{X 1120,Y -377,Z 804,{pose}", f"{{X 1195,Y 377,Z 1257,{pose}"
+    data = f"DEFDAT m\nDECL E6POS XA={a}\nDECL E6POS XC={c}\nENDDAT"
+    source = "DEF m()\n$TOOL=$NULLFRAME\nLIN XC\nLIN XA C_DIS\nPTP XC\nEND\n"
+    path = written(tmp_path, "m.src", source)
+    legs = legs_of(KR16, path, [written(tmp_path, "m.dat", data)])
+    assert places(legs) == pytest.approx(np.array([C, A, C]), abs=1e-6)
+    with pytest.raises(ValueError, match=r"m\.src, line 3: LIN goes to XC, which is no target .*--with FILE"):
+        legs_of(KR16, path)
+
+
+@pytest.mark.parametrize(
+    ("moves", "why"),
+    [
+        (
+            "PROC main()\nMoveL a,v1,fine,tool0;\nMoveL Offs(a,0,0,300),v1,fine,tool0;\nENDPROC",
+            "line 6: MoveL goes",
+        ),
+        ("", "no instruction moves, and what is declared has no order"),
+    ],
+)
+def test_a_program_whose_moves_are_not_all_known_is_refused(tmp_path: Path, moves: str, why: str):
+    text = f"MODULE m\n{DECLARED}\n{moves}\nENDMODULE\n"
+    with pytest.raises(ValueError, match=why):
+        legs_of(KR16, written(tmp_path, "m.mod", text))
