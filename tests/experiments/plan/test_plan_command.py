@@ -1,12 +1,15 @@
 """truetip plan: quicker and more frugal in the same limits, driven by the plant; wrong input is one line."""
 
+import io
 import json
 from pathlib import Path
 
 import numpy as np
 import pytest
+from rich.console import Console
 from typer.testing import Result
 
+from experiments.plan.command import result_table
 from experiments.plan.study import STILL
 from systems.reference.paths import ReferenceConfig, make_path
 from systems.reference.shapes import Planned
@@ -85,6 +88,17 @@ def test_a_law_keeps_to_a_planned_line_that_leaves_it_the_usual_reserve(tmp_path
     for law in json.loads(driven.stdout)["runs"].values():
         assert law["true"]["max_norm_mm"] < 40.0
         assert max(law["true"]["static_mm"]) < 0.3
+
+
+@pytest.mark.parametrize("width", [30, 80, 200])
+def test_the_table_folds_names_and_never_cuts_a_number_off(width: int):
+    numbers = ["12.345", "13.456", "-35.2", "123456", "234567", "+123.4", "0.010", "0.011"]
+    name = "to /home/somebody/robots/programs/welding_of_the_left_door.mod, line 123"
+    console = Console(width=width, file=io.StringIO(), record=True)
+    console.print(result_table("welding", [[name, *numbers, "kept"]] * 2, width), crop=False)
+    text = console.export_text()
+    assert all(text.count(each) == 2 for each in numbers)
+    assert "…" not in text
 
 
 TABLES = {
