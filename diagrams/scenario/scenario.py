@@ -19,7 +19,7 @@ from systems.cell.encoders import EncoderConfig
 from systems.cell.events.station_events import StationEvent
 from systems.cell.network_faults import FaultConfig
 from systems.cell.overview.overview_camera import OverviewConfig
-from systems.cell.pose_camera import PoseCameraConfig
+from systems.cell.pose_camera import PoseCameraConfig, no_window
 from systems.controller_model import ControllerModelConfig
 from systems.feedforward import FEEDFORWARDS, FeedforwardConfig
 from systems.guard.guard import GuardConfig
@@ -149,6 +149,9 @@ def _contradiction(scenario: Scenario) -> tuple[list[str | int], str] | None:
             f"servo.guard.hold_after={guard.hold_after:g} s must be below servo.guard.stop_after="
             f"{guard.stop_after:g} s"
         )
+    for number, window in enumerate(getattr(scenario.station.camera, "dropouts", ())):
+        if no_window(window):
+            return ["station", "camera", "dropouts", number], f"station.camera.dropouts: {no_window(window)}"
     try:
         LAWS.find(scenario.law)
     except ValueError as error:

@@ -18,18 +18,20 @@ class OptionSetting(str):
     """A change such as ``reference.laps=2`` that another option than ``--set`` has made; messages name it."""
 
     option: str
+    _by: str
 
     def __new__(cls, key: str, value: object, option: str) -> "OptionSetting":
-        """The change ``key=value`` by an option such as ``--laps``."""
+        """The change ``key=value`` by an option such as ``--laps``, or ``--faults loss=``."""
         # An empty name is a name that does not exist, and not what YAML makes of nothing.
         made = super().__new__(cls, f"{key}={repr('') if value == '' else value}")
-        made.option = f"{option} {value}"
+        made._by = option
+        made.option = f"{option}{value}" if option.endswith("=") else f"{option} {value}"
         return made
 
     def __getnewargs__(self) -> tuple[str, str, str]:
         """For other processes."""
         key, _, value = self.partition("=")
-        return key, value, self.option.partition(" ")[0]
+        return key, value, self._by
 
 
 def shipped_scenarios() -> list[str]:

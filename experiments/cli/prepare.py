@@ -12,7 +12,7 @@ from diagrams.scenario.scenario import Scenario, ScenarioError, load_scenario, s
 from diagrams.scenario.scenario_file import OptionSetting, read_scenario_nodes, stated_keys
 from experiments.cli.console import print_note
 from robots.description.foreign_sources import foreign_sources_note
-from robots.description.model import RobotModel, load_robot
+from robots.description.model import RobotFileError, RobotModel, load_robot
 from robots.kinematics.error_kinematics import ErrorKinematics
 
 QUICK_SPEEDUP = 4.0  # of the acceleration along the path
@@ -90,7 +90,7 @@ def prepare(
     """
     scenario = load_scenario(name, list(settings))
     differences = list(settings)
-    model = load_robot(robot or scenario.robot)
+    model = load_robot(robot) if robot else _robot_of(name, settings, scenario)
     if robot is not None:
         if model.calibration.of:  # it is what the controller knows, whatever the scenario says
             belief = replace(scenario.servo.model, robot="")
@@ -107,6 +107,17 @@ def prepare(
         differences.append(f"quick: {note}")
     title = Path(name).stem + (f" ({'; '.join(differences)})" if differences else "")
     return Prepared(title, scenario, model, carried)
+
+
+def _robot_of(name: str, settings: Sequence[str], scenario: Scenario) -> RobotModel:
+    """The robot of a scenario. Raises RobotFileError, with the place that names it."""
+    try:
+        return load_robot(scenario.robot)
+    except RobotFileError as error:
+        node = read_scenario_nodes(name, list(settings), Scenario)
+        if "robot" not in node.value:
+            raise
+        raise RobotFileError(f"{node.at(['robot']).place}: robot: {error}") from error
 
 
 def _fitted(

@@ -140,9 +140,9 @@ def fault_settings(faults: str | None) -> list[OptionSetting]:
     for part in filter(None, map(str.strip, (faults or "").split(","))):
         name, equals, value = map(str.strip, part.partition("="))
         if not equals or name not in known:
-            guess = did_you_mean(name, known)
+            guess = ", which has no value" if name in known else did_you_mean(name, known)
             raise ValueError(f"--faults takes NAME=VALUE with names {', '.join(known)}, got '{part}'{guess}")
-        settings.append(OptionSetting(f"station.faults.{name}", value, "--faults"))
+        settings.append(OptionSetting(f"station.faults.{name}", value, f"--faults {name}="))
     return settings
 
 

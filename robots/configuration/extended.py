@@ -31,13 +31,16 @@ class FileKind:
     read: Callable[[Path, str], Node] = read_nodes
 
 
-def read_extended(name: str, kind: FileKind, beside: Path | None = None, depth: int = 0) -> Node:
+def read_extended(name: str, kind: FileKind) -> Node:
     """The nodes of a file on top of those of the file that it names after ``extends``, if it does.
 
     Raises:
         ConfigurationError: if a file is missing or no mapping, or files extend each other in a circle.
     """
-    path, label = kind.find(name, beside or Path())
+    return _read(*kind.find(name, Path()), kind, 0)
+
+
+def _read(path: Path, label: str, kind: FileKind, depth: int) -> Node:
     if depth > _DEEPEST:
         raise ConfigurationError(f"{label}: 'extends' runs in a circle")
     node = kind.read(path, label)
@@ -45,11 +48,25 @@ def read_extended(name: str, kind: FileKind, beside: Path | None = None, depth: 
         raise ConfigurationError(f"{label}: must be a mapping of keys to values")
     own = Node({key: entry for key, entry in node.value.items() if key != "extends"}, node.place)
     own = kind.renamed(own)
-    base = node.value.get("extends")
-    if base is None or not base.value:
+    base = _base(node)
+    if base is None:
         return own
-    below = read_extended(str(base.value), kind, path.parent, depth + 1)
+    try:
+        found = kind.find(base.value, path.parent)
+    except ConfigurationError as error:
+        raise base.refuse(f"extends: {error}") from error
+    below = _read(*found, kind, depth + 1)
     return merged(below, own, kind.schema, merges_lists=kind.merges_lists)
+
+
+def _base(node: Node) -> Node | None:
+    """What stands after ``extends``; None if nothing does. Raises ConfigurationError if it is no name."""
+    base = node.value.get("extends") if isinstance(node.value, dict) else None
+    if base is None or base.value in (None, ""):
+        return None
+    if not isinstance(base.value, str):
+        raise base.refuse(f"extends must be the name of one file, got {base.plain!r}")
+    return base
 
 
 def extends(name: str, kind: FileKind) -> str | None:
@@ -59,9 +76,8 @@ def extends(name: str, kind: FileKind) -> str | None:
         ConfigurationError: if there is no such file, or it cannot be read.
     """
     path, label = kind.find(name, Path())
-    value = kind.read(path, label).value
-    base = value.get("extends") if isinstance(value, dict) else None
-    if base is None or not base.value:
+    base = _base(kind.read(path, label))
+    if base is None:
         return None
-    beside = path.parent / str(base.value)
+    beside = path.parent / base.value
     return str(beside if beside.is_file() else base.value)

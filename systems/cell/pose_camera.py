@@ -27,7 +27,7 @@ class ExposureConfig:
 
     period: float = quantity(4e-3, 5e-4, 1.0, "s")  # between exposures
     delay: float = quantity(4e-3, 0.0, 1.0, "s")  # transport delay: from exposure to arrival
-    dropout_probability: float = quantity(0.0, 0.0, 1.0)  # of a single sample to be lost
+    dropout_probability: float = quantity(0.0, 0.0, 0.999)  # of a single sample to be lost
     dropouts: list[list[float]] = field(default_factory=list)  # s, windows [start, end) without a sample
     # By which its stamps are ahead of the robot's clock
     clock_offset: float = quantity(0.0, -10.0, 10.0, "s")
@@ -47,8 +47,15 @@ class ExposureConfig:
         if not 0.0 <= self.dropout_probability < 1.0:
             raise ValueError(f"camera: dropout_probability must be in [0, 1), got {self.dropout_probability}")
         for window in self.dropouts:
-            if len(window) != 2 or not window[0] < window[1]:
-                raise ValueError(f"camera: a drop-out must be [start, end] with start < end, got {window}")
+            if no_window(window):
+                raise ValueError(f"camera: {no_window(window)}")
+
+
+def no_window(times: list[float]) -> str:
+    """Why times in s are no window of a drop-out; empty if they are."""
+    if len(times) == 2 and times[0] < times[1]:
+        return ""
+    return f"a drop-out must be [start, end] with start < end, got {times}"
 
 
 @dataclass

@@ -112,10 +112,10 @@ def test_an_event_must_say_what_it_is():
             "!PayloadChange {at: 99, payload: 1}",
             r"\[0\] \(PayloadChange\): at must be .* before the end",
         ),
-        ("!PayloadChange {at: 1, payload: -1}", "payload must not be negative, got -1"),
+        ("!PayloadChange {at: 1, payload: -1}", r"events\[0\].payload must be between 0 and 1000 kg, got -1"),
         ("!PayloadChange {at: 1, payload: 99}", "payload of .* must be between 0 and 7.0 kg, got 99"),
-        ("!ToolShift {at: -1}", r"\(ToolShift\): at must be after 0"),
-        ("!CameraLoss {at: 1, duration: 0}", "duration must be positive, got 0"),
+        ("!ToolShift {at: -1}", r"events\[0\].at must be positive, in s, got -1"),
+        ("!CameraLoss {at: 1, duration: 0}", "duration must be positive, in s, got 0"),
         ("!DeadTimeChange {at: 1, dead_time: 0.2}", "over must be longer than the change of 0.2 s, got 0.1"),
     ],
 )

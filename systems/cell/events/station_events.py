@@ -4,11 +4,12 @@ In a scenario each is a tagged entry of ``station.events``, as ``!PayloadChange 
 """
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import TypeVar
 
 import numpy as np
 
+from robots.configuration.quantity import numbers, positive, quantity, vector
 from robots.description.model import NUM_JOINTS
 
 _Kind = TypeVar("_Kind")
@@ -19,30 +20,29 @@ _EPSILON = 1e-9  # s, by which sums of times are not exact
 class PayloadChange:
     """A load is picked up or put down; neither drives nor controller are told."""
 
-    at: float = 0.0  # s
-    payload: float = 0.0  # kg at the flange from then on
-    centre_mm: list[float] = field(default_factory=list)  # in the flange frame; empty: as the robot has it
+    at: float = positive(0.0, "s")
+    payload: float = quantity(0.0, 0.0, 1000.0, "kg")  # at the flange from then on
+    # Three, in the flange frame; empty: as the robot has it
+    centre_mm: list[float] = numbers((), (0, 3), unit="mm")
 
 
 @dataclass
 class ToolShift:
     """The tool is knocked out of its place, by which the true tip is another point of the robot."""
 
-    at: float = 0.0  # s
-    shift_mm: np.ndarray = field(default_factory=lambda: np.zeros(3))  # along the axes of the tool
-    turn_deg: np.ndarray = field(
-        default_factory=lambda: np.zeros(3)
-    )  # rotation vector in the frame of the tool
+    at: float = positive(0.0, "s")
+    shift_mm: np.ndarray = vector((0.0, 0.0, 0.0), unit="mm")  # along the axes of the tool
+    turn_deg: np.ndarray = vector((0.0, 0.0, 0.0), unit="deg")  # rotation vector in the frame of the tool
 
 
 @dataclass
 class CameraShift:
     """The camera system is moved in the world, so that all that it sees is displaced the other way."""
 
-    at: float = 0.0  # s
-    shift_mm: np.ndarray = field(default_factory=lambda: np.zeros(3))  # along the axes of the world
-    turn_deg: np.ndarray = field(
-        default_factory=lambda: np.zeros(3)
+    at: float = positive(0.0, "s")
+    shift_mm: np.ndarray = vector((0.0, 0.0, 0.0), unit="mm")  # along the axes of the world
+    turn_deg: np.ndarray = vector(
+        (0.0, 0.0, 0.0), unit="deg"
     )  # rotation vector, about the origin of the world
 
 
@@ -50,26 +50,26 @@ class CameraShift:
 class JointZeroShift:
     """Links slip against the encoders of their joints."""
 
-    at: float = 0.0  # s
+    at: float = positive(0.0, "s")
     # Six, by which the true angles then exceed the measured ones
-    shift_deg: np.ndarray = field(default_factory=lambda: np.zeros(NUM_JOINTS))
+    shift_deg: np.ndarray = vector((0.0,) * NUM_JOINTS, unit="deg")
 
 
 @dataclass
 class DeadTimeChange:
     """The interface becomes slower or faster; the dead time changes evenly over a while."""
 
-    at: float = 0.0  # s
-    dead_time: float = 0.0  # s, from then on in place of station.drive.dead_time
-    over: float = 0.1  # s that it takes; longer than the change of the dead time
+    at: float = positive(0.0, "s")
+    dead_time: float = quantity(0.0, 0.0, 1.0, "s")  # from then on in place of station.drive.dead_time
+    over: float = positive(0.1, "s")  # that it takes; longer than the change of the dead time
 
 
 @dataclass
 class CameraLoss:
     """The camera sees nothing for a while."""
 
-    at: float = 0.0  # s
-    duration: float = 0.5  # s
+    at: float = positive(0.0, "s")
+    duration: float = positive(0.5, "s")
 
 
 StationEvent = PayloadChange | ToolShift | CameraShift | JointZeroShift | DeadTimeChange | CameraLoss

@@ -17,6 +17,13 @@ def test_the_option_is_named_also_after_a_way_to_another_process(value: object):
             load_scenario("misaligned", [each])
 
 
+def test_an_option_that_takes_names_is_named_with_the_name():
+    setting = OptionSetting("station.faults.loss", 2, "--faults loss=")
+    for each in (setting, pickle.loads(pickle.dumps(setting))):
+        with pytest.raises(ScenarioError, match=r"^--faults loss=2: station\.faults\.loss must"):
+            load_scenario("misaligned", [each])
+
+
 def test_it_changes_the_scenario_as_set_does():
     settings = ["reference.laps=2", OptionSetting("reference.laps", 2, "--laps")]
     assert all(load_scenario("misaligned", [each]).reference.laps == 2 for each in settings)

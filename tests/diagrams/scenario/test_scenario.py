@@ -172,7 +172,7 @@ def test_a_scenario_of_nothing_is_the_default(tmp_path: Path):
         ("station.camera.delay=[", ["--set station.camera.delay=["]),
         # What the parts of the diagram would refuse later.
         ("station.camera.dropout_probability=1.5", ["dropout_probability", "1.5"]),
-        ("station.camera.dropouts=[[0.2, 0.1]]", ["camera: a drop-out must be [start, end]", "[0.2, 0.1]"]),
+        ("station.camera.dropouts=[[0.2, 0.1]]", ["dropouts: a drop-out must be [start, end]", "[0.2, 0.1]"]),
         ("servo.guard.speed_share=2", ["speed_share", "2"]),
         ("station.payload=50", ["payload", "50"]),
         ("integrator.scheme=magic", ["integrator.scheme", "magic"]),
@@ -330,3 +330,43 @@ def test_a_path_out_of_reach_is_refused_before_anything_moves(settings: list[str
 def test_a_scenario_travels_to_another_process():
     scenario = load_scenario("misaligned")
     assert scenario_text(pickle.loads(pickle.dumps(scenario))) == scenario_text(scenario)
+
+
+PLACES = {
+    "two below": (
+        "extends: [misaligned, cell]",
+        "1: extends must be the name of one file, got ['misaligned', ",
+    ),
+    "none below": ("seed: 1\nextends: nosuch", "2: extends: scenario 'nosuch': no file of that name comes"),
+    "load": (
+        "station:\n  events:\n  - !PayloadChange {at: 8, payload: -3}",
+        "3: station.events[0].payload must be between 0 and 1000 kg, got -3",
+    ),
+    "time": (
+        "station:\n  events:\n  - !CameraLoss {duration: 3}",
+        "3: station.events[0].at must be positive",
+    ),
+    "size": (
+        "station:\n  events:\n  - !ToolShift {at: 1, shift_mm: [1, .inf, 0]}",
+        "3: station.events[0].shift_mm[1] must be finite, in mm, got inf",
+    ),
+    "losses": (
+        "station:\n  camera:\n    dropouts: [[1, 2],\n      [2, 1]]",
+        "4: station.camera.dropouts: a drop-out must be [start, end]",
+    ),
+    "share": (
+        "station:\n  camera:\n    dropout_probability: 1",
+        "3: station.camera.dropout_probability must be between 0 and 0.999, got 1",
+    ),
+}
+
+
+@pytest.mark.parametrize(("text", "message"), PLACES.values(), ids=PLACES)
+def test_a_refusal_names_file_and_line(tmp_path: Path, text: str, message: str):
+    path = written(tmp_path, text + "\n")
+    assert f"scenario {path}, line {message}" in refusal(path)
+
+
+def test_a_refused_setting_is_named():
+    message = "--set station.camera.dropouts=[3]: station.camera.dropouts: a drop-out must be [start, end]"
+    assert message in refusal("misaligned", "station.camera.dropouts=[3]")
