@@ -13,7 +13,9 @@ from diagrams.scenario.scenario_file import OptionSetting, read_scenario_nodes, 
 from experiments.cli.console import print_note
 from robots.description.foreign_sources import foreign_sources_note
 from robots.description.model import RobotFileError, RobotModel, load_robot
+from robots.dynamics.compliant_kinematics import controller_kinematics
 from robots.kinematics.error_kinematics import ErrorKinematics
+from systems.reference.shapes import Planned
 
 QUICK_SPEEDUP = 4.0  # of the acceleration along the path
 QUICK_SETTLE = 2.0  # s
@@ -102,6 +104,8 @@ def prepare(
     if robot is not None and scenario.servo.model.robot:
         known = f"the controller knows {load_robot(scenario.servo.model.robot).name}"
         carried = "; ".join(filter(None, (carried, known)))
+    if needs_path and isinstance(scenario.reference.path, Planned):
+        scenario.reference.path.motion(controller_kinematics(model, scenario.station.payload).forward)
     if is_quick:
         scenario, note = quick(scenario, settings)
         differences.append(f"quick: {note}")

@@ -17,6 +17,7 @@ from robots.planning.joint_path import (
     Curve,
     PathError,
     require_in_range,
+    require_motion,
     smooth_curve,
     straight_joint_path,
 )
@@ -87,6 +88,7 @@ def legs_of(robot: RobotModel, path: str, others: Sequence[str] = ()) -> list[Le
     for leg in legs:
         try:
             require_in_range(robot, leg.path)
+            require_motion(leg.path)
         except PathError as error:
             raise PathError(f"{leg.name}: {error}") from error
     return legs
@@ -142,10 +144,17 @@ def legs_between(robot: RobotModel, stops: list[Stop], home: np.ndarray) -> list
             start, goal = (_pose_of(kinematics, each.place) for each in (before, stop))
             path = _line_path(inverse, line(start, goal), q, stop.name)
         else:
-            path = straight_joint_path(q, _joints(inverse, stop, q))
+            path = _joint_path(q, _joints(inverse, stop, q), stop.name)
         legs.append(Leg(f"to {stop.name}", path, stop.is_straight))
         q = path.at(np.array([1.0]))[0]
     return legs
+
+
+def _joint_path(start: np.ndarray, goal: np.ndarray, name: str) -> Curve:
+    try:
+        return straight_joint_path(start, goal)
+    except PathError as error:
+        raise PathError(f"to {name}: {error}") from error
 
 
 def _pose_of(kinematics: Kinematics | CompliantKinematics, place: np.ndarray) -> np.ndarray:

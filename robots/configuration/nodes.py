@@ -1,5 +1,6 @@
 """YAML as nodes that know where they stand, so that a refusal can name file and line."""
 
+import re
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import lru_cache
@@ -7,6 +8,9 @@ from pathlib import Path
 from typing import Any
 
 import yaml
+
+# Octal numbers such as 010, and 1:30, which is 90; 0o10, 0x8 and 0b1000 are meant.
+_SURPRISING = re.compile(r"[-+]?(0[0-7_]+|\d[\d_]*(:\d+)+(\.\d*)?)")
 
 
 class ConfigurationError(ValueError):
@@ -119,7 +123,14 @@ def _node(loader: Any, node: yaml.Node, label: str, has_lines: bool) -> Node:
         if node.value:
             raise ConfigurationError(f"{place}: !{own_tag} must be followed by a group, got '{node.value}'")
         return Node({}, place, own_tag)
-    return Node(loader.construct_object(node), place)
+    value = loader.construct_object(node)
+    decimal = node.value.lstrip("+-0").replace("_", "") or "0"
+    if isinstance(value, int | float) and _SURPRISING.fullmatch(node.value) and decimal != f"{abs(value)}":
+        raise ConfigurationError(
+            f"{place}: {node.value} would be {value:g}, for YAML reads it with base 8 or 60; "
+            "write a decimal number"
+        )
+    return Node(value, place)
 
 
 def _one_line(error: object) -> str:

@@ -11,6 +11,7 @@ from robots.description.model import RobotModel
 _DEGREES = (6, 8, 10, 12, 15, 18, 22, 27, 33, 40, 50)  # of the polynomials that are tried
 _LOOKED_AT = 201  # parameters
 _ROUNDING = 1e-9  # rad
+_NEGLIGIBLE = 3e-6  # rad: a motion by less lasts no tick, and its timing is all rounding
 _SMALL = 1e-7  # rad: the last coefficients of a polynomial that is good enough
 
 
@@ -84,6 +85,21 @@ def straight_joint_path(start: np.ndarray, goal: np.ndarray) -> Curve:
     if not np.abs(goal - start).max() > 0.0:
         raise PathError("the motion ends where it starts: no joint moves")
     return Curve(np.array([0.5 * (start + goal), 0.5 * (goal - start)]))
+
+
+def require_motion(path: Curve) -> None:
+    """Refuses a path on which next to nothing moves.
+
+    Raises:
+        PathError: with how far the joints move.
+    """
+    q = path.at(np.linspace(0.0, 1.0, _LOOKED_AT))
+    most = float(np.abs(q - q[0]).max())
+    if most < _NEGLIGIBLE:
+        raise PathError(
+            f"the motion is negligible: no joint moves by more than {np.rad2deg(most):.2g} deg, "
+            f"{np.rad2deg(_NEGLIGIBLE):.2g} deg are the least"
+        )
 
 
 def require_in_range(robot: RobotModel, path: Curve) -> None:

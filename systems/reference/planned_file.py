@@ -1,5 +1,6 @@
 """Files of planned motions: times, poses of the tool in the world, and positions of the joints."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -14,6 +15,8 @@ _HEAD = "# time_s; x_m; y_m; z_m; qw; qx; qy; qz; q1_rad; q2_rad; q3_rad; q4_rad
 _EVEN = 1e-6  # s by which times may be uneven
 _UNIT = 1e-3  # by which a quaternion's length may be off
 _FEWEST = 8  # rows
+# By which joints and poses may differ: a motion is planned with the calibrated robot or with the nominal one.
+_FAR, _TURNED = 0.05, 0.1  # m, rad
 
 
 @dataclass(frozen=True)
@@ -41,11 +44,16 @@ def planned_text(times: np.ndarray, X_WE: np.ndarray, q: np.ndarray) -> str:
     return "\n".join([_HEAD, *lines]) + "\n"
 
 
-def read_planned(path: str) -> PlannedMotion:
+def read_planned(path: str, forward: Callable[[np.ndarray], np.ndarray] | None = None) -> PlannedMotion:
     """Reads such a file.
 
+    Args:
+        path: of the file.
+        forward: poses of the tool in the world, (n, 4, 4), at joint positions in rad, (n, 6); None for robots
+            that are not known, whose joints are not compared with the poses.
+
     Raises:
-        ValueError: if it is none; the message names file and line.
+        ValueError: if it is none, or a pose is not that of its joints; the message names file and line.
     """
     table = read_table(path)
     if table.columns != _COLUMNS:
@@ -59,12 +67,26 @@ def read_planned(path: str) -> PlannedMotion:
     quaternions = table.values[:, 4:8]
     lengths = np.linalg.norm(quaternions, axis=1)
     _require(table, np.abs(lengths - 1.0) <= _UNIT, "qw, qx, qy, qz must have the length 1")
+    if forward is not None:
+        off = _apart(forward(table.values[:, 8:]), table.values[:, 1:4], quaternions)
+        worst = np.max(off / [_FAR, _TURNED], axis=1)
+        what = (
+            "the joints do not bring the tool to the pose: the motion is of another robot, or it was changed"
+        )
+        _require(table, worst <= 1.0, what)
     return PlannedMotion(
         float(np.mean(steps)),
         table.values[:, 1:4],
         _continued(quaternions / lengths[:, None]),
         table.values[:, 8:],
     )
+
+
+def _apart(X: np.ndarray, positions: np.ndarray, quaternions: np.ndarray) -> np.ndarray:
+    """Between poses (n, 4, 4) and those of a file, in m and rad, shape (n, 2)."""
+    R = Rotation.from_quat(quaternions, scalar_first=True)
+    turns = (R.inv() * Rotation.from_matrix(X[:, :3, :3])).magnitude()
+    return np.column_stack([np.linalg.norm(X[:, :3, 3] - positions, axis=1), turns])
 
 
 def _require(table: NumberTable, good: np.ndarray, what: str, offset: int = 0) -> None:

@@ -1,7 +1,10 @@
 """A motion that was planned: a path with its own timing, from a file."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import ClassVar
+
+import numpy as np
 
 from systems.reference.planned_file import PlannedMotion, read_planned
 
@@ -13,8 +16,8 @@ class Planned:
     kind: ClassVar[str] = "planned"
     file: str = ""  # as ``truetip plan --write`` makes it
 
-    def motion(self) -> PlannedMotion:
-        """What the file holds. Raises ValueError if there is none, or it is not readable."""
+    def motion(self, forward: Callable[[np.ndarray], np.ndarray] | None = None) -> PlannedMotion:
+        """What the file holds; arguments and errors as of `read_planned`, and ValueError if there is none."""
         if not self.file:
             raise ValueError("reference: path planned needs a file, as truetip plan --write makes it")
-        return read_planned(self.file)
+        return read_planned(self.file, forward)

@@ -108,8 +108,13 @@ TABLES = {
     ),
     "no motion": (
         "q1_deg, q2_deg, q3_deg, q4_deg, q5_deg, q6_deg\n0,-90,90,0,0,0\n0,-90,90,0,0,0\n",
-        "no joint moves",
+        "targets.csv, line 3: the motion ends where it starts: no joint moves",
     ),
+    "hardly a motion": (
+        "q1_deg, q2_deg, q3_deg, q4_deg, q5_deg, q6_deg\n0,-90,90,0,30,0\n0.000001,-90,90,0,30,0\n",
+        "targets.csv, line 3: the motion is negligible: no joint moves by more than 1e-06 deg",
+    ),
+    "hardly a line": (SMALL.replace("60, 900", "-39.9999, 900"), "line 3: the motion is negligible"),
     "out of reach": (SMALL.replace("60, 900", "60, 2900"), "line 3"),
     "singular": (
         # The wrist passes straight over axis 1, where axis 1 would have to turn by half a turn at once.

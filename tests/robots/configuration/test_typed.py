@@ -12,6 +12,8 @@ from robots.configuration.nodes import ConfigurationError, parse
 from robots.configuration.quantity import choice, numbers, positive, quantity, vector
 from robots.configuration.typed import merged, typed
 
+BASES = "for YAML reads it with base 8 or 60; write a decimal number"
+
 
 @dataclass
 class Round:
@@ -41,6 +43,10 @@ def read(text: str) -> Part:
     return typed(parse(text, "part"), Part)
 
 
+def test_a_zero_before_a_number_that_does_not_change_it_is_harmless():
+    assert (read("count: 07").count, read("count: 08").count, read("count: 0x8").count) == (7, 8, 8)
+
+
 def test_what_is_left_out_has_its_default_and_small_numbers_need_no_point():
     part = read("place: [5e-2, 0, 0]\nweights: 2\n")
     np.testing.assert_array_equal(part.place, [0.05, 0.0, 0.0])
@@ -56,6 +62,8 @@ def test_what_is_left_out_has_its_default_and_small_numbers_need_no_point():
         ("place: [0, 2, 0]", "part, line 1: place[1] must be between -1 and 1 m, got 2"),
         ("place: [0, 2]", "part, line 1: place must be 3 numbers, got [0, 2]"),
         ("weights: [1, 2]", "part, line 1: weights must be 1 or 3 numbers, got [1, 2]"),
+        ("is_hollow: true\ncount: 010", f"part, line 2: 010 would be 8, {BASES}"),
+        ("weights: [1:30]", f"part, line 1: 1:30 would be 90, {BASES}"),
         ("count: true", "part, line 1: count must be a whole number, got true"),
         ("count: 1.5", "part, line 1: count must be a whole number, got 1.5"),
         ("is_hollow: 1", "part, line 1: is_hollow must be true or false, got 1"),

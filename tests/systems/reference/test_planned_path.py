@@ -3,6 +3,8 @@
 import numpy as np
 import pytest
 
+from robots.description.model import load_robot
+from robots.kinematics.forward import Kinematics
 from systems.reference.paths import ReferenceConfig, make_path
 from systems.reference.planned_file import planned_text, read_planned
 from systems.reference.shapes import Circle, Planned
@@ -84,3 +86,19 @@ def test_a_file_that_is_no_motion_is_refused_with_its_line(file, tmp_path, chang
 def test_a_planned_path_without_a_file_is_refused():
     with pytest.raises(ValueError, match="needs a file"):
         make_path(ReferenceConfig(Planned()))
+
+
+def test_joints_that_do_not_bring_the_tool_to_its_pose_are_refused_with_their_row(tmp_path):
+    robot = Kinematics(load_robot("kr16"))
+    q = np.deg2rad([0.0, -70.0, 80.0, 0.0, 40.0, 0.0]) + np.linspace(0.0, 0.1, 20)[:, None]
+    text = planned_text(PERIOD * np.arange(20), robot.forward(q), q)
+    file = tmp_path / "motion.csv"
+    file.write_text(text)
+    assert read_planned(str(file), robot.forward).q == pytest.approx(q)
+    rows = [row.split("; ") for row in text.splitlines()]
+    rows[7][8] = str(float(rows[7][8]) + 1.0)
+    file.write_text("\n".join("; ".join(row) for row in rows))
+    with pytest.raises(
+        ValueError, match=r"motion\.csv, line 8: the joints do not bring the tool to the pose"
+    ):
+        read_planned(str(file), robot.forward)
