@@ -93,7 +93,7 @@ def test_a_law_keeps_to_a_planned_line_that_leaves_it_the_usual_reserve(tmp_path
 @pytest.mark.parametrize("width", [30, 80, 200])
 def test_the_table_folds_names_and_never_cuts_a_number_off(width: int):
     numbers = ["12.345", "13.456", "-35.2", "123456", "234567", "+123.4", "0.010", "0.011"]
-    name = "to /home/somebody/robots/programs/welding_of_the_left_door.mod, line 123"
+    name = "to somebody/robots/programs/welding_of_the_left_door.mod, line 123"
     console = Console(width=width, file=io.StringIO(), record=True)
     console.print(result_table("welding", [[name, *numbers, "kept"]] * 2, width), crop=False)
     text = console.export_text()
