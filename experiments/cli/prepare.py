@@ -15,6 +15,8 @@ from robots.description.foreign_sources import foreign_sources_note
 from robots.description.model import RobotFileError, RobotModel, load_robot
 from robots.dynamics.compliant_kinematics import controller_kinematics
 from robots.kinematics.error_kinematics import ErrorKinematics
+from systems.cell.events.station_events import check_events
+from systems.reference.paths import make_path
 from systems.reference.shapes import Planned
 
 QUICK_SPEEDUP = 4.0  # of the acceleration along the path
@@ -109,6 +111,8 @@ def prepare(
     if is_quick:
         scenario, note = quick(scenario, settings)
         differences.append(f"quick: {note}")
+    if needs_path and scenario.station.kind == "simulated" and scenario.station.events:
+        _require_possible_events(name, settings, scenario)
     title = Path(name).stem + (f" ({'; '.join(differences)})" if differences else "")
     return Prepared(title, scenario, model, carried)
 
@@ -122,6 +126,16 @@ def _robot_of(name: str, settings: Sequence[str], scenario: Scenario) -> RobotMo
         if "robot" not in node.value:
             raise
         raise RobotFileError(f"{node.at(['robot']).place}: robot: {error}") from error
+
+
+def _require_possible_events(name: str, settings: Sequence[str], scenario: Scenario) -> None:
+    """Raises ScenarioError if an event is not within the run, with the place of the events."""
+    station, end = scenario.station, make_path(scenario.reference).duration
+    try:
+        check_events(station.events, end, station.drive.dead_time)
+    except ValueError as error:
+        node = read_scenario_nodes(name, list(settings), Scenario)
+        raise ScenarioError(f"{node.at(['station', 'events']).place}: {error}") from error
 
 
 def _fitted(
