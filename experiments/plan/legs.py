@@ -72,6 +72,8 @@ def legs_of(robot: RobotModel, path: str, others: Sequence[str] = ()) -> list[Le
     Raises:
         ValueError: if there is no such path, or the robot cannot follow it; with the place.
     """
+    if others and path in (RECTANGLE, JOINTS):
+        raise ValueError(f"--with counts for a program only, --path is {path}")
     if path == JOINTS:
         legs = [Leg("axes 1-3", straight_joint_path(np.zeros(NUM_JOINTS), _MOTION), False)]
     elif path == RECTANGLE:

@@ -134,6 +134,7 @@ def test_a_path_that_cannot_be_followed_is_refused_with_its_place(tmp_path: Path
 
 REFUSED = {
     "path": ("--path=circle", "--path must be rectangle, joints or a file that ends in"),
+    "others": ("--with=config.dat", "--with counts for a program only, --path is rectangle"),
     "objective": ("--objective=speed", "--objective must be one of time, energy, front, got 'speed'"),
     "dynamics": ("--dynamics=soft", "--dynamics must be one of rigid, flexible_joint, elastic_structure"),
     "tool speed": ("--tool-speed=0", "the speed of the tool must be positive, got 0"),
