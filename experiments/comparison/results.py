@@ -6,7 +6,7 @@ from typing import Any
 
 from diagrams.record.log import RunLog
 from experiments.cli.prepare import Prepared
-from experiments.cli.versions import versions_line
+from experiments.cli.versions import versions_in, versions_line
 from experiments.comparison.errors_table import ERRORS, write_errors
 from experiments.comparison.figure import write_figure
 from experiments.metrics.run_metrics import summary, timing
@@ -24,6 +24,16 @@ RESULTS = {
     ERRORS: "the errors of every sample",
     SCENARIO: "the scenario, to run it again",
 }
+
+
+def replacing(folder: Path) -> list[str]:
+    """Names of `RESULTS` that must not be files that somebody has given to the command.
+
+    A scenario that is itself the result of a run may be run again into its own folder.
+    """
+    own = folder / SCENARIO
+    is_result = own.is_file() and bool(versions_in(own.read_text(encoding="utf-8", errors="replace")))
+    return [name for name in RESULTS if name != SCENARIO or not is_result]
 
 
 def write_results(folder: Path, prepared: Prepared, logs: Mapping[str, Sequence[RunLog]]) -> dict[str, Any]:

@@ -37,6 +37,7 @@ from experiments.cli.prepare import check, option_settings, prepare
 from experiments.cli.staging import staged_folder
 from experiments.comparison.compare import compare, compared_laws, named_laws
 from experiments.comparison.learnt_file import WriteOption, check_write, robot_writer
+from experiments.comparison.results import replacing
 from experiments.metrics.run_metrics import timing, with_timing
 from experiments.plan.plan_option import PlanOption, plan_settings
 from experiments.record.simulated import write_records
@@ -111,7 +112,7 @@ def compare_command(
         refuse_real_time(prepared, realtime)
     guided: Guided | None = None
     with json_output(json_file) as output, refusing(OSError), ExitStack() as stack:
-        stage = stack.enter_context(staged_folder(out))
+        stage = stack.enter_context(staged_folder(out, *replacing(out)))
         keep_robot = robot_writer(stack, write, chosen)
         stack.enter_context(output.staged())
         if is_guided:

@@ -37,6 +37,7 @@ from experiments.cli.prepare import check, option_settings, prepare
 from experiments.cli.staging import staged_folder
 from experiments.comparison.compare import simulating
 from experiments.comparison.learnt_file import WriteOption, check_write, robot_writer
+from experiments.comparison.results import replacing
 from experiments.record.simulated import write_records
 from experiments.replay.live import LiveView, advance_live
 from experiments.running.outcome import print_outcome, write_outcome
@@ -122,7 +123,7 @@ def run_command(
     guided: Guided | None = None
     view: LiveView | None = None
     with refusing(OSError), ExitStack() as stack:
-        stage = stack.enter_context(staged_folder(out))
+        stage = stack.enter_context(staged_folder(out, *replacing(out)))
         keep_robot = robot_writer(stack, write, [law])
         if is_guided:
             guided = guide(console, (stage, out), prepared, [law], 1, with_cell, viewer, realtime)

@@ -5,6 +5,8 @@ from pathlib import Path
 import pytest
 
 from experiments.cli.staging import PAGE, keep_files, staged_file, staged_folder
+from experiments.cli.versions import versions_line
+from experiments.comparison.results import replacing
 from systems.vision.camera_rig import load_cell
 from systems.vision.camera_rig_file import cell_text
 from tests.experiments.commands import files, refusal, truetip
@@ -90,6 +92,8 @@ def test_a_place_where_nothing_can_be_written_is_refused_before_the_work(tmp_pat
             "--write seen.yaml: the results in . would",
         ),
         ("robots import r.yaml --write r.yaml", "FILE.urdf and --write name the same file"),
+        ("run --law open_loop --scenario scenario.yaml --out .", "--scenario scenario.yaml: the"),
+        ("compare --laws open_loop --scenario scenario.yaml --out .", "--scenario scenario.yaml: the"),
     ],
 )
 def test_what_is_written_is_named_by_one_option_alone(
@@ -98,6 +102,16 @@ def test_what_is_written_is_named_by_one_option_alone(
     monkeypatch.chdir(tmp_path)
     (tmp_path / "c.yaml").write_text(cell_text(load_cell("probst")))
     (tmp_path / "r.yaml").write_text("extends: irb1200\ncalibration: {of: irb1200, source: a table}\n")
+    (tmp_path / "scenario.yaml").write_text("extends: misaligned\n")
     before = files(tmp_path)
     assert options in refusal(truetip(*command.split()))
     assert files(tmp_path) == before
+
+
+def test_a_scenario_that_is_a_result_may_be_run_again_into_its_own_folder(tmp_path: Path):
+    own = tmp_path / "scenario.yaml"
+    own.write_text("extends: misaligned\n")
+    assert "scenario.yaml" in replacing(tmp_path)
+    own.write_text(f"# a run\n{versions_line()}\nextends: misaligned\n")
+    assert "scenario.yaml" not in replacing(tmp_path)
+    assert "report.html" in replacing(tmp_path)
