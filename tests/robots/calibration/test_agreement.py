@@ -48,7 +48,8 @@ def test_an_unreduced_search_on_54_parameters_finds_the_same_robot():
     assert theirs.success
     fresh = drawn.configurations(100, rng)
     position = Kinematics(ours.calibrated_robot()).forward(fresh)[:, :3, 3]
-    assert np.abs(moved(theirs.x).forward(fresh)[:, :3, 3] - position).max() < 1e-9  # m
+    # m; derivatives by differences leave about a nanometre, give or take by the library that solves
+    assert np.abs(moved(theirs.x).forward(fresh)[:, :3, 3] - position).max() < 1e-8
     assert np.abs(drawn.forward(fresh)[:, :3, 3] - position).max() > 1e-3  # there was an error to find
 
 
