@@ -25,7 +25,7 @@ _ARRIVED = math.radians(0.02)  # how near the measured joints must come
 _PATIENCE, _NEARLY = 3.0, math.radians(0.5)  # s after which it is enough to come so near
 _LONGEST_APPROACH = 60.0  # s
 _APPROACH_GAIN = 2.0  # 1/s, where only speeds are sent
-_ELSEWHERE = math.radians(3.0)  # more than a robot moves while its controller begins a session anew
+_ELSEWHERE = math.radians(3.0)  # beyond what it was told to move, while its controller begins a session anew
 _PHASE_SHARE = 0.02  # of the distance between a stamp and its tick, by which the phase follows
 _LATEST, _EARLIEST = 7e-4, 2e-3  # s before the next report is due, to prepare for it
 _MARGIN = 3e-4  # s, to be ready before it is due
@@ -352,13 +352,15 @@ class HardwareLink:
             if self._is_asked_to_end():
                 self.stop_smoothly()
                 raise EndedOnRequest
-            before, report = self.last, self.next_report()
+            before, heard, report = self.last, self._heard, self.next_report()
             passed += self.passed
             if report is None or not report.is_ready:
                 report = self.wait_until_ready(self._link.connect)
                 if report is None:
                     raise StationError("the controller stopped while the robot was on its way")
-            elif self.epoch != epoch >= 0 and _is_elsewhere(before, report):
+            elif self.epoch != epoch >= 0 and _is_elsewhere(
+                before, report, speed_share * self._speed * (self._heard - heard)
+            ):
                 why = self.trouble  # which is over once it has stopped
                 self.stop_smoothly()
                 raise StationError(why)
@@ -386,6 +388,6 @@ class HardwareLink:
         self.poses.poll(self._now())
 
 
-def _is_elsewhere(before: RobotReport | None, report: RobotReport) -> bool:
-    """Whether joints are not where they were in the report before."""
-    return before is not None and float(np.abs(report.position - before.position).max()) > _ELSEWHERE
+def _is_elsewhere(before: RobotReport | None, report: RobotReport, way: np.ndarray) -> bool:
+    """Whether joints are farther from the report before than the way that they may have gone, rad, (6,)."""
+    return before is not None and bool((np.abs(report.position - before.position) > way + _ELSEWHERE).any())

@@ -40,9 +40,7 @@ def is_straight(code: str) -> bool:
 def not_followed(code: str, text: str, has_target: bool, has_tool: bool) -> str:
     """Why a motion to what a text says is not followed; empty if it is."""
     if _kind(code) not in _STRAIGHT:
-        return f"{_kind(code)} is not followed, only {', '.join(_STRAIGHT)} are".replace(
-            ", SLIN", " and SLIN"
-        )
+        return f"{_kind(code)} is not followed, only PTP, SPTP, LIN and SLIN are"
     if not has_target:
         return (
             f"{_kind(code)} goes to {text.strip()}, which is no target given in numbers; --with FILE reads it"

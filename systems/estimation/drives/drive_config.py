@@ -28,9 +28,8 @@ class DriveModelConfig:
     dead_time_sigma: float = quantity(3e-3, 0.0, unit="s")  # of all joints alike
     lag_sigma: float = quantity(3e-4, 0.0, unit="s")  # of each joint
     smoothing_sigma: float = quantity(5e-4, 0.0, unit="s")  # by which a controller's planner smooths speeds
-    speed_lag_sigma: float = quantity(
-        1e-3, 0.0, unit="s"
-    )  # by which drives that take torques know speeds late
+    # By which drives that take torques know their speed late
+    speed_lag_sigma: float = quantity(1e-3, 0.0, unit="s")
     # Of a robot that carries 7 kg; of a larger one in proportion
     payload_sigma: float = quantity(0.5, 0.0, unit="kg")
     # First moment of the payload: 7 kg whose centre is off by 10 mm

@@ -180,7 +180,7 @@ class DriveModel:
         shares = self._moved_by_friction.astype(float)
         if self.is_fed_back and not (self._drives.takes_torque or shares.any()):
             sigma = np.sqrt(memory.P[_DIAGONAL[_ROTORS], _DIAGONAL[_ROTORS]])
-            shares = np.maximum(shares, 1.0 - sigma / _ROTOR_SPREAD)
+            shares = np.maximum(0.0, 1.0 - sigma / _ROTOR_SPREAD)
         return shares
 
     def start(self, memory: SimpleNamespace) -> None:

@@ -78,6 +78,40 @@ def test_they_are_found_where_torques_are_sent_from_what_these_leave(position, i
     assert p * i == pytest.approx(true.prod(), rel=0.3)
 
 
+@pytest.mark.parametrize("takes_torque", [False, True])
+def test_the_least_squares_of_all_joints_are_those_of_one_dense_system(takes_torque):
+    """Joint by joint, what is its own is eliminated; here all unknowns of a pair of gains stand in a row."""
+    search, rng = drives(takes_torque=takes_torque)[0].search, np.random.default_rng(3)
+    sums = search.layout.view(np.zeros(search.layout.size))
+    k, shared, own = sums.z.shape[1], search._shared, search._own
+    variances, at = rng.uniform(0.5, 2.0, 6), 7  # of a joint; which pair of gains
+    rows, seen = [], []
+    for _ in range(40):
+        sums.z[:] = rng.normal(size=sums.z.shape)
+        late, behind = rng.normal(size=(2, 6)), rng.normal(size=6)
+        left = np.exp(-PERIOD * sums.samples[0] * search._slowest[at])
+        for j in range(6):
+            columns = np.array([*sums.z[at, :, j, 1], *late[:, j], 1.0, left])
+            row = np.zeros(len(shared) + 6 * len(own))
+            row[: len(shared)] = columns[shared]
+            row[len(shared) + j * len(own) :][: len(own)] = columns[own]
+            rows.append(row / np.sqrt(variances[j]))
+            seen.append(behind[j] / np.sqrt(variances[j]))
+        search.add(sums, late, behind)
+    prior = np.sqrt(np.concatenate((search._of_shared, np.tile(search._of_own, 6))))
+    expected = np.zeros(len(prior))
+    expected[0] = prior[0]  # one, of how far motors give way
+    A, b = np.vstack((rows, np.diag(prior))), np.concatenate((seen, expected))
+    x, (square,), *_ = np.linalg.lstsq(A, b, rcond=None)
+    lower = sums.A + np.tril(sums.A, -1).swapaxes(-1, -2)
+    misfit, _, factors = search._fit(sums, lower, variances)
+    np.testing.assert_allclose(misfit[at], square, rtol=1e-9)
+    dense = np.zeros((6, k + 4))
+    dense[:, shared] = x[: len(shared)]
+    dense[:, own] += x[len(shared) :].reshape(6, len(own))
+    np.testing.assert_allclose(factors[at], dense, rtol=1e-7, atol=1e-10)
+
+
 @pytest.mark.parametrize("share", [0.0, 1.0, -1.0])
 def test_where_torques_are_sent_gains_as_believed_stay_whatever_else_is_wrong(share):
     unlike = {place: share * each for place, each in UNLIKE.items()}
