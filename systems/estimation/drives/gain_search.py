@@ -58,6 +58,10 @@ class GainSearch:
     between the points of the grid a parabola is laid through them. What is found is what describes the
     motors best: p and i may be exchanged, as e depends on their sum and product alone, and both come out
     lower where speed loops are slow, whose own lag the model does not have.
+
+    Where torques are sent, only drives softer than believed are looked for. Stiffer ones leave motors nearer
+    to their plan than anything else that is learnt needs, and friction that turns over otherwise than believed
+    looks like them.
     """
 
     def __init__(
@@ -81,6 +85,7 @@ class GainSearch:
         steps = filter_steps(kp.ravel(), self._ki.ravel(), kd.ravel(), period)
         self._steps = steps.reshape(n, NUM_JOINTS, *steps.shape[1:])
         self._slowest, self._period = poles.min(axis=1), period
+        self._candidates = np.flatnonzero(_GRID.prod(axis=1) < 1.0 + 1e-9) if takes_torque else np.arange(n)
         shared, own = (
             {column: spread * (load_scale if column in _LOADS else 1.0) for column, spread in spreads.items()}
             for spreads in ((_SHARED_OF_TORQUES, _OWN_OF_TORQUES) if takes_torque else (_SHARED, _OWN))
@@ -128,7 +133,7 @@ class GainSearch:
         variances = np.full(6, _SIGMA**2)
         for _ in range(2):  # a joint counts by what is left of it
             misfit, left, x = self._fit(memory, A, variances)
-            best = int(misfit.argmin())
+            best = int(self._candidates[misfit[self._candidates].argmin()])
             variances = np.maximum(left[best] / memory.samples[0], _SIGMA**2)
         present = int(np.abs(np.log(_GRID / (position, integral))).max(axis=1).argmin())
         if misfit[best] > self._clearer**2 * misfit[present]:

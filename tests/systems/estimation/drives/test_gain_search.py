@@ -70,7 +70,6 @@ def test_gains_as_believed_stay_whatever_else_is_wrong(friction, give):
 
 @pytest.mark.parametrize(("position", "integral"), [(0.6, 0.5), (0.5, 0.5), (0.5, 1.0)])
 def test_they_are_found_where_torques_are_sent_from_what_these_leave(position, integral):
-    """Softer ones at least: what stiffer ones leave is next to nothing."""
     found = searched(position, integral, 1.0, noise=1e-5, unlike=UNLIKE)
     assert found
     (p, i), true = BELIEVED * found[:2], BELIEVED * (position, integral)
@@ -134,6 +133,10 @@ def test_motors_at_rest_do_not_leap_when_gains_are_taken():
     np.testing.assert_allclose(memory.gains.factors, found[:2])
     assert not memory.coming.factors.any()
     assert not memory.beta[1:].any()  # but for the dead time
+
+
+def test_stiffer_ones_are_not_looked_for_where_torques_are_sent():
+    assert searched(2.0, 2.0, 1.0, noise=1e-7, unlike=UNLIKE) is None
 
 
 def test_motors_follow_their_plan_with_the_gains_that_were_found():
