@@ -60,7 +60,7 @@ def import_command(
         typer.Option(
             metavar="KG",
             min=0.0,
-            help="Of the whole robot, where links do not say theirs; from its data sheet.",
+            help="Of the whole robot, where links do not say theirs or all say the same; from its data sheet.",
         ),
     ] = None,
     payload: Annotated[
@@ -104,7 +104,7 @@ def _describe(console: Console, robot: RobotModel, found: UrdfRobot) -> None:
     limits = np.rad2deg(np.stack([robot.lower, robot.upper], -1))
     rows = [("robot", robot.name), ("world and tool", f"{found.chain.base}, {found.chain.tip}")]
     rows += [
-        (f"joint {number}", f"{joint.name}: {lower:.0f} to {upper:.0f} deg, moves {link.mass:.3g} kg")
+        (f"joint {number}", f"{joint.name}: {lower:.0f} to {upper:.0f} deg, its link {link.mass:.3g} kg")
         for number, (joint, (lower, upper), link) in enumerate(
             zip(found.chain.joints, limits, robot.links, strict=True), 1
         )
@@ -115,6 +115,18 @@ def _describe(console: Console, robot: RobotModel, found: UrdfRobot) -> None:
     if found.chain.held:
         names = ", ".join(joint.name for joint in found.chain.held)
         print_note(console, f"these joints are taken as fixed at zero: {names}")
+    if found.placeholder is not None:
+        print_note(
+            console,
+            f"all links weigh {found.placeholder:g} kg and have the same inertia, which looks like a "
+            "placeholder; with the robot's mass from its data sheet, --mass KG, masses are assumed instead",
+        )
+    for name, change in found.corrected.items():
+        print_note(
+            console,
+            f"no body can have the moments of inertia of link '{name}', one is above the sum of the others; "
+            f"the nearest that a body can have are taken, {change}",
+        )
     if found.missing_meshes:
         print_note(
             console,

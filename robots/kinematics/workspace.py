@@ -6,6 +6,7 @@ from robots.description.model import NUM_JOINTS, RobotModel
 from robots.kinematics.arm_structure import seen_from_base
 from robots.kinematics.forward import Kinematics
 
+_AT_ORIGIN = 1e-6  # m
 _SAMPLES = 4096  # configurations among which the best are looked for
 _APART = 0.6  # rad, of two candidates in one joint at least
 _MARGIN = 0.3  # share of half a range that a joint should be away from its limits
@@ -22,6 +23,8 @@ def arm_length(robot: RobotModel) -> float:
 def shoulder(robot: RobotModel) -> tuple[np.ndarray, np.ndarray]:
     """Axis 1: the point beside joint 2, and the direction towards it from the base.
 
+    Where the base's origin is that point, the direction is that of the base's z.
+
     Returns:
         A point in m and a unit vector in the world, shape (3,) each.
     """
@@ -30,6 +33,8 @@ def shoulder(robot: RobotModel) -> tuple[np.ndarray, np.ndarray]:
     axis, first = X_WB.rotation() @ axes[0], X_WB @ offsets[0]
     second = X_WB @ (offsets[0] + offsets[1])
     height = float(axis @ (second - X_WB.translation()))
+    if abs(height) < _AT_ORIGIN:
+        height = float(axis @ X_WB.rotation().matrix()[:, 2])
     up = axis if height >= 0.0 else -axis
     return first + axis * float(axis @ (second - first)), up
 

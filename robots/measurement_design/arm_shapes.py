@@ -112,9 +112,13 @@ class ArmShapes:
         return not self._too_close(q)
 
     def lowest(self, q: np.ndarray) -> np.ndarray:
-        """The height in m in the world of the lowest point of links 1 to 5 and the tool, (n, 6) -> (n,)."""
+        """The height in m in the world of the lowest point of links 1 to 5 and the tool, (n, 6) -> (n,).
+
+        The near end of link 1 does not move, and stands on the floor where joint 1 is there.
+        """
         ends = self._ends(q)[..., 2]
         heights = np.minimum(ends[:, :-1], ends[:, 1:])[:, : NUM_JOINTS - 1]
+        heights[:, 0] = ends[:, 1]
         heights = np.column_stack([heights, ends[:, -1]])
         return (heights - self._radii).min(axis=1)
 

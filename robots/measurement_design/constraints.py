@@ -58,7 +58,7 @@ class AdmissibleConfigurations:
             corners = " and ".join(str(corner.tolist()) for corner in config.box)
             raise ValueError(f"admissible configurations: a box needs increasing corners, got {corners} m")
         self._robot, self._config = robot, config
-        self._floor = floor_under(robot) if config.floor is None else config.floor
+        self._floor = floor_under(robot, config.clearance) if config.floor is None else config.floor
         self._kinematics = Kinematics(robot)
         self._shapes = ArmShapes(robot, config.tool_radius, config.clearance, config.obstacles)
 
@@ -120,7 +120,18 @@ class AdmissibleConfigurations:
         return np.asarray(cosine >= np.cos(np.deg2rad(view.largest_angle_deg)))
 
 
-def floor_under(robot: RobotModel) -> float:
-    """The height in m of the floor on which a robot stands; far below where it hangs or stands on a wall."""
-    _, up = shoulder(robot)
-    return float(robot.base.translation[2]) if up[2] > _UPRIGHT else -_NO_FLOOR
+def floor_under(robot: RobotModel, clearance: float = 0.0) -> float:
+    """The height in m of the floor on which a robot stands; far below where it hangs or stands on a wall.
+
+    It stands where its file has the origin, unless that is so near joint 2 that the arm would always touch
+    the floor there: then it stands on something.
+
+    Args:
+        robot: that stands.
+        clearance: smallest distance in m that its links keep from the floor.
+    """
+    joint_2, up = shoulder(robot)
+    if up[2] <= _UPRIGHT:
+        return -_NO_FLOOR
+    radius = max(link.radius for link in robot.links[:2])
+    return min(float(robot.base.translation[2]), float(joint_2[2]) - radius - clearance - _TOLERANCE)

@@ -17,6 +17,7 @@ from robots.description.urdf_in.chain import UrdfText
 SHARES = (0.300, 0.252, 0.245, 0.140, 0.042, 0.017, 0.004)  # of base and links 1 to 6
 _MOMENTS = {"ixx": (0, 0), "iyy": (1, 1), "izz": (2, 2), "ixy": (0, 1), "ixz": (0, 2), "iyz": (1, 2)}
 _ROUNDING = 1e-6  # of the largest moment
+_FLATTER = 0.25  # of it, by which it may be above the sum of the others: published files have up to 0.2
 _DENSITY = 2500.0  # kg/m^3, of housings with motors and gears inside
 
 
@@ -43,29 +44,60 @@ def assumed_masses(known: Mapping[int, float], total: float) -> dict[int, float]
     return {number: of_rest * SHARES[number] for number in missing}
 
 
-def refuse_impossible(text: UrdfText) -> None:
-    """Refuses a link that no body can be: Drake would take one of its own in its place.
+def correct_inertias(text: UrdfText) -> dict[str, str]:
+    """Gives links that no body can be the nearest inertia that one can have.
+
+    A principal moment above the sum of the two others, as many published files have one, means that the mass
+    is less than flat: it is made flat, see `_flat`. Drake would take an inertia of its own in its place.
+
+    Args:
+        text: the URDF, which is changed.
+
+    Returns:
+        What was corrected, by the names of links.
 
     Raises:
         ConfigurationError: if a mass is negative or not finite, or a principal moment of inertia is negative
-            or larger than the sum of the two others; the message names the link.
+            or larger by far than the sum of the two others; the message names the link.
     """
+    corrected = {}
     for link in text.root.findall("link"):
         name, mass = link.get("name", ""), _number(link.find("inertial/mass"), "value")
         if not 0.0 <= mass < math.inf:
             raise text.refuse(f"link '{name}': its mass must be zero or positive, in kg, got {mass:g}", name)
         element = link.find("inertial/inertia")
+        if element is None or mass == 0.0:
+            continue
         inertia = np.zeros((3, 3))
         for key, (i, j) in _MOMENTS.items():
             inertia[i, j] = inertia[j, i] = _number(element, key)
-        moments = np.linalg.eigvalsh(inertia) if np.isfinite(inertia).all() else np.full(3, math.nan)
-        least = -_ROUNDING * np.abs(moments).max()
-        if mass > 0.0 and not (moments.min() >= least and moments.sum() - 2.0 * moments.max() >= least):
+        finite = np.isfinite(inertia).all()
+        moments, axes = np.linalg.eigh(inertia) if finite else (np.full(3, math.nan), np.eye(3))
+        largest, excess = np.abs(moments).max(), 2.0 * moments.max() - moments.sum()
+        if not (moments.min() >= -_ROUNDING * largest and excess <= _FLATTER * largest):
             raise text.refuse(
                 f"link '{name}': its principal moments of inertia must not be negative, and none above the "
-                f"sum of the others, got {', '.join(f'{each:g}' for each in moments)} kg m^2",
+                f"sum of the others, got {_listed(moments)} kg m^2",
                 name,
             )
+        if excess > _ROUNDING * largest:
+            flat = _flat(moments)
+            _write_inertia(element, axes @ np.diag(flat) @ axes.T)
+            corrected[name] = f"from {_listed(moments)} to {_listed(flat)} kg m^2"
+    return corrected
+
+
+def _flat(moments: np.ndarray) -> np.ndarray:
+    """Of principal moments in rising order, the largest too large: those of the mass with no thickness.
+
+    I = (yy + zz, xx + zz, xx + yy) with the second moments of mass xx, yy and zz. That along the third axis is
+    negative: it is zero instead, and the largest moment stays.
+    """
+    return moments + 0.5 * (moments[2] - moments[0] - moments[1]) * np.array([1.0, 1.0, 0.0])
+
+
+def _listed(moments: np.ndarray) -> str:
+    return ", ".join(f"{each:.3g}" for each in moments)
 
 
 def _number(element: ElementTree.Element | None, key: str) -> float:
@@ -101,5 +133,9 @@ def add_inertia(text: UrdfText, link: str, mass: float, stretch: np.ndarray) -> 
     xyz = " ".join(repr(float(each)) for each in 0.5 * np.asarray(stretch))
     ElementTree.SubElement(inertial, "origin", xyz=xyz, rpy="0 0 0")
     ElementTree.SubElement(inertial, "mass", value=repr(mass))
-    moments = {name: repr(float(inertia[at])) for name, at in _MOMENTS.items()}
-    ElementTree.SubElement(inertial, "inertia", moments)
+    _write_inertia(ElementTree.SubElement(inertial, "inertia"), inertia)
+
+
+def _write_inertia(element: ElementTree.Element, inertia: np.ndarray) -> None:
+    for name, at in _MOMENTS.items():
+        element.set(name, repr(float(inertia[at])))

@@ -8,7 +8,7 @@ hold is `assumed`.
 import copy
 import math
 import xml.etree.ElementTree as ElementTree
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass, field
 from itertools import pairwise
 from pathlib import Path
@@ -30,7 +30,7 @@ from robots.description.urdf_in.assumed import (
     assumed_tilting,
 )
 from robots.description.urdf_in.chain import NUM_AXES, Chain, UrdfText
-from robots.description.urdf_in.masses import add_inertia, assumed_masses, refuse_impossible
+from robots.description.urdf_in.masses import add_inertia, assumed_masses, correct_inertias
 from robots.description.urdf_in.pictures import Pictures
 
 SUFFIXES = (".urdf", ".xacro")
@@ -51,6 +51,8 @@ class UrdfRobot:
     assumed: list[str] = field(default_factory=list)  # what the URDF does not say
     missing_meshes: list[str] = field(default_factory=list)
     unreadable_meshes: list[str] = field(default_factory=list)  # and why
+    corrected: Mapping[str, str] = field(default_factory=dict)  # inertias, by the names of links
+    placeholder: float | None = None  # kg, that every link weighs: nobody knows what they do
 
 
 def is_urdf(name: str) -> bool:
@@ -75,7 +77,7 @@ def read_urdf(
         label: how messages call it.
         base, tip: links whose frames are the world and the tool, see `UrdfText.chain`.
         packages: folders of packages, for meshes; others are looked for above the file.
-        mass: of the whole robot in kg, for links that do not say theirs.
+        mass: of the whole robot in kg, for links that do not say theirs, or all say the same.
         payload: the largest that it carries in kg; None for what robots of its mass carry.
 
     Raises:
@@ -83,17 +85,18 @@ def read_urdf(
             or inertia, and no mass is given.
     """
     text = UrdfText(path, label)
-    refuse_impossible(text)
+    corrected = correct_inertias(text)
     chain = text.chain(base, tip)
-    arm = _Arm(text, chain, payload)
+    arm = _Arm(text, chain, payload, corrected)
+    placeholder = arm.placeholder
     if mass is not None:
-        shared = arm.share(mass)
-        arm = _Arm(text, chain, payload, shared)
+        arm, placeholder = _Arm(text, chain, payload, corrected, arm.share(mass)), None
     pictures = Pictures(text, packages or {})
     tree = arm.entries(pictures)
     assumed = ["gears, motors and friction", "bearings", *(["payload"] if payload is None else [])]
     assumed += arm.assumed
-    return UrdfRobot(_node(tree, label), chain, assumed, pictures.missing, pictures.unreadable)
+    meshes = pictures.missing, pictures.unreadable
+    return UrdfRobot(_node(tree, label), chain, assumed, *meshes, corrected, placeholder)
 
 
 class _Arm:
@@ -103,11 +106,18 @@ class _Arm:
         self,
         text: UrdfText,
         chain: Chain,
-        payload: float | None = None,
+        payload: float | None,
+        corrected: Collection[str],
         shared: Mapping[int, str] | None = None,
     ) -> None:
-        """``shared``: where masses that the URDF does not say are from, by the numbers of links."""
-        self._text, self._chain, self._payload = text, chain, payload
+        """Has Drake read it.
+
+        Args:
+            text, chain, payload: as in `read_urdf`.
+            corrected: names of links whose inertia is not that of the file.
+            shared: where masses that the URDF does not say are from, by the numbers of links.
+        """
+        self._text, self._chain, self._payload, self._corrected = text, chain, payload, corrected
         self._shared = shared or {}
         self.assumed = [f"masses of {len(self._shared)} links"] if self._shared else []
         plant = MultibodyPlant(0.0)
@@ -128,8 +138,18 @@ class _Arm:
         names = [chain.joints[0].parent, *(joint.child for joint in chain.joints)]
         self._bodies: list[RigidBody] = [plant.GetBodyByName(name) for name in names]
 
+    @property
+    def placeholder(self) -> float | None:
+        """The mass in kg of each link, if all that move have the same and the same inertia; else None."""
+        inertias = [self._inertia(number).CopyToFullMatrix6() for number in range(1, NUM_AXES + 1)]
+        first = inertias[0]
+        alike = all(np.allclose(each, first, rtol=1e-9, atol=0.0) for each in inertias)
+        return float(first[3, 3]) if alike and first[3, 3] > _NO_MASS else None
+
     def share(self, mass: float) -> dict[int, str]:
         """Writes masses into the text for links that have none, and says where they are from.
+
+        Where all links have the same, as files do that were made for planning, it is that of none.
 
         Args:
             mass: of the whole robot in kg.
@@ -138,6 +158,8 @@ class _Arm:
             ConfigurationError: if nothing is left for them.
         """
         known = {number: self._inertia(number).get_mass() for number in range(NUM_AXES + 1)}
+        if self.placeholder is not None:
+            known.clear()
         try:
             masses = assumed_masses({n: m for n, m in known.items() if m > _NO_MASS}, mass)
         except ValueError as error:
@@ -215,6 +237,7 @@ class _Arm:
         ]
         M = self._inertia(number)
         source = self._shared.get(number, source)
+        is_corrected = number not in self._shared and any(name in self._corrected for name in X_of)
         if not M.get_mass() > _NO_MASS:
             if number:
                 raise self._text.refuse(
@@ -236,7 +259,7 @@ class _Arm:
             "mass": M.get_mass(),
             "inertia": moments.tolist(),
             "products": products.tolist(),
-            "source": source,
+            "source": f"{source}; inertia made the nearest that a body can have" if is_corrected else source,
             "center_of_mass": p.tolist(),
             "center_of_mass_source": source,
             "radius": assumed_radius(M.get_mass(), principal, reach),

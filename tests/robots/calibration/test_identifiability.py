@@ -52,6 +52,16 @@ def test_the_independent_parameters_are_those_of_table_2_2(position_only: bool, 
     assert [found.names[i] for i in found.independent] == expected
 
 
+def test_an_elbow_somewhat_beside_its_arm_has_the_same_parameters():
+    """A hundredth of one here: an error across the arm is then one along it, too, and must not be lost."""
+    robot = plain()
+    placement = robot.joints[2].placement
+    robot.joints[2].placement = replace(placement, translation=placement.translation + [1e-5, 0.0, 0.0])
+    found = identifiable_parameters(robot)
+    assert [found.names[i] for i in found.independent] == WITH_POSE
+    assert found.explain()["pl_23x"]["pl_23z"] == pytest.approx(1e-5 / 0.35, rel=0.01)
+
+
 def test_the_dependent_parameters_lie_where_table_2_2_and_its_errata_say():
     """Lengths of table 2.1: l_01z = 0.219, l_23z = 0.35, l_45x + l_56x by the wrist."""
     shares = identifiable_parameters(plain()).explain()

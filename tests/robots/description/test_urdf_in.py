@@ -148,6 +148,35 @@ def test_masses_that_are_missing_come_from_that_of_the_robot(tmp_path: Path):
     assert np.ptp(robot.links[5].inertia) < 1e-12  # the flange is at the tool: a ball
 
 
+def test_masses_that_are_all_the_same_are_a_placeholder(tmp_path: Path):
+    path = tmp_path / "arm.urdf"
+    path.write_text(arm())
+    assert read_urdf(path, "URDF").placeholder == 2.0
+    found = read_urdf(path, "URDF", mass=40.0)
+    masses = np.array([link.mass for link in robot_of(found.nodes).links])
+    np.testing.assert_allclose(masses, 40.0 * np.array(SHARES[1:]))
+    assert found.placeholder is None
+    assert "masses of 7 links" in found.assumed
+    path.write_text(arm().replace('ixx="0.02"', 'ixx="0.021"', 3))
+    assert read_urdf(path, "URDF").placeholder is None
+
+
+def test_an_inertia_that_is_somewhat_too_flat_becomes_that_of_a_flat_body(tmp_path: Path):
+    """The second moment of mass across it is zero, the others stay; nothing changes about axes or sources."""
+    path = tmp_path / "arm.urdf"
+    path.write_text(arm().replace('iyy="0.03"', 'iyy="0.07"', 2))  # of the base and of link 1
+    found = read_urdf(path, "URDF")
+    robot = robot_of(found.nodes)
+    assert list(found.corrected) == ["l0", "l1"]
+    tensor = np.diag(robot.links[0].inertia)
+    tensor[np.triu_indices(3, 1)] = tensor[np.tril_indices(3, -1)] = robot.links[0].products
+    moments = np.linalg.eigvalsh(tensor)
+    assert moments[0] + moments[1] == pytest.approx(moments[2])
+    assert moments[2] == pytest.approx(0.07, rel=0.01)
+    assert "nearest that a body can have" in robot.links[0].source
+    assert "nearest" not in robot.links[0].center_of_mass_source + robot.links[1].source
+
+
 @pytest.mark.parametrize("name", shipped_robots())
 def test_robots_whose_links_are_known_have_their_masses_where_those_of_others_are_assumed(name: str):
     robot = load_robot(name)
@@ -212,7 +241,7 @@ def test_a_mass_that_leaves_nothing_to_assume_is_refused(
     bare: list[int], mass: float, reason: str, tmp_path: Path
 ):
     path = tmp_path / "arm.urdf"
-    path.write_text(arm(bare=bare))
+    path.write_text(arm(bare=bare).replace('ixx="0.02"', 'ixx="0.021"', 3))
     with pytest.raises(ConfigurationError, match=reason):
         read_urdf(path, "URDF", mass=mass)
 

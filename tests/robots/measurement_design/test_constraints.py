@@ -97,6 +97,20 @@ def test_the_floor_is_under_an_upright_robot_and_far_from_others():
     assert floor_under(replace(UR10, base=Placement(np.zeros(3), np.array([0.0, 90.0, 0.0])))) < -50.0
 
 
+@pytest.mark.parametrize("height", [0.675, 0.0])
+def test_a_robot_whose_file_has_no_base_is_not_always_on_the_floor(height: float):
+    """Joint 1 is on the floor, as in many URDFs, or the origin is in the shoulder, as in tables of links."""
+    robot = load_robot("kr16")
+    joints = list(robot.joints)
+    for index, translation in enumerate(([0.0, 0.0, 0.0], [0.26, 0.0, height])):
+        placement = replace(joints[index].placement, translation=np.array(translation))
+        joints[index] = replace(joints[index], placement=placement)
+    changed, q = replace(robot, joints=joints), random(robot, 200)
+    free = AdmissibleConfigurations(changed)(q)
+    assert free.sum() > 0.7 * AdmissibleConfigurations(robot, AdmissibleConfig(floor=0.675 - height))(q).sum()
+    assert Kinematics(changed).forward(q)[free, 2, 3].min() > min(0.0, height - 0.3)
+
+
 def test_the_grid_has_the_robot_s_own_ranges():
     robot = load_robot("puma560")
     for axis, joint in zip(own_ranges(robot), robot.joints, strict=True):
