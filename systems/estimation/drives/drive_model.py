@@ -347,8 +347,10 @@ class DriveModel:
         gains = memory.gains
         gains.all[:] = memory.coming.all
         memory.coming.factors[:] = 0.0
-        memory.z[..., 0], memory.z[..., 1] = memory.w / gains.ki[:, None], 0.0
-        memory.deviation.z[..., 0], memory.deviation.z[..., 1] = memory.deviation.last / gains.ki[0], 0.0
+        # What motors are still behind by goes on from there, or commands would leap.
+        memory.z[..., 0] = (memory.w - gains.kp * memory.z[..., 1]) / gains.ki[:, None]
+        deviation = memory.deviation
+        deviation.z[..., 0] = (deviation.last - gains.kp * deviation.z[..., 1]) / gains.ki[0]
         self._doubt(memory, keeps_beta=False)
         self.open_low_speeds(memory, is_early=True)
         return float((self._drives.ki[0] / gains.ki[0]).mean())

@@ -135,6 +135,24 @@ def test_motors_at_rest_do_not_leap_when_gains_are_taken():
     assert not memory.beta[1:].any()  # but for the dead time
 
 
+def test_commands_do_not_leap_while_motors_still_come_to_rest():
+    """What they are behind by fades with the new gains; before, it was gone in a tick."""
+    model, memory = drives(takes_torque=False)
+    still = np.zeros(6)
+    for time in PERIOD * np.arange(300):
+        model.command(memory, motion(time), LOADS, 7.0)
+    theta = motion(0.3)[0]
+    ahead = [model.command(memory, (theta, still, still), LOADS, 7.0).position - theta for _ in range(20)]
+    found = searched(0.6, 0.5, 1.67)
+    assert found
+    model.prepare_gains(memory, found)
+    model.take_gains(memory)
+    after = model.command(memory, (theta, still, still), LOADS, 7.0).position - theta
+    leap = np.abs(after - ahead[-1]).max()
+    assert leap < 1.5 * np.abs(ahead[-1] - ahead[-2]).max()
+    assert np.abs(ahead[-1]).max() > 10.0 * leap
+
+
 def test_stiffer_ones_are_not_looked_for_where_torques_are_sent():
     assert searched(2.0, 2.0, 1.0, noise=1e-7, unlike=UNLIKE) is None
 
