@@ -2,13 +2,14 @@
 
 Path, load and home position of a scenario fit one robot. Another one gets the same path at its own size:
 turned and moved so that the middle of the path, with the tool's orientation there, is a place where this
-robot moves freely, and smaller where it would not reach all of it. Its load is the same share of what it may
-carry. What is said explicitly, as by ``--set``, stays.
+robot moves freely, smaller where it would not reach all of it, and slower where its joints are slow. Its load
+is the same share of what it may carry. What is said explicitly, as by ``--set``, stays.
 """
 
-from collections.abc import Collection, Sequence
+import math
+from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass, replace
-from itertools import pairwise
+from itertools import pairwise, product
 from typing import Any
 
 import numpy as np
@@ -24,10 +25,13 @@ from systems.cell.events.station_events import PayloadChange
 from systems.reference.paths import ReferenceConfig, make_path
 from systems.reference.shapes import Circle, Planned, Points, Rectangle, Shape, Waypoint
 
-PATH, HOME, PAYLOAD = "reference.path", "home_deg", "station.payload"  # what is carried over
+# What is carried over
+PATH, SPEED, HOME, PAYLOAD = "reference.path", "reference.acceleration", "home_deg", "station.payload"
 _SAME = 0.05  # m, and of direction cosines: robots that are one machine with errors differ by less
 _PLACES = (12, 96)  # for its middle, the best first; the others where none of the first will do
-_SIZES = (1.0, 0.8, 0.6, 0.45, 0.3, 0.2, 0.12)  # of the path, over what the lengths of the arms say
+# Sizes of the path, over what the lengths of the arms say: rather slower than very small
+_SIZES = (1.0, 0.8, 0.6, 0.45, 0.3), (0.2, 0.12)
+_SLOWEST = 0.03  # times its acceleration, for slow joints
 _SAMPLES = 120  # of a path, at which it is tried
 _JUMP = 0.6  # rad between two of them: another branch
 _MARGIN = np.deg2rad(3.0)  # from the limits of the joints
@@ -77,12 +81,15 @@ def carried_over(
         scenario = _with_load(scenario, before, robot)
         notes.append(f"payload {scenario.station.payload:g} kg")
     if not _is_stated(PATH, stated):
-        placed = _place(scenario, before, robot)
-        reference = replace(scenario.reference, path=placed.path)
+        placed = _place(scenario, before, robot, not _is_stated(SPEED, stated))
+        usual = scenario.reference.acceleration
+        reference = replace(scenario.reference, path=placed.path, acceleration=placed.acceleration)
         scenario = replace(scenario, reference=reference)
         if not _is_stated(HOME, stated):
             scenario = replace(scenario, home_deg=np.round(np.rad2deg(placed.start), 3))
         notes.append(f"path {placed.scale:.2g} times as large, at {_metres(placed.middle)} m")
+        if placed.acceleration < usual:
+            notes.append(f"its acceleration {placed.acceleration:.2g} 1/s^2, as its joints are slow")
     return scenario, f"carried over from {before.name} to {robot.name}: {', '.join(notes)}" if notes else ""
 
 
@@ -135,6 +142,7 @@ class _Placed:
     start: np.ndarray  # rad, shape (6,)
     middle: np.ndarray  # m, shape (3,)
     scale: float
+    acceleration: float  # 1/s^2, see `ReferenceConfig`
 
 
 class _Motion:
@@ -181,8 +189,39 @@ def _degrees(rotation: np.ndarray) -> np.ndarray:
     return np.round(np.rad2deg(zyx_from_rotation(rotation)), 6)
 
 
-def _place(scenario: Scenario, before: RobotModel, robot: RobotModel) -> _Placed:
-    old = _middle(scenario.reference)
+def _place(scenario: Scenario, before: RobotModel, robot: RobotModel, may_slow: bool) -> _Placed:
+    """Where the robot is quick enough for the path; else where the path is slowed least, for its size."""
+    reference = scenario.reference
+    is_slow, slowed = False, None
+    for sizes in _SIZES:
+        least = np.inf
+        for place, speed in _places(reference, before, robot, sizes):
+            if speed < 1.0:
+                return place
+            is_slow = True
+            # Speeds go with the root of the acceleration.
+            acceleration = 0.9 * reference.acceleration / speed**2
+            if speed / place.scale < least and acceleration > _SLOWEST * reference.acceleration:
+                least = speed / place.scale
+                slowed = replace(place, acceleration=_shortened(acceleration))
+        if slowed and may_slow:
+            return slowed
+    reason = (
+        "its joints are too slow: --set reference.acceleration=..."
+        if is_slow
+        else "say where it is: --set reference.path=... and home_deg"
+    )
+    raise ScenarioError(
+        f"no place was found where {robot.name} can follow the path '{reference.path.kind}' of "
+        f"{before.name}; {reason}"
+    )
+
+
+def _places(
+    reference: ReferenceConfig, before: RobotModel, robot: RobotModel, sizes: Sequence[float]
+) -> Iterator[tuple[_Placed, float]]:
+    """Where the robot can follow the path, the best first, and the share of the speeds that it may have."""
+    old = _middle(reference)
     _, old_front = front(before, old[:3, 3])
     candidates = np.deg2rad([robot.home_deg]) if robot.home_deg else working_positions(robot, _PLACES[-1])
     admissible = AdmissibleConfigurations(robot)
@@ -193,19 +232,20 @@ def _place(scenario: Scenario, before: RobotModel, robot: RobotModel) -> _Placed
             break
         positions = positions[admissible(positions)] if admissible(positions).any() else positions
         best = max(best, float(dexterity(robot, positions).max()))
-        trial = _Trial(scenario.reference, robot, admissible, _DEXTERITY * best)
-        for size in _SIZES:
-            for q in positions:
-                X = Kinematics(robot).forward(q)
-                motion = _Motion([old_front, front(robot, X[:3, 3])[1]], [old, X], size * larger)
-                path = motion.of(scenario.reference.path)
-                start = trial.start(path, q)
-                if start is not None:
-                    return _Placed(path, start, X[:3, 3], size * larger)
-    raise ScenarioError(
-        f"no place was found where {robot.name} can follow the path '{scenario.reference.path.kind}' of "
-        f"{before.name}; say where it is: --set reference.path=... and home_deg"
-    )
+        trial = _Trial(reference, robot, admissible, _DEXTERITY * best)
+        for size, q in product(sizes, positions):
+            X = Kinematics(robot).forward(q)
+            motion = _Motion([old_front, front(robot, X[:3, 3])[1]], [old, X], size * larger)
+            path = motion.of(reference.path)
+            followed = trial.follow(path, q)
+            if followed:
+                yield _Placed(path, followed[0], X[:3, 3], size * larger, reference.acceleration), followed[1]
+
+
+def _shortened(value: float) -> float:
+    """The next lower number of two digits."""
+    unit = 10.0 ** (math.floor(math.log10(value)) - 1)
+    return round(math.floor(value / unit) * unit, 12)
 
 
 def _middle(reference: ReferenceConfig) -> np.ndarray:
@@ -223,7 +263,7 @@ def _waypoint(X: np.ndarray) -> Waypoint:
 
 
 class _Trial:
-    """Whether a robot can follow a path freely."""
+    """Whether a robot can follow a path freely, and how fast its joints are on it."""
 
     def __init__(
         self,
@@ -236,8 +276,11 @@ class _Trial:
         self._inverse, self._dexterity = NumericInverse(robot), dexterity
         self._kinematics = Kinematics(robot)
 
-    def start(self, path: Shape, q_middle: np.ndarray) -> np.ndarray | None:
-        """Where the path begins in rad, (6,), if it is followed from its middle to both ends; else None."""
+    def follow(self, path: Shape, q_middle: np.ndarray) -> tuple[np.ndarray, float] | None:
+        """Where the path begins in rad, (6,), and the largest share of the speed that joints may have.
+
+        None if it is not followed from its middle to both ends.
+        """
         robot, timed = self._robot, make_path(replace(self._reference, path=path, laps=1))
         times = np.linspace(timed.path_start, timed.dwell_start, _SAMPLES)
         X = timed.sample(times)[0]
@@ -252,12 +295,12 @@ class _Trial:
         step = np.abs(np.diff(q, axis=0))
         is_free = (
             step.max() < _JUMP
-            and np.all(step / np.diff(times)[:, None] < _SPEED * robot.speed)
             and np.all((q > robot.lower + _MARGIN) & (q < robot.upper - _MARGIN))
             and dexterity(robot, q).min() > self._dexterity
             and self._admissible(q[::8]).all()
         )
-        return q[0] if is_free else None
+        speed = step / np.diff(times)[:, None] / (_SPEED * robot.speed)
+        return (q[0], float(speed.max())) if is_free else None
 
     def _followed(self, X_WE: np.ndarray, q: np.ndarray) -> np.ndarray | None:
         """Joint positions along poses (n, 4, 4) from a configuration on, (n, 6); None if it ends or jumps."""

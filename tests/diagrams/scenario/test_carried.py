@@ -45,6 +45,19 @@ def test_the_path_is_followed_on_one_branch_within_limits_and_speeds(name: str):
     assert scenario.station.payload == pytest.approx(robot.payload.largest_mass, rel=1e-3)
 
 
+def test_slow_joints_get_a_slower_path_unless_its_speed_is_said():
+    """A Kinova whose joints turn by 36 degrees a second."""
+    robot, scenario = robot_of("kinova.urdf"), load_scenario("misaligned")
+    carried, note = carried_over(scenario, IRB1200, robot)
+    assert "its acceleration 0." in note
+    assert carried.reference.acceleration < scenario.reference.acceleration
+    times, X = poses(carried)
+    q = inverse_kinematics(robot).along(X, np.deg2rad(carried.home_deg))
+    assert (np.abs(np.diff(q, axis=0)).max(axis=0) / np.diff(times)[0] < 0.5 * robot.speed).all()
+    with pytest.raises(ScenarioError, match=r"its joints are too slow: --set reference.acceleration"):
+        carried_over(scenario, IRB1200, robot, {"reference.acceleration"})
+
+
 def test_the_path_keeps_its_shape_and_its_turns():
     robot = robot_of("ur10_robot.urdf")
     scenario = load_scenario("misaligned")
@@ -122,7 +135,7 @@ def test_a_robot_that_can_follow_no_path_is_refused():
     robot = load_robot("kr16")
     for joint in robot.joints:
         joint.limits.speed_deg_s = 0.01
-    with pytest.raises(ScenarioError, match="no place was found where KUKA KR 16-2 can follow the path"):
+    with pytest.raises(ScenarioError, match=r"no place was found where KUKA KR 16-2 can .* too slow"):
         carried_over(load_scenario("misaligned"), IRB1200, robot)
 
 
