@@ -11,7 +11,7 @@ from rich.markup import escape
 
 from experiments.cli.console import print_files, refusing
 from experiments.cli.json_output import human_console, json_output
-from experiments.cli.option_limits import at_least, positive
+from experiments.cli.option_limits import at_least, positive, without_effect
 from experiments.cli.options import JsonOption, PictureOption
 from experiments.cli.staging import PAGE, staged_file
 from experiments.report.plot_page import Section, html_table, write_plot_page
@@ -32,6 +32,8 @@ _NAMES = {
     "passed": "passed",
 }
 LINES, LEAST_LENGTHS = 7, 5
+_CELL, _EDGE, _NOISE = "probst", 1000.0, 0.1  # of a simulation: cameras, mm of the cube, px
+_IN_METRES = 20.0  # mm; no bar is shorter, but one of 20 m in metres
 _PROBED = 25  # times that one ball is measured for the probing error
 # Directions of the lines in a box: its space diagonals, and three parallel to its edges.
 _DIRECTIONS = np.array(
@@ -47,21 +49,33 @@ def accept_cameras_command(
         ),
     ] = None,
     cell: Annotated[
-        str, typer.Option(metavar="NAME|FILE", help="The true cameras of a simulation.")
-    ] = "probst",
+        str | None,
+        typer.Option(metavar="NAME|FILE", help="The true cameras of a simulation.", show_default=_CELL),
+    ] = None,
     calibration: Annotated[
         str | None,
         typer.Option(metavar="FILE.yaml", help="What is believed of the cameras.", show_default="the truth"),
     ] = None,
     limit: Annotated[float, typer.Option(metavar="MM", help="Largest permissible error of a length.")] = 0.2,
     cube_mm: Annotated[
-        float, typer.Option("--cube", metavar="MM", help="Edge of the cube that is tested.")
-    ] = 1000.0,
+        float | None,
+        typer.Option(
+            "--cube", metavar="MM", help="Edge of the cube that is tested.", show_default=f"{_EDGE}"
+        ),
+    ] = None,
     pixel_sigma: Annotated[
-        float, typer.Option("--pixel-sigma", metavar="PX", help="Noise of an image coordinate.")
-    ] = 0.1,
-    count: Annotated[int, typer.Option(metavar="N", help="Lengths on each line.")] = LEAST_LENGTHS,
-    seed: Annotated[int, typer.Option(metavar="N", help="Seed of the noise.")] = 0,
+        float | None,
+        typer.Option(
+            "--pixel-sigma", metavar="PX", help="Noise of an image coordinate.", show_default=f"{_NOISE}"
+        ),
+    ] = None,
+    count: Annotated[
+        int | None,
+        typer.Option(metavar="N", help="Lengths on each line.", show_default=f"{LEAST_LENGTHS}"),
+    ] = None,
+    seed: Annotated[
+        int | None, typer.Option(metavar="N", help="Seed of the noise.", show_default="0")
+    ] = None,
     out: PictureOption = Path("out/accept-cameras.html"),
     json_file: JsonOption = None,
 ) -> None:
@@ -74,8 +88,25 @@ def accept_cameras_command(
             positive(name, value)
         probing = None
         if lengths is None:
-            table, probing = simulated(cell, calibration or cell, 1e-3 * cube_mm, pixel_sigma, count, seed)
+            truth = cell or _CELL
+            table, probing = simulated(
+                truth,
+                calibration or truth,
+                1e-3 * (cube_mm or _EDGE),
+                pixel_sigma or _NOISE,
+                count or LEAST_LENGTHS,
+                seed or 0,
+            )
         else:
+            for name, value in (
+                ("--cell", cell),
+                ("--calibration", calibration),
+                ("--cube", cube_mm),
+                ("--pixel-sigma", pixel_sigma),
+                ("--count", count),
+                ("--seed", seed),
+            ):
+                without_effect(name, value, "--lengths: nothing is simulated")
             table = read_lengths(lengths)
         numbers = judged(table, probing, limit)
         page = stack.enter_context(staged_file(out, *PAGE))
@@ -143,9 +174,12 @@ def read_lengths(path: str) -> np.ndarray:
     """
     table = parse_fields(read_text(path), path, has_head=True)
     head = table.rows[0]
-    missing = [name for name in COLUMNS if name not in head]
+    missing = [name for name in COLUMNS if head.count(name) != 1]
     if missing:
-        raise TextTableError(f"{table.where(0)}: no column {missing[0]}; needed are {', '.join(COLUMNS)}")
+        raise TextTableError(
+            f"{table.where(0)}: one column {missing[0]} is needed, there are {head.count(missing[0])}; "
+            f"needed are {', '.join(COLUMNS)}"
+        )
     rows = []
     for number, fields in enumerate(table.rows[1:], 1):
         if len(fields) != len(head):
@@ -157,16 +191,30 @@ def read_lengths(path: str) -> np.ndarray:
                 raise TextTableError(
                     f"{table.where(number)}: {name} is not a finite number, got '{row[name]}'"
                 )
+        _refuse_row(row, values, table.where(number))
         rows.append(values)
     found = np.array(rows, dtype=float).reshape(-1, len(COLUMNS))
-    lines, counts = np.unique(found[:, 0], return_counts=True)
-    least = int(counts.min()) if len(counts) else 0
+    lines = np.unique(found[:, 0])
+    # A length that was measured several times is one length, to a mm: the guideline wants different ones.
+    least = min((len(np.unique(found[found[:, 0] == line, 1].round())) for line in lines), default=0)
     if len(lines) < LINES or least < LEAST_LENGTHS:
         raise TextTableError(
             f"{path}: {LINES} lines with {LEAST_LENGTHS} lengths each are needed, got {len(lines)} lines "
-            f"with {least} at least"
+            f"with {least} different ones at least"
         )
     return found
+
+
+def _refuse_row(row: dict[str, str], values: list[float | None], where: str) -> None:
+    """Raises TextTableError for what is no line of a ball bar's lengths."""
+    line, *lengths = values
+    if line is None or line != round(line):
+        raise TextTableError(f"{where}: line must be the number of a line, got '{row['line']}'")
+    for name, value in zip(COLUMNS[1:], lengths, strict=True):
+        if value is None or value < _IN_METRES:
+            raise TextTableError(
+                f"{where}: {name} must be at least {_IN_METRES:g}, got {row[name]}: is it in mm?"
+            )
 
 
 def judged(table: np.ndarray, probing: float | None, limit: float) -> dict[str, Any]:

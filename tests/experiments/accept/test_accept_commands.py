@@ -40,6 +40,44 @@ def test_recorded_lengths_are_judged_by_the_largest_error(tmp_path: Path):
     )
 
 
+def _lengths(line: int, k: int) -> list[float]:
+    return [line, 200.0 * k, 200.0 * k + 0.05]
+
+
+@pytest.mark.parametrize(
+    ("row", "message"),
+    [
+        (
+            lambda line, k: [line, 0.2 * k, 0.2 * k],
+            "line 2: nominal_mm must be at least 20, got 0.2: is it in",
+        ),
+        (
+            lambda line, k: [line, 200.0 * k, -200.0 * k],
+            "line 2: measured_mm must be at least 20, got -200.0",
+        ),
+        (
+            lambda line, k: [line + 0.5, *_lengths(line, k)[1:]],
+            "line must be the number of a line, got '1.5'",
+        ),
+        (lambda line, k: _lengths(line, 1 + k % 2), "got 7 lines with 2 different ones at least"),
+    ],
+)
+def test_a_table_that_is_none_of_lengths_is_refused(row, message: str, tmp_path: Path):
+    table = tmp_path / "lengths.csv"
+    rows = [",".join(map(str, row(line, k))) for line in range(1, 8) for k in range(1, 6)]
+    table.write_text("\n".join(["line,nominal_mm,measured_mm", *rows]))
+    out = tmp_path / "c.html"
+    assert message in refusal(truetip("accept", "cameras", "--lengths", table, "--report", out))
+
+
+def test_two_columns_of_one_name_are_refused(tmp_path: Path):
+    table = tmp_path / "lengths.csv"
+    table.write_text("line,nominal_mm,measured_mm,measured_mm\n1,200,200.1,205\n")
+    out = tmp_path / "c.html"
+    found = refusal(truetip("accept", "cameras", "--lengths", table, "--report", out))
+    assert "lengths.csv, line 1: one column measured_mm is needed, there are 2" in found
+
+
 @pytest.mark.slow
 def test_the_table_of_a_robot_has_a_column_for_each_speed(tmp_path: Path):
     result = truetip(
@@ -83,6 +121,11 @@ def test_a_guided_robot_is_judged_by_what_its_camera_measures(tmp_path: Path):
         (["cameras", "--count", "4"], "--count must be at least 5, got 4"),
         (["cameras", "--cube", "1e5"], "a ball is not seen by two cameras"),
         (["cameras", "--lengths", "none.csv"], "none.csv"),
+        (
+            ["cameras", "--lengths", "l.csv", "--calibration", "c.yaml"],
+            "--calibration has no effect with --lengths",
+        ),
+        (["cameras", "--lengths", "l.csv", "--seed", "0"], "--seed has no effect with --lengths"),
     ],
 )
 def test_wrong_arguments_are_refused_in_one_line(
