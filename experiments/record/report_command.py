@@ -11,6 +11,7 @@ from rich.markup import escape
 from diagrams.record.log import RunLog
 from diagrams.record.read_record import read_record
 from diagrams.record.restored import restored
+from diagrams.scenario.differences import scenario_differences
 from experiments.cli.console import print_files, progress_bar, refusing
 from experiments.cli.json_output import human_console, json_output
 from experiments.cli.options import JsonOption, PictureOption
@@ -20,6 +21,9 @@ from experiments.cli.tables import print_summary
 from experiments.metrics.run_metrics import summary
 from experiments.report.report import verdict, write_report
 from robots.description.model import RobotModel
+
+# Fields that may differ between runs of one scenario.
+_OF_A_RUN = ("description", "law", "seed", "station.link.")
 
 
 def report_command(
@@ -48,7 +52,7 @@ def _read(records: list[Path], progress: Any) -> tuple[str, dict[str, list[RunLo
     """The scenario of the first record, and the logs of each law in the order of their seeds.
 
     Raises:
-        ValueError: if a record does not hold a whole run, or two hold the same.
+        ValueError: if a record does not hold a whole run, two hold the same, or one is of another scenario.
     """
     text, logs = "", dict[str, list[RunLog]]()
     for number, file in enumerate(records):
@@ -58,8 +62,21 @@ def _read(records: list[Path], progress: Any) -> tuple[str, dict[str, list[RunLo
             raise ValueError(f"{file}: a run of law {log.law} with seed {log.seed} is there twice")
         logs.setdefault(log.law, []).append(log)
         text = text or contents.scenario
+        _refuse_another(file, contents.scenario, records[0], text)
         progress((number + 1) / len(records))
     return text, {law: sorted(cycles, key=lambda log: log.seed) for law, cycles in logs.items()}
+
+
+def _refuse_another(file: Path, text: str, first: Path, of_first: str) -> None:
+    """Raises ValueError if a record is of another scenario than the first: they would look like one."""
+    differing = [
+        f"{place} is {here} here and {there} there"
+        for place, here, there in scenario_differences(text, of_first)
+        if not place.startswith(_OF_A_RUN)
+    ]
+    if differing:
+        more = f" ({len(differing)} fields differ)" if len(differing) > 1 else ""
+        raise ValueError(f"{file}: a run of another scenario than {first}: {differing[0]}{more}")
 
 
 def _true_robot(text: str) -> RobotModel | None:

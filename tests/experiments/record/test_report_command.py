@@ -50,6 +50,16 @@ def test_one_run_twice_is_refused(logs: dict[str, list[RunLog]], tmp_path: Path)
     assert files(tmp_path) == before
 
 
+def test_runs_of_two_scenarios_are_refused_with_what_differs(logs: dict[str, list[RunLog]], tmp_path: Path):
+    for number, (law, cycles) in enumerate(logs.items()):
+        text = f"law: {law}\nseed: {number}\nstation: {{payload: {number}.0, period: 0.004}}\n"
+        write_records(tmp_path, text, {law: cycles[:1]})
+    records = sorted(tmp_path.glob("*.mcap"))
+    said = refusal(truetip("report", *records, "--report", tmp_path / "page.html"))
+    assert "pbvs-1.mcap: a run of another scenario than" in said
+    assert "station.payload is 1 here and 0 there" in said
+
+
 def test_an_index_has_a_line_for_each_law_with_its_figures(logs: dict[str, list[RunLog]], tmp_path: Path):
     for name in ("a", "b/c"):
         (tmp_path / name).mkdir(parents=True)
