@@ -44,10 +44,16 @@ def optimised_markers(
 
     Returns:
         The best markers that were found, (m, 3) in m; those of the beginning if none was better.
+
+    Raises:
+        ValueError: if the markers to begin with are nearer to each other or more alike than that, and no step
+            of one of them mended it.
     """
     rng = np.random.default_rng(seed)
     low, high = p_E.min(axis=0), p_E.max(axis=0)
-    best, lowest = p_E.copy(), score(p_E)
+    best, lowest = p_E.copy(), np.inf
+    if spacing(p_E) >= least and distinct(p_E) >= alike:
+        lowest = score(p_E)
     for step in range(steps):
         length = _FIRST * (_LAST / _FIRST) ** (step / max(1, steps - 1))
         tried = best.copy()
@@ -59,6 +65,12 @@ def optimised_markers(
                 best, lowest = tried, found
         if progress:
             progress((step + 1) / steps)
+    if lowest == np.inf:
+        raise ValueError(
+            f"body: its markers are {1e3 * spacing(p_E):.1f} mm apart and their distances differ by "
+            f"{1e3 * distinct(p_E):.1f} mm at least; in {steps} steps none was found where these are "
+            f"{1e3 * least:g} and {1e3 * alike:g} mm: allow less, or try more steps"
+        )
     return best
 
 
