@@ -47,20 +47,27 @@ class Budget:
         return np.sqrt(sum(np.trace(part[:, :3, :3], axis1=1, axis2=2) for part in self.by_cause.values()))
 
     def shares(self) -> dict[str, np.ndarray]:
-        """The variance of each cause over that of the position, (p,)."""
+        """The variance of each cause over that of the position, (p,); zero of a position that is exact."""
         total = self.position**2
+        total[total == 0.0] = np.inf
         return {
             name: np.trace(part[:, 3:, 3:], axis1=1, axis2=2) / total for name, part in self.by_cause.items()
         }
 
+    def mean_shares(self) -> dict[str, float]:
+        """Their means over the poses that are seen and uncertain."""
+        counts = self.position > 0.0
+        return {name: float(np.mean(share[counts])) for name, share in self.shares().items()}
+
     def largest_deviation(self) -> float:
-        """Of the simulated uncertainties from the budget, relative."""
-        return float(np.abs(self.simulated / self.position[self.checked] - 1.0).max())
+        """Of the simulated uncertainties from the budget, relative, where there is any."""
+        expected = self.position[self.checked]
+        counts = expected > 0.0
+        return float(np.abs(self.simulated[counts] / expected[counts] - 1.0).max())
 
     def as_dict(self) -> dict[str, Any]:
-        """For JSON; shares are means over the poses that are seen."""
+        """For JSON."""
         seen = np.isfinite(self.position)
-        shares = {name: float(np.mean(share[seen])) for name, share in self.shares().items()}
         return {
             "poses": len(self.time),
             "seen": int(seen.sum()),
@@ -69,7 +76,7 @@ class Budget:
                 "largest": 1e6 * float(self.position[seen].max()),
             },
             "rotation_mdeg_median": 1e3 * float(np.rad2deg(np.median(self.rotation[seen]))),
-            "shares": shares,
+            "shares": self.mean_shares(),
             "simulated_deviation": self.largest_deviation(),
         }
 
@@ -144,6 +151,10 @@ def budget(
     if not len(visible):
         raise ValueError("budget: the cameras see the tool nowhere on the path")
     worst = int(np.nanargmax(_position(by_cause)))
+    if _position(by_cause)[worst] == 0.0:
+        raise ValueError(
+            "budget: nothing is uncertain that moves a position; let one of the causes be positive"
+        )
     even = visible[np.linspace(0, len(visible) - 1, _CHECKED - 1).astype(int)]
     checked = np.unique([*even, worst])
     rng, simulated = np.random.default_rng(prepared.scenario.seed), []

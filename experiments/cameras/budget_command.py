@@ -4,7 +4,6 @@ from contextlib import ExitStack
 from pathlib import Path
 from typing import Annotated
 
-import numpy as np
 import plotly.graph_objects as go
 import typer
 from rich.markup import escape
@@ -164,6 +163,4 @@ def _rows(found: Budget, given: Uncertainties) -> list[list[str]]:
         TEMPERATURE: f"±{given.temperature:g} K; frame {1e6 * given.frame_expansion:g} and body "
         f"{1e6 * given.body_expansion:g} ppm/K",
     }
-    return [
-        [name, said[name], f"{100.0 * np.nanmean(share):.1f} %"] for name, share in found.shares().items()
-    ]
+    return [[name, said[name], f"{100.0 * share:.1f} %"] for name, share in found.mean_shares().items()]

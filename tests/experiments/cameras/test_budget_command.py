@@ -28,6 +28,21 @@ def test_the_shares_are_a_whole_and_late_stamps_take_over(tmp_path: Path):
     assert "Along the path" in (tmp_path / "b.html").read_text()
 
 
+EXACT = ["--pixel-sigma", "--camera-mm", "--camera-urad", "--tool-mm", "--temperature"]
+
+
+def test_where_nothing_is_uncertain_is_no_share_of_anything(tmp_path: Path):
+    """Late stamps alone are no uncertainty at the corners, where the tool is at rest."""
+    zeros = [word for option in EXACT for word in (option, "0")]
+    found = budget(tmp_path, *zeros)
+    assert found["shares"]["time stamps"] == pytest.approx(1.0)
+    arguments = ["cameras", "budget", "--report", str(tmp_path / "c.html"), *zeros, "--time-ms", "0"]
+    result = CliRunner().invoke(app, arguments)
+    assert result.exit_code == 2
+    assert "budget: nothing is uncertain that moves a position" in result.stderr
+    assert not (tmp_path / "c.html").exists()
+
+
 def test_what_cannot_be_is_refused_in_one_line(tmp_path: Path):
     for option, value, message in (
         ("--pixel-sigma", "-1", "uncertainty pixel must be zero or positive, got -1.0"),
