@@ -97,6 +97,10 @@ def health_command(
             raise ValueError("--change-at needs --change")
         first = len(before.time) + 1 if change_at is None else change_at
         at_least("--change-at", 1, first)
+        if first > len(before.time) + checks:
+            raise ValueError(
+                f"--change-at {first}: the last check of this run is {len(before.time) + checks}"
+            )
         page = stack.enter_context(staged_file(out, *PAGE))
         table = stack.enter_context(staged_file(history, *_HISTORY))
         stack.enter_context(output.staged())

@@ -62,6 +62,8 @@ class Injected:
             size = float(np.inf if [kind, rest[-1]] == ["marker", "lost"] else rest[-1])
         except (IndexError, ValueError):
             raise ValueError(f"--change must be {form}, got '{text}'") from None
+        if not np.isfinite(size) and rest[-1] != "lost":
+            raise ValueError(f"--change {text}: the size must be a finite number, got '{rest[-1]}'")
         if kind == "tool" and len(rest) == 1:
             return cls(kind, "", 1e-3 * size)
         if kind == "joint" and len(rest) == 2 and rest[0] in map(str, range(1, NUM_JOINTS + 1)):

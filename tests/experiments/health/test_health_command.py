@@ -58,7 +58,10 @@ def test_a_history_goes_on_and_a_joint_that_drifts_is_named(tmp_path: Path):
         (["--checks", "0"], "--checks must be at least 1, got 0"),
         (["--change", "joint:7:1"], "--change must be joint:N:MDEG, tool:MM, camera:NAME:MICRORADIANS"),
         (["--change", "camera:99:1"], "the cameras are 01, 02"),
+        (["--change", "marker:5:nan"], "--change marker:5:nan: the size must be a finite number, got 'nan'"),
+        (["--change", "joint:3:inf"], "--change joint:3:inf: the size must be a finite number, got 'inf'"),
         (["--change-at", "2"], "--change-at needs --change"),
+        (["--change", "joint:3:40", "--change-at", "2"], "--change-at 2: the last check of this run is 1"),
         (["--with-cell", "--change", "joint:3:40"], "--change changes a simulated station"),
         (
             ["--with-cell", "--checks", "2"],
