@@ -122,7 +122,10 @@ def test_what_is_wrong_with_a_recording_is_said_in_one_line(recording: Path, tmp
         (["--study", "--places", "0"], "--places must be at least 1, got 0"),
         (["--study", "--images", "x"], "--study draws its own images"),
         (["--images", "none"], "--images none: must be a folder with joints.csv"),
-        (["--minutes", "-1"], "--minutes must not be negative, got -1"),
+        (["--study", "--minutes", "-1"], "--minutes must be zero or positive, got -1"),
+        (["--study", "--minutes", "nan"], "--minutes must be zero or positive, got nan"),
+        (["--places", "3"], "--places has no effect with images that are watched: it is of --study"),
+        (["--empty", "3"], "--empty has no effect with simulated images"),
         (["--scenario", "nominal"], "takes images of the whole cell; use --scenario watched"),
     ],
 )
