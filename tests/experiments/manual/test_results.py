@@ -9,6 +9,7 @@ ROOT = Path(__file__).resolve().parents[3]
 PAGES = [(ROOT / "docs" / "reference" / name).read_text() for name in ("results.md", "files.md")]
 # Functions that make what --json writes; other functions of these names make parts of other files.
 WRITERS = {
+    "accept/cameras_command.py": ("judged",),
     "accept/robot_cycle.py": ("pose_results", "path_results"),
     "accept/robot_page.py": ("results",),
     "accept/tracker_command.py": ("_numbers",),
@@ -21,6 +22,7 @@ WRITERS = {
     "cameras/sweeps.py": ("as_dict",),
     "compensate/report.py": ("compensation_json",),
     "feedforward/study.py": ("study_json",),
+    "health/study.py": ("_alarm",),
     "identify/fine_tuning/report.py": ("fine_tuning_json", "_motion_json"),
     "identify/slow.py": ("slow_json",),
     "identify/study.py": ("identify_json",),
@@ -28,10 +30,12 @@ WRITERS = {
     "metrics/run_metrics.py": ("summary",),
     "modes/study.py": ("modes_json",),
     "plan/study.py": ("plan_json",),
+    "record/runs_command.py": ("runs_below",),
     "station/guided.py": ("_link_json", "link_json"),
     "station/latency.py": ("as_dict",),
     "station/path_correction.py": ("_numbers",),
     "study/analysis.py": ("study_json",),
+    "watch/data_rates.py": ("data_rates",),
     "watch/run.py": ("as_dict",),
     "watch/study.py": ("as_dict",),
     "zeros/study.py": ("zeros_json", "one_json"),
