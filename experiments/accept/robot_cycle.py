@@ -81,7 +81,11 @@ class Visits:
 
     def of_pair(self, pose: int, before: int) -> np.ndarray:
         """Attained positions of those visits to a pose that began at another, (k, 3)."""
-        return self.position[(self.pose == pose) & (self.before == before)]
+        return self.position[self.pair(pose, before)]
+
+    def pair(self, pose: int, before: int) -> np.ndarray:
+        """Which visits to a pose began at another, (n,) bool."""
+        return (self.pose == pose) & (self.before == before)
 
 
 def visits(log: RunLog, scenario: Scenario, cycle: Cycle, cycles: int) -> Visits:
@@ -117,17 +121,21 @@ def visits(log: RunLog, scenario: Scenario, cycle: Cycle, cycles: int) -> Visits
 
 
 def pose_results(found: Visits, cycle: Cycle) -> dict[str, float | None]:
-    """AP, RP, vAP, distances, drift, stabilisation and overshoot, in mm, degrees and s."""
+    """AP, RP, vAP, distances, drift, stabilisation and overshoot, in mm, degrees and s.
+
+    Accuracy, repeatability and drift are those of visits from one side, each pose from the one before it, as
+    the standard has them (ISO 9283:1998, 7.2): what another side changes is vAP.
+    """
     e = found.error
-    at = [found.pose == k for k in range(5)]
+    at = [found.pair(k, (k - 1) % 5) for k in range(5)]
     accuracy = [float(np.linalg.norm(e[here, 3:].mean(axis=0))) for here in at]
     attained = [found.position[here] for here in at]
     middles = [found.of_pair(0, before).mean(axis=0) for before in (4, 1, 3)]
     apart = [float(np.linalg.norm(a - b)) for a in middles for b in middles]
-    # P2 to P4, each measured once a cycle by the visit of the first half.
-    first, second = found.of_pair(1, 0), found.of_pair(3, 2)
-    count = min(len(first), len(second))
-    lengths = np.linalg.norm(first[:count] - second[:count], axis=1)
+    # P2 to P4 in the first half of each cycle; P1 to P2 comes again in the second.
+    second = found.of_pair(3, 2)
+    count = len(second)
+    lengths = np.linalg.norm(found.of_pair(1, 0)[::2] - second, axis=1)
     wanted = float(np.linalg.norm(cycle.poses[1, :3, 3] - cycle.poses[3, :3, 3]))
     quarter = max(1, len(attained[0]) // 4)
     drift = attained[0][-quarter:].mean(axis=0) - attained[0][:quarter].mean(axis=0)

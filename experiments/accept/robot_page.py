@@ -86,7 +86,8 @@ def write_acceptance_page(page: Path, title: str, told: str, scenario: str, rows
     head = ("criterion", *(row.name for row in rows))
     poses = (
         "A dot is the tip at rest after one visit, less the wanted position, along the axes of the world. "
-        "How far the dots of a pose are from zero is its accuracy, how far they are apart its repeatability."
+        "How far the dots of a pose are from zero is its accuracy, how far they are apart its repeatability, "
+        "of visits from the pose before it alone; P1 from P2 and P4, and P4 from P1, show another side."
     )
     square = (
         "Above, the mean of all cycles, its distance to the path as a curve: its maximum is AT. Below, how "

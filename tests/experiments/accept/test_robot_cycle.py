@@ -6,6 +6,7 @@ import pytest
 from diagrams.record.log import RunLog
 from diagrams.scenario.scenario import Scenario, load_scenario
 from experiments.accept.robot_cycle import (
+    ORDER,
     Cycle,
     cube_poses,
     path_results,
@@ -66,6 +67,33 @@ def test_a_tip_that_drifts_steadily_has_moved_by_three_quarters_of_its_way():
 
     found = poses_of(scenario, drifting)
     assert found["dAP_mm"] == pytest.approx(0.75, abs=0.03)
+
+
+def test_what_depends_on_the_side_is_variation_and_neither_accuracy_nor_repeatability_nor_drift():
+    scenario = pose_scenario(BASE, CYCLE, 2, 1.0)
+
+    def one_sided(t: np.ndarray) -> np.ndarray:
+        span = (make_path(scenario.reference).dwell_start - 0.5) / 18
+        move = np.clip(np.floor((t - 0.5 + 1e-9) / span).astype(int) - 1, 0, None) % 9
+        before, pose = np.array(ORDER)[move], np.array(ORDER)[move + 1]
+        is_another_side = before != (pose - 1) % 5
+        return np.outer(1e-3 * is_another_side, [0.0, 0.0, 1.0])
+
+    found = pose_results(visits(log_of(scenario, one_sided), scenario, CYCLE, 2), CYCLE)
+    assert found["vAP_mm"] == pytest.approx(1.0, rel=1e-6)
+    for name in ("AP_mm", "RP_mm", "dAP_mm", "AD_mm"):
+        assert found[name] == pytest.approx(0.0, abs=1e-6), name
+
+
+def test_distances_are_those_of_one_cycle_and_drift_does_not_make_them_scatter():
+    scenario = pose_scenario(BASE, CYCLE, CYCLES, 1.0)
+    p = CYCLE.poses[:, :3, 3]
+    along = (p[3] - p[1]) / np.linalg.norm(p[3] - p[1])
+    end = make_path(scenario.reference).dwell_start
+    found = poses_of(scenario, lambda t: np.outer(1e-3 * t / end, along))
+    # From P2 to P4 are two of the 36 moves of the whole run.
+    assert found["AD_mm"] == pytest.approx(2.0 / 36.0, rel=0.02)
+    assert found["RD_mm"] == pytest.approx(0.0, abs=1e-6)
 
 
 def test_a_tip_that_rings_out_needs_the_time_until_its_amplitude_is_that_of_the_band():
