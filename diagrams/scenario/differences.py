@@ -42,12 +42,24 @@ def scenario_differences(text: str, other: str | None = None) -> list[tuple[str,
     ]
 
 
-def _leaves(text: str) -> dict[str, str]:
+def scenario_tree(text: str) -> dict[str, Any]:
+    """What stands in a scenario, also in one of another version: nothing is checked, and tags are ``kind``.
+
+    Args:
+        text: the scenario as YAML.
+
+    Returns:
+        Values by name, as far as the text is a scenario at all.
+    """
     try:
         tree = yaml.load(text, Loader=_AnyTag)  # it extends the safe loader
     except yaml.YAMLError:
         return {}
-    return dict(_flat(tree, "")) if isinstance(tree, dict) else {}
+    return tree if isinstance(tree, dict) else {}
+
+
+def _leaves(text: str) -> dict[str, str]:
+    return dict(_flat(scenario_tree(text), ""))
 
 
 def _flat(value: Any, place: str) -> list[tuple[str, str]]:

@@ -9,9 +9,10 @@ import plotly.graph_objects as go
 import typer
 from rich.markup import escape
 
-from diagrams.record.read_record import read_record
+from diagrams.record.read_record import Contents, read_record
 from diagrams.record.restored import exposures
 from diagrams.record.topics import JOINTS, POSE
+from diagrams.scenario.differences import scenario_tree
 from experiments.cli.console import print_files, refusing
 from experiments.cli.json_output import human_console, json_output
 from experiments.cli.option_limits import positive
@@ -25,6 +26,7 @@ from robots.metrology.number_table import read_table
 from robots.pose import zyx_from_rotation
 
 _UNITS = {"mm": 1e-3, "m": 1.0}
+_ROBOT = "irb1200"  # of a record that does not say
 _FEWEST = 100  # samples of an instrument
 _SAID = {
     "first": "the camera explains them",
@@ -43,9 +45,14 @@ def accept_tracker_command(
         ),
     ],
     robot: Annotated[
-        str,
-        typer.Option("--robot", metavar="NAME|FILE", help="Whose joints tell which instrument is wrong."),
-    ] = "irb1200",
+        str | None,
+        typer.Option(
+            "--robot",
+            metavar="NAME|FILE",
+            help="Whose joints tell which instrument is wrong.",
+            show_default="that of the record",
+        ),
+    ] = None,
     unit: Annotated[str, typer.Option(metavar="mm|m", help="Unit of the coordinates.")] = "mm",
     window: Annotated[float, typer.Option(metavar="S", help="By which the clocks may differ at most.")] = 2.0,
     out: PictureOption = Path("out/accept-tracker.html"),
@@ -57,12 +64,15 @@ def accept_tracker_command(
         positive("--window", window)
         if unit not in _UNITS:
             raise ValueError(f"--unit must be mm or m, got '{unit}'")
-        kinematics = Kinematics(load_robot(robot))
+        contents = read_record(record)
+        name = robot or str(scenario_tree(contents.scenario).get("robot", _ROBOT))
+        kinematics = Kinematics(load_robot(name))
         page = stack.enter_context(staged_file(out, *PAGE))
         stack.enter_context(output.staged())
-        camera, joints = _recorded(record, kinematics)
-        second = fitted(camera, _seen(seen, _UNITS[unit]), window)
-        share = share_of_first(second, fitted(camera, joints, window))
+        camera, joints = _recorded(record, contents, kinematics)
+        second = _fitted(f"{record} and {seen} in {unit}", camera, _seen(seen, _UNITS[unit]), window)
+        third = _fitted(f"camera and joints of {record} with --robot {name}", camera, joints, window)
+        share = share_of_first(second, third)
         verdict = tracker_verdict(second, share)
         write_tracker_page(page, f"{Path(record).name} and {Path(seen).name}", verdict, second, share)
         output.write(_numbers(second, share))
@@ -70,9 +80,16 @@ def accept_tracker_command(
     print_files(human, out)
 
 
-def _recorded(record: str, kinematics: Kinematics) -> tuple[Followed, Followed]:
-    """What the camera and what the joints say of the tool. Raises ValueError, OSError."""
-    contents = read_record(record)
+def _fitted(what: str, first: Followed, second: Followed, window: float) -> Fit:
+    """`fitted`, whose refusals say of what they are. Raises ValueError."""
+    try:
+        return fitted(first, second, window)
+    except ValueError as error:
+        raise ValueError(f"{what}: {error}") from error
+
+
+def _recorded(record: str, contents: Contents, kinematics: Kinematics) -> tuple[Followed, Followed]:
+    """What the camera and what the joints say of the tool. Raises ValueError."""
     missing = [topic for topic in (JOINTS, POSE) if topic not in contents.topics]
     if missing:
         raise ValueError(f"record {record}: no messages of {', '.join(missing)}")

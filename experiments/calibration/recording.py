@@ -3,11 +3,11 @@
 from pathlib import Path
 
 import numpy as np
-import yaml
 
 from diagrams.record.read_record import Contents, read_record
 from diagrams.record.restored import exposures
 from diagrams.record.topics import JOINTS, POSE
+from diagrams.scenario.differences import scenario_tree
 from robots.calibration.dwells import DwellRule, Recording, RecordingError, dwell_measurements
 from robots.calibration.measurements import Measurements
 from robots.description.model import RobotModel
@@ -41,5 +41,5 @@ def recorded_measurements(path: str | Path, robot: RobotModel, rule: DwellRule |
 
 def _payload(contents: Contents) -> float:
     """The load at the flange in kg; nothing where the record does not say."""
-    scenario = yaml.safe_load(contents.scenario) if contents.scenario else {}
-    return float(scenario.get("station", {}).get("payload") or 0.0)
+    station = scenario_tree(contents.scenario).get("station")
+    return float(station.get("payload") or 0.0) if isinstance(station, dict) else 0.0

@@ -15,6 +15,7 @@ from experiments.cameras.study import study_setup
 from experiments.cli.prepare import Prepared
 from robots.description.model import RobotModel
 from robots.kinematics.arm_capsules import ArmCapsules
+from robots.kinematics.forward import Kinematics
 from systems.reference.paths import make_path
 from systems.vision.camera_model import Cameras
 from systems.vision.marker_body import DetectionBody
@@ -24,6 +25,7 @@ from systems.vision.uncertainty.simulated_poses import simulated_errors
 from systems.vision.visibility import in_window, occluded
 
 _CHECKED = 5  # poses that are simulated
+_ANOTHER_ROBOT = 0.15  # m, off the path; no robot errs by so much
 
 
 @dataclass(frozen=True)
@@ -101,18 +103,24 @@ def motion_on_path(prepared: Prepared, places: Places) -> Motion:
     return Motion(time, places, path.sample(time)[1])
 
 
-def motion_of_record(name: str | Path, count: int) -> Motion:
+def motion_of_record(name: str | Path, count: int, robot: RobotModel) -> Motion:
     """Places of the record of a run, evenly in time from its start to the dwell.
 
     Raises:
         OSError: if it cannot be read.
-        ValueError: if it is no record of a whole run.
+        ValueError: if it is no record of a whole run, or one of another robot.
     """
     log = restored(read_record(name), str(name))
     inside = np.flatnonzero((log.time >= log.path_start) & (log.time <= log.dwell_start))[1:-1]
     if len(inside) < count:
         raise ValueError(f"record {name}: {len(inside)} samples on the path, at least {count} are needed")
     chosen = inside[np.linspace(0, len(inside) - 1, count).astype(int)]
+    away = Kinematics(robot).forward(log.joint_position[chosen])[:, :3, 3] - log.X_WE_desired[chosen, :3, 3]
+    if (off := float(np.median(np.linalg.norm(away, axis=1)))) > _ANOTHER_ROBOT:
+        raise ValueError(
+            f"record {name}: its joints put the tool of {robot.name} {1e3 * off:.0f} mm off the path: it is "
+            "of another robot; --set robot=NAME"
+        )
     X, step = log.X_WE_desired, log.time[chosen + 1] - log.time[chosen - 1]
     turn = Rotation.from_matrix(X[chosen + 1, :3, :3]) * Rotation.from_matrix(X[chosen - 1, :3, :3]).inv()
     moved = np.hstack([turn.as_rotvec(), X[chosen + 1, :3, 3] - X[chosen - 1, :3, 3]])
@@ -142,7 +150,11 @@ def budget(
     setup = study_setup(prepared)
     cameras = setup.cell.camera_model(setup.robot.base.pose())
     anchor_W = setup.robot.base.pose().translation()
-    motion = motion_of_record(record, len(setup.path.q)) if record else motion_on_path(prepared, setup.path)
+    motion = (
+        motion_of_record(record, len(setup.path.q), setup.robot)
+        if record
+        else motion_on_path(prepared, setup.path)
+    )
     seen = lone_markers(cameras, setup.cell.windows, setup.body, motion.places, setup.robot)
     poses = [MeasuredPose(*each) for each in zip(motion.places.X_WE, motion.V_WE, seen, strict=True)]
     parts = [covariances(cameras, setup.body.p_E, anchor_W, pose, given) for pose in poses]

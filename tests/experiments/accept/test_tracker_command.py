@@ -46,6 +46,28 @@ def test_the_camera_that_is_wrong_is_named(files, tmp_path):
     assert "Along the motion" in (tmp_path / "t.html").read_text()
 
 
+def test_the_robot_is_that_of_the_record_and_refusals_say_of_what_they_are(tmp_path):
+    time = np.arange(0.0, 8.0, 0.01)
+    q = 0.3 * np.sin(np.outer(time, [0.9, 1.3, 0.7, 1.1, 1.7, 2.3])) + [0.0, -1.5, 1.7, 0.0, 0.8, 0.0]
+    X = Kinematics(load_robot("kr16")).forward(q)
+    record = RunRecord(tmp_path / "kr16.mcap", "robot: kr16\nreference:\n  path: !Circle {radius_mm: 100}\n")
+    for t, joints, pose in zip(time.tolist(), q, X, strict=True):
+        record.write(JOINTS, t, {"stamp": t, "position": joints.tolist(), "effort": [0.0] * 6})
+        record.write(POSE, t, pose_message(pose, t))
+    record.close()
+    table = np.column_stack([time, 1e3 * X[:, :3, 3]])
+    np.savetxt(tmp_path / "kr16.csv", table, delimiter=";")
+    page = ["--report", tmp_path / "t.html"]
+    result = invoked(tmp_path / "kr16.mcap", tmp_path / "kr16.csv", *page, "--json", "-")
+    assert result.exit_code == 0, result.stderr
+    assert json.loads(result.stdout)["rms_mm"] < 1e-3
+    result = invoked(tmp_path / "kr16.mcap", tmp_path / "kr16.csv", *page, "--robot", "irb1200")
+    assert "camera and joints of" in result.stderr
+    assert "kr16.mcap with --robot irb1200" in result.stderr
+    result = invoked(tmp_path / "kr16.mcap", tmp_path / "kr16.csv", *page, "--unit", "m")
+    assert "kr16.csv in m" in result.stderr
+
+
 def test_what_cannot_be_compared_is_refused_in_one_line(files, tmp_path):
     record, seen = files
     (tmp_path / "three.csv").write_text("0 1 2\n1 2 3\n")

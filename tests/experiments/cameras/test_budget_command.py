@@ -1,12 +1,18 @@
 """``truetip cameras budget``: shares that sum up, a check by simulation, and late stamps that cost speed."""
 
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
 from typer.testing import CliRunner
 
+from diagrams.record.run_record import write_log
+from experiments.cameras.budget import motion_of_record
 from experiments.main import app
+from robots.description.model import load_robot
+from robots.kinematics.forward import Kinematics
+from tests.experiments.synthetic import comparison
 
 
 def budget(tmp_path: Path, *options: str) -> dict:
@@ -41,6 +47,15 @@ def test_where_nothing_is_uncertain_is_no_share_of_anything(tmp_path: Path):
     assert result.exit_code == 2
     assert "budget: nothing is uncertain that moves a position" in result.stderr
     assert not (tmp_path / "c.html").exists()
+
+
+def test_a_record_of_another_robot_is_refused(tmp_path: Path):
+    (log,) = comparison(cycles=1, with_joints=True)["pbvs"]
+    reached = Kinematics(load_robot("irb1200")).forward(log.joint_position)
+    write_log(tmp_path / "run.mcap", "", replace(log, X_WE_desired=reached))
+    assert len(motion_of_record(tmp_path / "run.mcap", 30, load_robot("irb1200")).time) == 30
+    with pytest.raises(ValueError, match="mm off the path: it is of another robot"):
+        motion_of_record(tmp_path / "run.mcap", 30, load_robot("kr16"))
 
 
 def test_what_cannot_be_is_refused_in_one_line(tmp_path: Path):

@@ -57,7 +57,8 @@ def test_what_cannot_be_measured_is_refused_in_one_line(tmp_path, design):
 
 def test_a_recording_without_a_dwell_is_refused_in_one_line(tmp_path):
     path = tmp_path / "moving.mcap"
-    record = RunRecord(path, "station: {payload: 1.0}")
+    # A path has a tag, which a reader of plain YAML refuses.
+    record = RunRecord(path, "reference:\n  path: !Circle {radius_mm: 150}\nstation: {payload: 1.0}\n")
     for at in np.arange(0.0, 4.0, 0.02).tolist():
         record.write(JOINTS, at, {"stamp": at, "position": [0.1 * at] * 6, "effort": [0.0] * 6})
         record.write(POSE, at, pose_message(np.eye(4), at))
