@@ -98,19 +98,20 @@ def visits(log: RunLog, scenario: Scenario, cycle: Cycle, cycles: int) -> Visits
         cycles: how often they were visited, at least 2.
     """
     moves = len(ORDER) - 1
-    settle = scenario.reference.settle
-    span = (log.dwell_start - settle) / (moves * cycles)  # of a rest and a move
+    settle, on_path = scenario.reference.settle, _on_path(log)
+    span = (make_path(scenario.reference).dwell_start - settle) / (moves * cycles)  # of a rest and a move
     reached = [
         (ORDER[k % moves + 1], ORDER[k % moves], settle + (k + 1) * span) for k in range(moves * cycles)
     ]
     attained, error, stable, overshoot = [], [], [], []
     for pose, _, arrival in reached:
-        rest = (log.time >= arrival - 1e-9) & (log.time < arrival + cycle.dwell - 1e-9)
-        end = rest & (log.time >= arrival + cycle.dwell - _ATTAINED)
+        rest = (on_path >= arrival - 1e-9) & (on_path < arrival + cycle.dwell - 1e-9)
+        end = rest & (on_path >= arrival + cycle.dwell - _ATTAINED)
         e = pose_error(np.broadcast_to(cycle.poses[pose], (int(end.sum()), 4, 4)), log.X_WE_true[end])
         mean = log.X_WE_true[end, :3, 3].mean(axis=0)
         away = np.linalg.norm(log.X_WE_true[rest, :3, 3] - mean, axis=1)
-        seconds, beyond = _settled(away, log.time[rest] - arrival, cycle.band)
+        since = log.time[rest] - log.time[rest][0] + on_path[rest][0] - arrival
+        seconds, beyond = _settled(away, since, cycle.band)
         attained.append(mean)
         error.append(e.mean(axis=0))
         stable.append(seconds)
@@ -165,13 +166,13 @@ class Square:
 def path_results(log: RunLog, scenario: Scenario, cycle: Cycle) -> Square:
     """AT and RT with orientation, corner deviation and velocity of a run of `path_scenario`."""
     path = make_path(scenario.reference)
-    lap = float(path.lap_starts[1] - path.lap_starts[0])
+    lap, on_path = float(path.lap_starts[1] - path.lap_starts[0]), _on_path(log)
     since = np.arange(0.0, lap, scenario.station.period)
     wanted, V, _ = path.sample(path.lap_starts[0] + since)
     # Laps may begin between two ticks: errors vary less between these than positions do.
     off = log.X_WE_true[:, :3, 3] - log.X_WE_desired[:, :3, 3]
-    p = wanted[:, :3, 3] + np.stack([_at(log.time, off, start + since) for start in path.lap_starts])
-    nearest = np.clip(np.searchsorted(log.time, path.lap_starts[:, None] + since), 0, len(log.time) - 1)
+    p = wanted[:, :3, 3] + np.stack([_at(on_path, off, start + since) for start in path.lap_starts])
+    nearest = np.clip(np.searchsorted(on_path, path.lap_starts[:, None] + since), 0, len(log.time) - 1)
     angles = pose_error(wanted, log.X_WE_true[nearest])[..., :3].mean(axis=0)
     mean = p.mean(axis=0)
     # Some time before and after, for the tip is late.
@@ -179,7 +180,10 @@ def path_results(log: RunLog, scenario: Scenario, cycle: Cycle) -> Square:
     distances = path_distance(
         since, mean, np.arange(-0.5, lap + 0.5, scenario.station.period), around[:, :3, 3]
     )
-    speed = np.linalg.norm(np.gradient(p, since, axis=1), axis=2)
+    # Where the path was slowed, its time and that of the clock are two.
+    clock = np.interp(path.lap_starts[:, None] + since, on_path, log.time)
+    lasted = np.maximum(np.gradient(clock, axis=1), np.finfo(float).tiny)
+    speed = np.linalg.norm(np.gradient(p, axis=1), axis=2) / lasted
     quick = np.linalg.norm(V[:, 3:], axis=1)
     middle = quick > 0.99 * quick.max()
     ratio = speed[:, middle].max(axis=1) / quick.max() - 1.0
@@ -195,6 +199,11 @@ def path_results(log: RunLog, scenario: Scenario, cycle: Cycle) -> Square:
         "RV_percent": 300.0 * float(ratio.std(ddof=1)),
     }
     return Square(results, 4.0 * since / lap, distances, scatter)
+
+
+def _on_path(log: RunLog) -> np.ndarray:
+    """The time on the path in s at the times of a log, (n,)."""
+    return log.time if log.path_time is None else log.path_time
 
 
 def _settled(away: np.ndarray, since: np.ndarray, band: float) -> tuple[float, float]:

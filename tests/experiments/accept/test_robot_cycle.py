@@ -23,17 +23,19 @@ CYCLE = Cycle(cube_poses(BASE, 0.25), dwell=0.5, band=1e-4)
 CYCLES = 4
 
 
-def log_of(scenario: Scenario, error) -> RunLog:
-    """A run whose tip is off by ``error(times)``, (n, 3) in m, and otherwise follows."""
+def log_of(scenario: Scenario, error, share: float = 1.0) -> RunLog:
+    """A run, at a share of the speed, whose tip is off by ``error(times)``, (n, 3) in m."""
     path = make_path(scenario.reference)
-    time = np.arange(0.0, path.duration, 4e-3)
-    wanted = path.sample(time)[0]
+    time = np.arange(0.0, path.duration / share, 4e-3)
+    wanted = path.sample(share * time)[0]
     true = wanted.copy()
     true[:, :3, 3] += error(time)
     none = np.zeros((len(time), 6))
     return RunLog(
         "made_up", 0, time, wanted, true, true, none, none, none, none, none, none, {}, [],
-        path.path_start, path.dwell_start, path.duration, tuple(path.lap_starts),
+        path.path_start / share, path.dwell_start / share, path.duration / share,
+        tuple(path.lap_starts / share),
+        path_time=None if share == 1.0 else share * time,
     )  # fmt: skip
 
 
@@ -129,6 +131,22 @@ def test_a_tip_that_is_late_is_on_the_path_and_one_beside_it_is_not():
     found = path_results(log_of(scenario, lambda t: np.tile(beside, (len(t), 1))), scenario, CYCLE).results
     assert found["AT_mm"] == pytest.approx(0.2, rel=1e-3)
     assert found["RT_mm"] == pytest.approx(0.0, abs=1e-6)
+
+
+def test_a_path_that_was_slowed_is_attained_as_well_and_its_velocity_is_not():
+    poses, square = (make(BASE, CYCLE, CYCLES, 1.0) for make in (pose_scenario, path_scenario))
+    offset = np.array([3e-4, 0.0, 4e-4])
+
+    def beside(t: np.ndarray) -> np.ndarray:
+        return np.tile(offset, (len(t), 1))
+
+    found = pose_results(visits(log_of(poses, beside, 0.8), poses, CYCLE, CYCLES), CYCLE)
+    assert found["AP_mm"] == pytest.approx(0.5, rel=1e-6)
+    for name in ("RP_mm", "vAP_mm", "AD_mm", "RD_mm", "dAP_mm", "stabilisation_s"):
+        assert found[name] == pytest.approx(0.0, abs=1e-5), name
+    along = path_results(log_of(square, beside, 0.8), square, CYCLE).results
+    assert along["RT_mm"] == pytest.approx(0.0, abs=0.01)
+    assert along["AV_percent"] == pytest.approx(-20.0, abs=0.5)
 
 
 def test_half_the_speed_takes_twice_the_time():
