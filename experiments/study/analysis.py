@@ -1,5 +1,6 @@
 """What the rows of a study say: distributions, effects of the factors, indices of Sobol, worst cases."""
 
+import warnings
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -120,10 +121,13 @@ def sobol_indices(study: Study, rows: Rows, metric: str) -> Indices | None:
         return None
     used = 2 ** int(np.log2(len(complete)))  # scipy insists on a power of two
     f_A, f_B, *f_AB = blocks[:, complete[:used]]
-    found = stats.sobol_indices(
-        func={"f_A": f_A[None], "f_B": f_B[None], "f_AB": np.array(f_AB)[:, None]}, n=used
-    )
-    bounds = found.bootstrap(confidence_level=_CONFIDENCE, n_resamples=_RESAMPLES)
+    with warnings.catch_warnings(), np.errstate(invalid="ignore", divide="ignore"):
+        # A metric that hardly varies, or few samples, have no shares or no interval, and NaN says so.
+        warnings.simplefilter("ignore", stats.DegenerateDataWarning)
+        found = stats.sobol_indices(
+            func={"f_A": f_A[None], "f_B": f_B[None], "f_AB": np.array(f_AB)[:, None]}, n=used
+        )
+        bounds = found.bootstrap(confidence_level=_CONFIDENCE, n_resamples=_RESAMPLES)
     return Indices(
         factors=list(study.factors),
         first=np.ravel(found.first_order),
@@ -149,15 +153,20 @@ def study_json(study: Study, rows: Rows, commands: Sequence[str]) -> dict[str, A
             if indices is not None:
                 found["sobol"] = {
                     name: {
-                        "first": float(indices.first[i]),
-                        "first_interval": indices.first_interval[i].tolist(),
-                        "total": float(indices.total[i]),
-                        "total_interval": indices.total_interval[i].tolist(),
+                        "first": _known(indices.first[i]),
+                        "first_interval": [_known(end) for end in indices.first_interval[i]],
+                        "total": _known(indices.total[i]),
+                        "total_interval": [_known(end) for end in indices.total_interval[i]],
                     }
                     for i, name in enumerate(indices.factors)
                 }
             laws[law][metric] = found
     return {"rows": len(rows["row"]), "failures": int((rows["failure"] != "").sum()), "laws": laws}
+
+
+def _known(value: float) -> float | None:
+    """A number; None where there is none, as of shares of a variance that is zero."""
+    return float(value) if np.isfinite(value) else None
 
 
 def _half_width(values: np.ndarray) -> float:

@@ -102,6 +102,13 @@ def load_study(path: str | Path) -> Study:
     study = typed(node, Study)
     for key, factor in study.factors.items():
         _check_factor(node.at(["factors", key]), key, factor, study.design)
+        if any(setting.partition("=")[0].strip() == key for setting in study.settings):
+            raise node.at(["factors", key]).refuse(
+                f"factors.{key}: settings say it, too: leave it out in one"
+            )
+    if "seed" in study.factors and study.repetitions > 1:
+        reason = "factors.seed: repetitions would all have the noise of that seed; leave one of the two out"
+        raise node.at(["factors", "seed"]).refuse(reason)
     samples = getattr(study.design, "samples", 1)
     if isinstance(study.design, SobolIndices) and samples & (samples - 1):
         raise node.at(["design", "samples"]).refuse(f"design.samples must be a power of two, got {samples}")

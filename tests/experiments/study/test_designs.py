@@ -1,11 +1,13 @@
 """Which points a study runs, and what its rows say about the factors."""
 
+import json
+
 import numpy as np
 import pytest
 from scipy import stats
 
 from experiments.bench.scaling import busy_share
-from experiments.study.analysis import main_effects, sobol_indices
+from experiments.study.analysis import main_effects, sobol_indices, study_json
 from experiments.study.designs import design_points
 from experiments.study.study_file import (
     Distribution,
@@ -68,6 +70,18 @@ def test_a_failed_run_takes_its_sample_out_and_leaves_the_indices(ishigami):
     found = sobol_indices(study, rows | {"max_norm_mm": holes}, "max_norm_mm")
     assert found is not None
     np.testing.assert_allclose(found.first, [0.3139, 0.4424, 0.0], atol=0.1)
+
+
+@pytest.mark.filterwarnings("error")
+def test_shares_of_a_metric_that_does_not_vary_are_none_in_json():
+    study = Study(laws=["pbvs"], metrics=["max_norm_mm"], design=SobolIndices(2),
+                  factors={"a": Range(0.0, 1.0), "b": Range(0.0, 1.0)})  # fmt: skip
+    point = np.arange(8)
+    rows = {"row": point, "point": point, "law": np.full(8, "pbvs"), "failure": np.full(8, "")}
+    found = study_json(study, rows | {"max_norm_mm": np.full(8, 3.0)}, [""] * 8)
+    share = found["laws"]["pbvs"]["max_norm_mm"]["sobol"]["a"]
+    assert share["first_interval"] == share["total_interval"] == [None, None]
+    json.dumps(found, allow_nan=False)
 
 
 def test_the_main_effect_is_the_mean_over_all_other_factors(ishigami):

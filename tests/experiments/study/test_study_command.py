@@ -95,6 +95,14 @@ def test_the_numbers_name_the_worst_row_of_each_law(study):
         ("{factors: {seed: {values: [1]}}, metrics: [speed]}", "metrics: must be of max_norm_mm"),
         ("{factors: {seed: {values: [1]}}, laws: [magic]}", "magic"),
         ("{factors: {station.paylaod: {values: [1]}}}", "the first run of the study is refused: .*paylaod"),
+        (
+            "{factors: {seed: {values: [1]}}, repetitions: 2}",
+            "line 1: factors.seed: repetitions would all have",
+        ),
+        (
+            "{factors: {station.payload: {values: [1]}}, settings: [station.payload=3]}",
+            "line 1: factors.station.payload: settings say it, too",
+        ),
         ("laws: [open_loop]", "at least one key of a scenario that is varied"),
     ],
 )
