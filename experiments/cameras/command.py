@@ -119,7 +119,7 @@ def calibrate_cameras_command(
             run = _simulated(nominal, kit, truth, waved, seed or 0)
             start = replace(start, radial=0.0 * start.radial, tangential=0.0 * start.tangential)
         else:
-            run = read_observations(recording, names, len(kit.p_Q))
+            run = read_observations(recording, names, len(kit.p_Q), nominal.sensor_px)
         started = time.perf_counter()
         calibration = calibrate_with_wand(run, kit, start, names, pixel_sigma)
         found = CamerasFound(calibration, names, kit, time.perf_counter() - started, truth)

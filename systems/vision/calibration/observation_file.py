@@ -21,22 +21,27 @@ MEAN_OF = "mean_of"  # a column that may be missing
 ENDS = ("A", "B")
 
 
-def read_observations(path: str | Path, cameras: Sequence[str], frame_points: int) -> WandRun:
+def read_observations(
+    path: str | Path, cameras: Sequence[str], frame_points: int, sensor_px: np.ndarray | None = None
+) -> WandRun:
     """Reads a table.
 
     Args:
         path: of the file.
         cameras: names of the cameras, in the order of the result.
         frame_points: number of spheres of the frame.
+        sensor_px: width and height of the images, in which all pixels must lie; None if that is not known.
 
     Raises:
         TextTableError: if the file is missing, a column is, or a line says what cannot be; one line that says
             which.
     """
-    return parse_observations(read_text(path), str(path), cameras, frame_points)
+    return parse_observations(read_text(path), str(path), cameras, frame_points, sensor_px)
 
 
-def parse_observations(text: str, name: str, cameras: Sequence[str], frame_points: int) -> WandRun:
+def parse_observations(
+    text: str, name: str, cameras: Sequence[str], frame_points: int, sensor_px: np.ndarray | None = None
+) -> WandRun:
     """The same from a text; ``name`` is where it came from. Raises what `read_observations` raises."""
     rows = _rows(text, name)
     points = [*ENDS, *(f"L{number}" for number in range(1, frame_points + 1))]
@@ -50,6 +55,8 @@ def parse_observations(text: str, name: str, cameras: Sequence[str], frame_point
         if point not in points:
             raise TextTableError(f"{where}: point '{point}' must be one of {', '.join(points)}")
         pixel = _number(row["u_px"], where, "u_px"), _number(row["v_px"], where, "v_px")
+        if sensor_px is not None:
+            _refuse_outside(pixel, sensor_px, where)
         mean_of = _count(row.get(MEAN_OF, "1"), where)
         if point not in ENDS:
             frame.setdefault((camera_of[camera], int(point[1:]) - 1), []).append((*pixel, mean_of))
@@ -115,6 +122,16 @@ def _number(field: str, where: str, column: str) -> float:
     if value is None:
         raise TextTableError(f"{where}: {column} must be a finite number with a decimal point, got '{field}'")
     return value
+
+
+def _refuse_outside(pixel: tuple[float, float], sensor_px: np.ndarray, where: str) -> None:
+    """Raises TextTableError for a pixel that is not in the image, whichever corner of a pixel counts from."""
+    if not all(-1.0 <= at <= size + 1.0 for at, size in zip(pixel, sensor_px, strict=True)):
+        width, height = sensor_px
+        raise TextTableError(
+            f"{where}: u_px and v_px must lie in the image of {width:g} by {height:g} px that the cell has, "
+            f"got {pixel[0]:g} and {pixel[1]:g}; are u and v exchanged, or is the sensor another one?"
+        )
 
 
 def _count(field: str, where: str) -> int:

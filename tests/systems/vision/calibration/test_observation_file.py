@@ -83,6 +83,16 @@ def test_refuses_what_is_wrong_by_its_line(text: str, message: str):
         parse_observations(text, "x", NAMES, 3)
 
 
+def test_pixels_outside_the_image_are_refused_where_its_size_is_known():
+    text = HEAD + "1,left,A,0,-0.5\n1,left,B,100.5,50\n2,left,A,60,90\n"
+    size = np.array([100.0, 60.0])
+    with pytest.raises(
+        ValueError, match=r"x, line 4: .* image of 100 by 60 px .*, got 60 and 90; are u and v"
+    ):
+        parse_observations(text, "x", NAMES, 3, size)
+    assert parse_observations(text, "x", NAMES, 3).wand_pixels.shape == (2, 2, 2, 2)
+
+
 def test_refuses_a_file_that_is_not_there():
     with pytest.raises(ValueError, match=r"nowhere\.csv: no such file"):
         read_observations("nowhere.csv", NAMES, 3)
