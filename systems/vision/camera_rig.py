@@ -123,7 +123,10 @@ def _problem(cell: MeasuringCell) -> Problem | None:
         return ["sensor_px"], f"sensor_px must be a width and a height, got {cell.sensor_px}"
     if np.shape(cell.target_mm) != (3,) or not np.isfinite(cell.target_mm).all():
         return ["target_mm"], f"target_mm must be three finite numbers, got {cell.target_mm}"
+    names = [camera.name for camera in cell.cameras]
     for number, camera in enumerate(cell.cameras):
+        if camera.name in names[:number]:
+            return ["cameras", number, "name"], f"two cameras have the name '{camera.name}'"
         problem = _camera_problem(camera, cell)
         if problem:
             place, reason = problem

@@ -68,6 +68,7 @@ REFUSED = {
     "no number": ("radial: [-0.08, 0.02, 0]", "radial: [.nan, 0, 0]", r"radial\[0\] must be finite, got nan"),
     "field": ("sensor_px:", "sensor_size:", "unknown key 'sensor_size'; known here: name, sensor_px"),
     "twice": ("frame_rate_hz: 250", "frame_rate_hz: 250\nname: B", "key 'name' is given twice"),
+    "name": ('- name: "02"', '- name: "01"', "two cameras have the name '01'"),
     "mapping": ("target_mm: [450, 0, 450]", "target_mm: {x: 450}", "target_mm must be 3 numbers, got {'x'"),
     "not YAML": ("frame_rate_hz: 250", "frame_rate_hz: 250: 3", "no valid YAML: mapping values are not"),
 }
