@@ -23,6 +23,7 @@ def read_configurations(path: str | Path) -> np.ndarray:
     """
     try:
         table = parse_fields(read_text(path), str(path), has_head=True)
+        table.refuse_longer_rows()
     except TextTableError as error:
         raise ValueError(f"configurations {error}") from error
     head = table.rows[0]

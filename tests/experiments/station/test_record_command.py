@@ -53,6 +53,8 @@ def test_what_cannot_be_measured_is_refused_in_one_line(tmp_path, design):
     assert "nothing.csv: no such file" in refused("record", str(tmp_path / "nothing.csv"))
     design.write_text(HEAD + "\n1,2,3,4,5,six\n")
     assert "design.csv, line 2: not six finite joint positions" in refused("record", str(design))
+    design.write_text(HEAD + "\n1,5,2,0,3,0,4,0,5,0,6,0\n")  # decimal commas between commas
+    assert "design.csv, line 2: 12 fields, but the head has 6" in refused("record", str(design))
 
 
 def test_a_recording_without_a_dwell_is_refused_in_one_line(tmp_path):
