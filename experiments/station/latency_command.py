@@ -27,6 +27,7 @@ from experiments.cli.staging import PAGE, YAML, staged_file
 from experiments.report.files import write_text
 from experiments.report.plot_page import Section, write_plot_page
 from experiments.station.clients import station_clients
+from experiments.station.found_delays import check_settings, scenario_with
 from experiments.station.guided_command import ask_before_moving, on_station
 from experiments.station.latency import ImpossibleDelayError, Latency, evaluate
 
@@ -53,6 +54,8 @@ def latency_command(
     with json_output(json_file) as output, refusing(ValueError, OSError), ExitStack() as stack:
         config = LatencyConfig(joint, amplitude, duration)
         config.check()
+        if write:
+            check_settings(settings or [])
         link = load_scenario(scenario, settings).station.link.kind
         name, changes = on_station(scenario, list(settings or []), link, with_cell)
         prepared = prepare(name, changes)
@@ -67,8 +70,8 @@ def latency_command(
             fail(f"{error}; nothing was written", BROKEN_OFF)
             raise
         write_latency_page(page, found, record)
-        if written:
-            write_text(written, scenario_with(scenario, found))
+        if write and written:
+            write_text(written, scenario_with(scenario, found, settings or [], Path(write)))
         output.write(found.as_dict())
     human.print(latency_table(found))
     print_files(human, report, write)
@@ -135,17 +138,6 @@ def latency_table(found: Latency) -> Table:
         if value is not None and np.isfinite(value):
             table.add_row(name, f"{value:.2f} {unit}", text)
     return table
-
-
-def scenario_with(name: str, found: Latency) -> str:
-    """A scenario file that extends another by the delays that were found."""
-    lines = ["# Delays as `truetip latency` found them.", f"extends: {name}", "station:"]
-    lines += [f"  period: {found.cycle:.6f}"]
-    # One cycle is the least: a command is interpolated over it.
-    lines += [f"  drive: {{command_delay: {found.cycle:.6f}, dead_time: {max(0.0, found.dead_time):.6f}}}"]
-    if found.camera is not None:
-        lines += [f"  camera: {{delay: {max(0.0, found.camera):.6f}}}"]
-    return "\n".join(lines) + "\n"
 
 
 def write_latency_page(path: Path, found: Latency, record: LatencyRecord) -> None:

@@ -8,7 +8,7 @@ from diagrams.hardware_link import StationError
 from diagrams.runs.latency import LatencyConfig, LatencyRecord, measure_latency, motion
 from diagrams.scenario.scenario import load_scenario
 from experiments.station.latency import ImpossibleDelayError, Latency, delay_between, evaluate
-from experiments.station.latency_command import scenario_with
+from experiments.station.found_delays import scenario_with
 from robots.description.model import load_robot
 from systems.link.clock import ClockQuality
 from tests.diagrams.lockstep import Lockstep
