@@ -22,6 +22,7 @@ from robots.programs.program import (
     ProgramError,
     Source,
     Target,
+    quaternion_problem,
 )
 
 _UNITS = {"mm": MILLIMETRE, "m": 1.0, "deg": DEGREE, "rad": 1.0, "": 1.0}
@@ -56,7 +57,7 @@ def read_pose_table(source: Source, context: ProgramContext) -> Program:
             moves.append(Move(line, None, why_not=target.text.removesuffix(_LEFT)))
         else:
             targets.append(target)
-            moves.append(Move(line, target, not target.has_joints, _surplus(fields, header)))
+            moves.append(Move(line, target, not target.has_joints))
     if not targets:
         raise ProgramError(f"{source.name}: no row of numbers; {notes[0].text if notes else 'it is empty'}")
     return Program(source.name, source.text, tuple(targets), tuple(notes), tuple(moves))
@@ -113,8 +114,9 @@ def _row(
             text = fields[place][1] if place < len(fields) else ""
             return Note(line, f"{role} is not a number: '{text.strip()}'{_LEFT}")
         numbers[role] = literal
-    if "qw" in numbers and not any(numbers[role].value for role in _QUATERNION):
-        return Note(line, f"the quaternion is zero{_LEFT}")
+    problem = quaternion_problem(numbers) or _surplus(fields, columns)
+    if problem:
+        return Note(line, f"{problem}{_LEFT}")
     payloads: tuple[float, ...] = ()
     if "payload_kg" in columns:
         place = columns["payload_kg"]

@@ -18,6 +18,7 @@ from robots.pose import rotation_from_zyx, zyx_from_rotation
 MILLIMETRE, DEGREE = 1e-3, float(np.pi / 180.0)
 _DECIMALS = {1.0: 13, MILLIMETRE: 9, DEGREE: 11}  # all worth less than 1e-9 mm at the tip of a robot
 _POSITION, _QUATERNION = ("x", "y", "z"), ("qw", "qx", "qy", "qz")
+_UNIT = 0.01  # of the length of a quaternion, which two decimals leave
 _EULER = ("alpha", "beta", "gamma")
 JOINTS = tuple(f"q{number}" for number in range(1, 7))
 _SAME_PLACE = 1e-11  # m; of rounding in the kinematics
@@ -59,6 +60,16 @@ class Frame:
 
 
 WORLD = Frame("world", np.eye(4))
+
+
+def quaternion_problem(numbers: Mapping[str, Literal]) -> str:
+    """Why a quaternion among literals by their roles is no rotation but for rounding; empty if it is one."""
+    if "qw" not in numbers:
+        return ""
+    length = float(np.linalg.norm([numbers[role].value for role in _QUATERNION]))
+    if not length > 0.0:
+        return "the quaternion is zero"
+    return "" if abs(length - 1.0) <= _UNIT else f"the quaternion has the length {length:.4g}, not 1"
 
 
 @dataclass(frozen=True)

@@ -26,6 +26,7 @@ from robots.programs.program import (
     Source,
     Target,
     homogeneous,
+    quaternion_problem,
 )
 from robots.programs.rapid_course import is_motion, is_straight, not_followed, note_call, steer
 from robots.programs.rapid_text import (
@@ -327,6 +328,8 @@ class _Reader:
 
     def _target(self, place: _Place) -> Target | None:
         """The target with its frames; None where nothing says its tool."""
+        if problem := quaternion_problem(place.numbers):
+            return self._note(self._source, place.line, f"{place.name or 'a target'}: {problem}, left alone")
         where = self._source.where(place.line)
         uses = [use for use in place.uses if use.tool is not None]
         if not uses and not self._context.tool:

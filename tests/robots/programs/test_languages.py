@@ -25,6 +25,7 @@ def krl(*lines: str, suffix: str = "src", others: tuple[str, ...] = ()) -> Progr
 
 GRIPPER = "PERS tooldata grip:=[TRUE,[[0,0,150],[1,0,0,0]],[2.5,[0,0,60],[1,0,0,0],0,0,0]];"
 TABLE = 'PERS wobjdata table:=[FALSE,TRUE,"",[[100,0,0],[0,0,0,1]],[[0,20,0],[1,0,0,0]]];'
+MOVE_P = "PROC main() MoveL p,v1,fine,tool0;"
 PART = "PERS loaddata part:=[1.5,[0,0,80],[1,0,0,0],0,0,0];"
 
 
@@ -58,10 +59,14 @@ def test_tools_of_another_module_and_arrays_and_inline_targets():
 @pytest.mark.parametrize(
     ("lines", "note"),
     [
-        ([robtarget("p", "reach+10"), "PROC main() MoveL p,v1,fine,tool0;"], "p has expressions"),
+        ([robtarget("p", "reach+10"), MOVE_P], "p has expressions"),
         ([robtarget("p"), "PROC main() p:=Offs(p,0,0,1); MoveL p,v1,fine,tool0;"], "given another value"),
         ([robtarget("p"), "PROC main() p.trans.x:=3; MoveL p,v1,fine,tool0;"], "given another value"),
         ([robtarget("p"), "PROC main() approach p;"], "--tool NAME says it"),
+        (
+            [robtarget("p").replace("[0,0,1,0]", "[1,0,1,0]"), MOVE_P],
+            "the quaternion has the length 1.414, not 1",
+        ),
         (
             ["PROC main()", f"MoveL [[x,0,0],[1,0,0,0],[0,0,0,0],{EXTERNAL}],v1,fine,tool0;"],
             "has expressions",
@@ -180,3 +185,28 @@ def test_a_row_may_end_before_its_name_and_one_with_an_impossible_load_is_named(
     assert [(note.line, note.text) for note in program.notes] == [
         (4, "payload_kg must not be negative, got -3, row left alone")
     ]
+
+
+@pytest.mark.parametrize(
+    ("head", "good", "bad", "why"),
+    [
+        (
+            "q1_deg,q2_deg,q3_deg,q4_deg,q5_deg,q6_deg",
+            "1,2,3,4,5,6,,",
+            "1,5,2,0,3,0,4,0,5,0,6,0",  # decimal commas between commas
+            "there are 12 values for 6 columns",
+        ),
+        (
+            "x_mm,y_mm,z_mm,qw,qx,qy,qz",
+            "600,0,900,0.71,0,0.7,0",
+            "600,0,900,0.07071,0,0.7071,0",
+            "the quaternion has the length 0.7106, not 1",
+        ),
+    ],
+)
+def test_a_row_that_cannot_be_meant_as_it_stands_is_left_alone_and_named(
+    head: str, good: str, bad: str, why: str
+):
+    program = parse_program(Source("t.csv", f"{head}\n{good}\n{bad}\n"))
+    assert [each.line for each in program.targets] == [2]
+    assert [(note.line, note.text) for note in program.notes] == [(3, f"{why}, row left alone")]

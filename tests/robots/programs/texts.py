@@ -7,6 +7,9 @@ NUMBERS = st.one_of(
     st.integers(-999, 999).map(str),
     st.sampled_from(["1.", ".5", "-0", "0.70710678", "3.09086E-08", "+2"]),
 )
+QUATERNIONS = st.sampled_from(
+    ["-.99499,0.1,0,1E-3", "+0.5,.5,0.5,-0.5", "0.70710678,0,0, 7.071068E-1", "0,1.,0,-0"]
+)
 BLANKS = st.sampled_from(["", " ", "\t", "  "])
 EXTERNAL = "[9E9,9E+09, 0,9E9,9E9,9E9]"
 LINE_ENDS = st.sampled_from(["\n", "\r\n", "\r"])
@@ -22,7 +25,7 @@ def rapid_modules(draw) -> str:
 
     lines = ["%%%", "MODULE m", f"  CONST num a{blank}:={blank}5; ! a := [[1,2,3],[1,0,0,0]]"]
     for number in range(draw(st.integers(1, 4))):
-        rotation = f"[1,{blank}0, 0 ,0]" if draw(st.booleans()) else f"[{draw(NUMBERS)},0.1,0,1E-3]"
+        rotation = f"[1,{blank}0, 0 ,0]" if draw(st.booleans()) else f"[{draw(QUATERNIONS)}]"
         configuration = f"[{','.join(str(draw(st.integers(-4, 4))) for _ in range(4))}]"
         value = f"[{row(3)},{rotation},{blank}{configuration},{EXTERNAL}]"
         lines.append(f"LOCAL {draw(st.sampled_from(['CONST', 'PERS', 'var']))} robtarget p{number}:={value};")
@@ -69,7 +72,7 @@ def tables(draw) -> str:
         separator.join(["name", "x_mm", "y_mm", "z_mm", "qw", "qx", "qy", "qz"]),
     ]
     for number in range(draw(st.integers(1, 5))):
-        fields = [f'"p{number}{separator}"', *(draw(NUMBERS) for _ in range(3)), "1", "0.0", " 0 ", "-0.5"]
+        fields = [f'"p{number}{separator}"', *(draw(NUMBERS) for _ in range(3)), "0.8", "0.0", " 0 ", "-0.6"]
         line = separator.join(fields)
         lines.append(line.replace(".", ",") if has_commas else line)
     return end.join(lines) + draw(st.sampled_from(["", end]))
