@@ -3,6 +3,8 @@
 import math
 from collections.abc import Iterable
 
+import typer
+
 from robots.configuration.suggestion import did_you_mean
 
 
@@ -46,6 +48,23 @@ def without_effect(option: str, given: object, beside: str) -> None:
     """
     if given is not None:
         raise ValueError(f"{option} has no effect with {beside}")
+
+
+def refuse_given(context: typer.Context, names: Iterable[str], beside: str) -> None:
+    """Refuses options with defaults of their own that are of no use beside another one.
+
+    Args:
+        context: of the command that runs.
+        names: of its parameters, such as ``spring_error``.
+        beside: the other option.
+
+    Raises:
+        ValueError: if one of them was given, whatever its value.
+    """
+    for parameter in context.command.params:
+        source = context.get_parameter_source(parameter.name or "")
+        if parameter.name in names and source is not None and source.name == "COMMANDLINE":
+            without_effect(parameter.opts[0], True, beside)
 
 
 def positive(option: str, given: float | None) -> None:

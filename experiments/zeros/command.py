@@ -7,8 +7,9 @@ import numpy as np
 import typer
 from rich.markup import escape
 
-from experiments.cli.console import print_files, progress_bar, refusing
+from experiments.cli.console import count, print_files, progress_bar, refusing
 from experiments.cli.json_output import human_console, json_output
+from experiments.cli.option_limits import refuse_given
 from experiments.cli.options import (
     GridOption,
     JsonOption,
@@ -26,6 +27,7 @@ from experiments.zeros.study import ZeroStudy, study_zeros, zeros_json
 
 
 def zeros_command(
+    context: typer.Context,
     robot: StudiedRobotOption = "kr210",
     payload: PayloadOption = None,
     elasticity: Annotated[
@@ -54,6 +56,10 @@ def zeros_command(
     ):
         if body is not None and example is not None:
             raise ValueError("--body and --example are two different things: give one of them")
+        if body is not None:
+            refuse_given(context, ("robot", "elasticity", "grid"), "--body")
+        if example is not None:
+            refuse_given(context, ("robot", "payload", "elasticity", "grid"), "--example")
         if body is not None or example is not None:
             found = body_zeros(body, payload or 0.0) if body else example_named(str(example))
             numbers, verdict = found.numbers, found.verdict
@@ -77,12 +83,14 @@ def zeros_verdict(study: ZeroStudy) -> str:
     slowest = study.slowest_rhp
     unstable, poses = int(np.isfinite(slowest).sum()), len(study.regular)
     name = f"{study.robot.name}, {study.payload:g} kg, elastic {study.elasticity}"
+    singular = slowest.size - poses
+    left_out = f" Left out: {count(singular, 'position')} where the arm is singular." if singular else ""
     if not unstable:
-        return f"{name}: no unstable zero in any of {poses} positions; the exact inverse is stable."
+        return f"{name}: no unstable zero in any of {poses} positions; the exact inverse is stable.{left_out}"
     return (
         f"{name}: zeros in the right half-plane in {unstable} of {poses} positions, so no causal inverse can "
         f"be exact there; the real part of the slowest is {np.nanmin(slowest):.0f} 1/s at the worst "
-        f"position and {np.nanmedian(slowest):.0f} 1/s in the median."
+        f"position and {np.nanmedian(slowest):.0f} 1/s in the median.{left_out}"
     )
 
 

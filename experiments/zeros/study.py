@@ -60,18 +60,26 @@ def study_zeros(
     """Finds the zeros at grid x grid positions of axes 2 and 3 within their limits.
 
     Raises:
-        ValueError: if the grid is too small, or `ZeroAnalysis` refuses the robot.
+        ValueError: if the grid is too small or all of it singular, or `ZeroAnalysis` refuses the robot.
     """
     if grid < 2:
         raise ValueError(f"--grid must be at least 2, got {grid}")
     analysis = ZeroAnalysis(robot, elasticity, payload)
-    axis_2, axis_3 = np.linspace(robot.lower[1:3], robot.upper[1:3], grid).T
+    # Of a range of more than a turn, one turn.
+    lower, upper = np.maximum(robot.lower, -np.pi), np.minimum(robot.upper, np.pi)
+    axis_2, axis_3 = np.linspace(lower[1:3], upper[1:3], grid).T
     workspace = []
     for q2 in axis_2:
         workspace.append([_zeros_at(analysis, q2, q3) for q3 in axis_3])
         if progress:
             progress(len(workspace) / grid)
-    return ZeroStudy(robot, elasticity, payload, axis_2, axis_3, workspace)
+    study = ZeroStudy(robot, elasticity, payload, axis_2, axis_3, workspace)
+    if not study.regular:
+        raise ValueError(
+            f"zeros of {robot.name}: the arm is singular at all {grid} x {grid} positions of axes 2 and 3; "
+            "a larger --grid has others"
+        )
+    return study
 
 
 def _zeros_at(analysis: ZeroAnalysis, q2: float, q3: float) -> Zeros | None:

@@ -32,6 +32,15 @@ def test_a_robot_with_an_elastic_structure_has_no_stable_inverse_anywhere(
         assert numbers["slowest_rhp"] == min(min(row) for row in numbers["slowest_rhp_map"])
 
 
+def test_positions_of_an_arm_that_turns_further_are_counted_once_and_singular_ones_named(tmp_path: Path):
+    result = run(tmp_path, "--robot=ur10", "--grid=4", f"--json={tmp_path / 'zeros.json'}")
+    numbers = json.loads((tmp_path / "zeros.json").read_text())
+    assert numbers["axis_2_deg"] == pytest.approx([-180.0, -60.0, 60.0, 180.0])
+    singular = 16 - numbers["poses"]
+    assert 0 < singular < 16
+    assert f"Left out: {singular} positions where the arm is singular." in " ".join(result.stdout.split())
+
+
 @pytest.mark.slow
 def test_the_examples_give_the_published_figures(tmp_path: Path):
     arm = json.loads(run(tmp_path, "--example=two_joint_arm", "--json", "-").stdout)
@@ -125,10 +134,14 @@ REFUSED = {
     ),
     "rigid": ("--elasticity=rigid", "elasticity must be joints or structure"),
     "grid": ("--grid=1", "--grid must be at least 2, got 1"),
+    "singular": ("--robot=ur10 --grid=2", "singular at all 2 x 2 positions of axes 2 and 3; a larger --grid"),
+    "example of a robot": ("--example=beam --robot=kr210", "--robot has no effect with --example"),
+    "load of an example": ("--payload=3 --example=beam", "--payload has no effect with --example"),
+    "body on a grid": ("--body=nothing.sid --grid=15", "--grid has no effect with --body"),
 }  # fmt: skip
 
 
-@pytest.mark.parametrize(("option", "message"), REFUSED.values(), ids=REFUSED)
-def test_wrong_input_is_refused_in_one_line_and_leaves_nothing(tmp_path: Path, option: str, message: str):
-    assert message in refusal(run(tmp_path, option))
+@pytest.mark.parametrize(("options", "message"), REFUSED.values(), ids=REFUSED)
+def test_wrong_input_is_refused_in_one_line_and_leaves_nothing(tmp_path: Path, options: str, message: str):
+    assert message in refusal(run(tmp_path, *options.split()))
     assert files(tmp_path) == set()
