@@ -15,7 +15,7 @@ from rich.markup import escape
 from experiments.calibration.design_program import ProgramFiles
 from experiments.cli.console import print_files, progress_bar, refusing
 from experiments.cli.json_output import human_console, json_output
-from experiments.cli.option_limits import at_least, one_of
+from experiments.cli.option_limits import at_least, one_of, without_effect
 from experiments.cli.options import JsonOption, PictureOption
 from experiments.cli.prepare import noted_robot
 from experiments.cli.staging import PAGE, TABLE, staged_file
@@ -31,6 +31,7 @@ from robots.measurement_design.design import MeasurementDesign, design_measureme
 from robots.measurement_design.obstacles import read_obstacles
 
 _ROUNDING = 1e-6  # deg
+_NUMBER = r"[+-]?(?:\d+\.?\d*|\.\d+)"
 _MEASURES = {
     "b3": "smallest eigenvalue of the information matrix, in m and rad",
     "d": "root of its determinant: volume of the confidence ellipsoid of the parameters",
@@ -48,7 +49,7 @@ def design_command(
         bool, typer.Option("--position-only", help="Design for measurements of the tool position only.")
     ] = False,
     anywhere: Annotated[
-        bool, typer.Option("--anywhere", help="Ignore floor, base and joint limits.")
+        bool, typer.Option("--anywhere", help="Ignore the floor and the arm itself.")
     ] = False,
     camera: Annotated[
         str | None,
@@ -107,6 +108,9 @@ def design_command(
     with json_output(json_file) as output, refusing(ValueError, OSError), ExitStack() as stack:
         one_of("--criterion", NAMES, criterion)
         at_least("--seed", 0, seed)
+        if anywhere:
+            for option, given in (("--camera-at", camera), ("--box", box), ("--obstacles", obstacles)):
+                without_effect(option, given, "--anywhere")
         run = ProgramFiles(program, out, settle, trigger)
         page = stack.enter_context(staged_file(report, *PAGE))
         run_stage = run.staged(stack)
@@ -174,33 +178,39 @@ def _ways(robot: RobotModel, config: AdmissibleConfig, q: np.ndarray) -> list[np
 
 
 def _place(text: str) -> tuple[float, float, float]:
-    try:
-        x, y, z = (float(part) for part in text.split(","))
-    except ValueError:
-        raise ValueError(f"--camera-at must be three numbers in m such as 1.5,0,1.2, got '{text}'") from None
+    x, y, z = _numbers("--camera-at", text, "three", "1.5,0,1.2")
     return x, y, z
 
 
 def _box(text: str | None) -> tuple[np.ndarray, np.ndarray] | None:
     if text is None:
         return None
-    try:
-        corners = np.array([float(part) for part in text.split(",")]).reshape(2, 3)
-    except ValueError:
-        raise ValueError(
-            f"--box must be six numbers in m such as 0.2,-0.5,0,0.8,0.5,0.9, got '{text}'"
-        ) from None
+    corners = np.array(_numbers("--box", text, "six", "0.2,-0.5,0,0.8,0.5,0.9")).reshape(2, 3)
     return corners[0], corners[1]
+
+
+def _numbers(option: str, text: str, count: str, example: str) -> list[float]:
+    """Finite numbers, as many as in an example. Raises ValueError that names the option."""
+    try:
+        values = [float(part) for part in text.split(",")]
+    except ValueError:
+        values = []
+    if len(values) != len(example.split(",")) or not np.isfinite(values).all():
+        raise ValueError(f"{option} must be {count} numbers in m such as {example}, got '{text}'")
+    return values
 
 
 def _ranges(robot: RobotModel, texts: list[str]) -> tuple[AxisRange, ...]:
     """The robot's own ranges with those of ``--range`` in their places."""
-    ranges = list(own_ranges(robot))
+    ranges, done = list(own_ranges(robot)), set()
     for text in texts:
-        found = re.fullmatch(r"([1-6])=(-?[\d.]+):(-?[\d.]+)", text.strip())
+        found = re.fullmatch(rf"([1-6])=({_NUMBER}):({_NUMBER})", text.strip())
         if not found:
             raise ValueError(f"--range must be like 2=-45:90 with a joint from 1 to 6, got '{text}'")
         joint = int(found[1]) - 1
+        if joint in done:
+            raise ValueError(f"--range of joint {joint + 1} is given twice, got '{text}', too")
+        done.add(joint)
         low, high = float(found[2]), float(found[3])
         if not low < high:
             raise ValueError(
