@@ -55,7 +55,9 @@ class ModalStudy:
         """
         hand = self.robot.joints[5].placement.translation, self.robot.tool.translation
         length = sum(float(np.linalg.norm(part)) for part in hand)
-        squared = np.array([modes.tip[:, mode] for modes in self._modes(everywhere)]) ** 2
+        tip = np.array([modes.tip[:, mode] for modes in self._modes(everywhere)])
+        in_base = tip[:, 3:] @ self.robot.base.pose().rotation().matrix()
+        squared = np.hstack([tip[:, :3], in_base]) ** 2
         motion = np.column_stack([squared[:, 3:], length**2 * squared[:, :3].sum(1)])
         shares = np.mean(motion / motion.sum(1, keepdims=True), axis=0)
         return {TIP_MOTIONS[i]: float(shares[i]) for i in np.argsort(shares)[::-1]}

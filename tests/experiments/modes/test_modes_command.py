@@ -54,6 +54,18 @@ def test_shapes_say_what_the_two_slowest_modes_of_an_arm_do(tmp_path: Path):
         assert max(map(abs, numbers["shape"][mode].values())) == 1.0
 
 
+def test_sideways_is_meant_as_seen_from_the_robot_however_it_stands(tmp_path: Path):
+    base = "base: {translation: [0, 0, 0], zyx_deg: [90, 0, 0], source: assumed}"
+    (tmp_path / "turned.yaml").write_text(f"extends: kr16\n{base}\n")
+    ahead, turned = (
+        json.loads(run(tmp_path, f"--robot={name}", "--json", "-").stdout)
+        for name in ("kr16", tmp_path / "turned.yaml")
+    )
+    for place in ("stretched", "workspace"):
+        for mode, motion in enumerate(ahead[place]["tip_motion"]):
+            assert turned[place]["tip_motion"][mode] == pytest.approx(motion, abs=1e-6)
+
+
 def test_the_table_names_frequencies_and_what_yields(tmp_path: Path):
     result = run(tmp_path, "--robot=irb1200", "--elasticity=joints")
     assert result.exit_code == 0, result.output
