@@ -50,13 +50,13 @@ def without_effect(option: str, given: object, beside: str) -> None:
         raise ValueError(f"{option} has no effect with {beside}")
 
 
-def refuse_given(context: typer.Context, names: Iterable[str], beside: str) -> None:
-    """Refuses options with defaults of their own that are of no use beside another one.
+def refuse_given(context: typer.Context, names: Iterable[str], where: str) -> None:
+    """Refuses options with defaults of their own where they are of no use.
 
     Args:
         context: of the command that runs.
         names: of its parameters, such as ``spring_error``.
-        beside: the other option.
+        where: that is, such as ``"with --body"``.
 
     Raises:
         ValueError: if one of them was given, whatever its value.
@@ -64,7 +64,7 @@ def refuse_given(context: typer.Context, names: Iterable[str], beside: str) -> N
     for parameter in context.command.params:
         source = context.get_parameter_source(parameter.name or "")
         if parameter.name in names and source is not None and source.name == "COMMANDLINE":
-            without_effect(parameter.opts[0], True, beside)
+            raise ValueError(f"{parameter.opts[0]} has no effect {where}")
 
 
 def positive(option: str, given: float | None) -> None:

@@ -32,7 +32,7 @@ from experiments.feedforward.study import (
     study_feedforward,
     study_json,
 )
-from robots.description.model import RobotFileError, RobotModel, load_robot
+from robots.description.model import RobotFileError, RobotModel, load_robot, shipped_robots
 from systems.feedforward import FeedforwardConfig
 
 
@@ -92,25 +92,28 @@ def _driven(name: str, plant: str | None) -> RobotModel | None:
     """The realistic variant where it is asked for, or nothing is said and there is one; else None."""
     if plant == "exact":
         return None
-    try:
-        return realistic_robot(name)
-    except RobotFileError:
-        if plant is None:
-            return None
-        raise
+    realistic = realistic_robot(name)
+    if realistic is None and plant is not None:
+        raise RobotFileError(
+            f"--plant realistic: there is no file {_variant(name)}; --plant exact needs no other file"
+        )
+    return realistic
 
 
-def realistic_robot(name: str) -> RobotModel:
-    """The realistic variant of a robot: the file that is named after it.
+def realistic_robot(name: str) -> RobotModel | None:
+    """The realistic variant of a robot: the file that is named after it; None if there is none.
 
     Raises:
-        RobotFileError: if there is none.
+        RobotFileError: if that file is no valid robot.
     """
+    variant = _variant(name)
+    is_there = variant in shipped_robots() or (Path(variant).suffix and Path(variant).is_file())
+    return load_robot(variant) if is_there else None
+
+
+def _variant(name: str) -> str:
     stem = name.removesuffix(".yaml").removesuffix(".yml").removesuffix(".urdf")
-    try:
-        return load_robot(f"{stem}-realistic{name[len(stem) :]}")
-    except RobotFileError as error:
-        raise RobotFileError(f"--plant realistic: {error}; --plant exact needs no other file") from error
+    return f"{stem}-realistic{name[len(stem) :]}"
 
 
 def _table(study: FeedforwardStudy) -> Table:

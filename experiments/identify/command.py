@@ -13,7 +13,7 @@ from rich.table import Table
 from experiments.cli.cluster import executor
 from experiments.cli.console import count, print_files, progress_bar, refusing
 from experiments.cli.json_output import human_console, json_output
-from experiments.cli.option_limits import at_least
+from experiments.cli.option_limits import at_least, refuse_given
 from experiments.cli.options import (
     JobsOption,
     JsonOption,
@@ -71,8 +71,12 @@ from robots.description.model import RobotFileError, RobotModel, load_robot
 from robots.description.robot_file import robot_text
 from systems.cell.drive import DriveConfig
 
+# Options that say how to identify.
+_NOT_EXCITED = ("plant", "gear_parts", "drives", "tuned_on_robot", "rectangle", "search")
+
 
 def identify_command(
+    context: typer.Context,
     robot: StudiedRobotOption = "kr210",
     cases: Annotated[
         Path | None,
@@ -188,6 +192,8 @@ def identify_command(
     """Identify stiffness and damping from short motions, gyros and accelerometers."""
     human = human_console(json_file)
     with json_output(json_file) as output, refusing(ValueError, OSError), ExitStack() as stack:
+        refuse_given(context, () if search else ("search_evaluations",), "without --search")
+        refuse_given(context, () if tuned_on_robot else ("tuning_share",), "without --fine-tune")
         at_least("--jobs", 1, jobs)
         at_least("--seed", 0, seed)
         at_least("--search", 1, search)
@@ -202,6 +208,8 @@ def identify_command(
             )
         if excite is not None and (wants_advice or wants_verdict):
             raise ValueError("--excite only designs a motion: there is nothing to --judge or to --advise")
+        if excite is not None:
+            refuse_given(context, _NOT_EXCITED, "with --excite, which only designs a motion")
         if not 0.0 < tuning_share < 1.0:
             raise ValueError(f"--tuning-share must be between 0 and 1, got {tuning_share:g}")
         if tuned_on_robot and recording is not None and plant is None:
@@ -285,13 +293,13 @@ def _plant(robot: str, plant: str | None, is_recorded: bool) -> RobotModel | Non
         return load_robot(plant)
     if is_recorded:
         return None
-    try:
-        return realistic_robot(robot)
-    except RobotFileError as error:
+    realistic = realistic_robot(robot)
+    if realistic is None:
         raise RobotFileError(
             f"robot '{robot}' has no variant named {robot}-realistic: say what moves by --plant NAME|FILE, "
             "or give a --recording"
-        ) from error
+        )
+    return realistic
 
 
 def _simulated(

@@ -10,7 +10,7 @@ from rich.table import Table
 
 from experiments.cli.console import count, print_files, progress_bar, refusing
 from experiments.cli.json_output import human_console, json_output
-from experiments.cli.option_limits import at_least
+from experiments.cli.option_limits import at_least, refuse_given
 from experiments.cli.options import (
     GridOption,
     JobsOption,
@@ -27,6 +27,7 @@ from experiments.invert.study import KINDS, InvertStudy, invert_json, study_inve
 
 
 def invert_command(
+    context: typer.Context,
     robot: StudiedRobotOption = "kr210",
     payload: PayloadOption = None,
     angle: Annotated[float, typer.Option(metavar="DEG", help="By which axes 1 to 3 turn.")] = 5.0,
@@ -54,6 +55,9 @@ def invert_command(
         output.staged(),
     ):
         at_least("--jobs", 1, jobs)
+        refuse_given(
+            context, () if spring_error else ("seeds",), "without --spring-error: all robots are the same"
+        )
         model = noted_robot(human, robot)
         mass = model.payload.largest_mass if payload is None else payload
         runs = max(1, (len(KINDS) + rehearse) * grid * grid * (seeds if spring_error else 1))

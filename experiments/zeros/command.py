@@ -57,9 +57,9 @@ def zeros_command(
         if body is not None and example is not None:
             raise ValueError("--body and --example are two different things: give one of them")
         if body is not None:
-            refuse_given(context, ("robot", "elasticity", "grid"), "--body")
+            refuse_given(context, ("robot", "elasticity", "grid"), "with --body")
         if example is not None:
-            refuse_given(context, ("robot", "payload", "elasticity", "grid"), "--example")
+            refuse_given(context, ("robot", "payload", "elasticity", "grid"), "with --example")
         if body is not None or example is not None:
             found = body_zeros(body, payload or 0.0) if body else example_named(str(example))
             numbers, verdict = found.numbers, found.verdict

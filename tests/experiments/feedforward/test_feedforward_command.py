@@ -206,11 +206,18 @@ def test_every_robot_follows_the_rectangle_of_its_trial(name: str):
     assert max(rectangle_edges(robot)) >= 0.3 * reach(robot)
 
 
+def test_a_realistic_variant_that_is_no_robot_is_named_and_not_passed_over(tmp_path: Path):
+    (tmp_path / "mine.yaml").write_text("extends: kr16\n")
+    (tmp_path / "mine-realistic.yaml").write_text("extends: kr16\njoint: []\n")
+    line = refusal(run(tmp_path, f"--robot={tmp_path / 'mine.yaml'}"))
+    assert "mine-realistic.yaml, line 2: unknown key 'joint'" in line
+
+
 REFUSED = {
     "robot": ("--robot=kr211", "robot 'kr211': no file"),
     "payload": ("--payload=17", "payload of KUKA KR 16-2 must be between 0 and 16.0 kg, got 17.0 kg"),
     "plant": ("--plant=worn", "--plant must be one of exact, realistic, got 'worn'"),
-    "variant": ("--robot=kr16-realistic --plant=realistic", "no file"),
+    "variant": ("--robot=kr16-realistic --plant=realistic", "no file kr16-realistic-realistic;"),
     "grid": ("--grid=1", "--grid must be at least 2, got 1"),
     "jobs": ("--jobs=0", "--jobs must be at least 1, got 0"),
     "error": ("--stiffness-error=-1", "stiffness_error must be above -1 and finite, got -1"),

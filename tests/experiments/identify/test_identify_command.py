@@ -248,6 +248,9 @@ REFUSED = {
     "excite": (["--excite=slow.csv", "--write=robot.yaml"], "--excite only designs a motion"),
     "judge": (["--excite=slow.csv", "--judge"], "there is nothing to --judge or to --advise"),
     "advise": (["--excite=slow.csv", "--advise"], "there is nothing to --judge or to --advise"),
+    "drives": (["--excite=slow.csv", "--drives"], "--drives has no effect with --excite"),
+    "alone": (["--search-evaluations=100"], "--search-evaluations has no effect without --search"),
+    "untuned": (["--tuning-share=0.5"], "--tuning-share has no effect without --fine-tune"),
     "robot": (["--robot=kr211"], "robot 'kr211': no file"),
     "plant": (["--robot=irb140"], "has no variant named irb140-realistic: say what moves by --plant"),
     "recording": (["--recording=none.csv"], "--recording none.csv: no such file"),
@@ -269,6 +272,13 @@ REFUSED = {
 def test_wrong_input_is_refused_in_one_line_and_leaves_nothing(tmp_path: Path, options, message: str):
     assert message in refusal(run(tmp_path, *options))
     assert files(tmp_path) == set()
+
+
+def test_a_realistic_variant_that_is_no_robot_is_named(tmp_path: Path):
+    (tmp_path / "mine.yaml").write_text("extends: kr210\n")
+    (tmp_path / "mine-realistic.yaml").write_text("extends: kr210\njoint: []\n")
+    result = run(tmp_path, f"--robot={tmp_path / 'mine.yaml'}")
+    assert "mine-realistic.yaml, line 2: unknown key 'joint'" in result.stderr
 
 
 @pytest.mark.slow

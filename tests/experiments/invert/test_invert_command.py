@@ -48,6 +48,7 @@ REFUSED = {
     "grid": ("--grid=0", "--grid and --seeds must be at least 1, got 0 and 1"),
     "springs": ("--spring-error=1", "--spring-error must be from 0 to below 1, got 1"),
     "rehearsal": ("--rehearse", "--rehearse learns springs that are off: give --spring-error too"),
+    "seeds": ("--seeds=3", "--seeds has no effect without --spring-error: all robots are the same"),
     "angle": ("--angle=0", "--angle must be up to 45 degrees and not zero, got 0"),
     "jobs": ("--jobs=0", "--jobs must be at least 1, got 0"),
 }  # fmt: skip
