@@ -18,6 +18,8 @@ from robots.description.model import RobotModel, load_robot, robot_of, shipped_r
 from robots.description.robot_file import robot_text
 from robots.description.urdf_in.reader import UrdfRobot, is_urdf, read_urdf
 
+_WIDE = 1800.0  # deg to a side: no joint but an endless one turns so far
+
 robots_app = command_app(
     "List the robots that come with truetip, or make a robot file of a URDF.", no_args_is_help=False
 )
@@ -112,6 +114,17 @@ def _describe(console: Console, robot: RobotModel, found: UrdfRobot) -> None:
     rows.append(("pictures", str(sum(len(link.pictures) for link in [robot.base_link, *robot.links]))))
     rows.append(("assumed", ", ".join(found.assumed)))
     print_list(rows)
+    wide = [
+        joint.name
+        for joint, ends in zip(found.chain.joints, limits, strict=True)
+        if np.abs(ends).max() > _WIDE
+    ]
+    if wide:
+        print_note(
+            console,
+            f"joints with {_WIDE:g} degrees and more to a side: {', '.join(wide)}; limits of a URDF are in "
+            "radians, are these in degrees?",
+        )
     if found.chain.held:
         names = ", ".join(joint.name for joint in found.chain.held)
         print_note(console, f"these joints are taken as fixed at zero: {names}")

@@ -57,8 +57,9 @@ def correct_inertias(text: UrdfText) -> dict[str, str]:
         What was corrected, by the names of links.
 
     Raises:
-        ConfigurationError: if a mass is negative or not finite, or a principal moment of inertia is negative
-            or larger by far than the sum of the two others; the message names the link.
+        ConfigurationError: if a mass is negative or not finite, there is an inertia without one, or a
+            principal moment of inertia is negative or larger by far than the sum of the two others; the
+            message names the link.
     """
     corrected = {}
     for link in text.root.findall("link"):
@@ -66,11 +67,19 @@ def correct_inertias(text: UrdfText) -> dict[str, str]:
         if not 0.0 <= mass < math.inf:
             raise text.refuse(f"link '{name}': its mass must be zero or positive, in kg, got {mass:g}", name)
         element = link.find("inertial/inertia")
-        if element is None or mass == 0.0:
+        if element is None:
             continue
         inertia = np.zeros((3, 3))
         for key, (i, j) in _MOMENTS.items():
             inertia[i, j] = inertia[j, i] = _number(element, key)
+        if not mass > 0.0:
+            if inertia.any():
+                raise text.refuse(
+                    f"link '{name}': it has an inertia and no mass; give both, or neither where nothing is "
+                    "known",
+                    name,
+                )
+            continue
         finite = np.isfinite(inertia).all()
         moments, axes = np.linalg.eigh(inertia) if finite else (np.full(3, math.nan), np.eye(3))
         largest, excess = np.abs(moments).max(), 2.0 * moments.max() - moments.sum()

@@ -40,6 +40,7 @@ _SAMPLES = 200  # configurations among which the largest inertia is looked for
 _FULL_TURN = 360.0  # deg, either way, of a joint without limits
 _SPEED = 180.0  # deg/s, of a joint that does not say it
 _NO_MASS = 1e-9  # kg
+_LARGEST = 100.0  # m, that an arm reaches
 
 
 @dataclass(frozen=True)
@@ -127,7 +128,7 @@ class _Arm:
             if root.index() != plant.world_body().index():
                 plant.WeldFrames(plant.world_frame(), root.body_frame())
             plant.Finalize()
-        except RuntimeError as error:
+        except (RuntimeError, ValueError) as error:  # a ValueError is of a text that is no row of numbers
             reason = " ".join(str(error).split())
             raise ConfigurationError(f"{text.label}: Drake cannot read it: {reason}") from error
         self._plant: MultibodyPlant = plant
@@ -277,7 +278,13 @@ class _Arm:
         """The sum of the distances from joint to joint and to the tool, from the second joint on, in m."""
         bodies = [*self._bodies[2:], self._plant.GetBodyByName(self._chain.tip)]
         steps = (self._between(*pair).translation() for pair in pairwise(bodies))
-        return max(sum(float(np.linalg.norm(step)) for step in steps), 1e-3)
+        reach = sum(float(np.linalg.norm(step)) for step in steps)
+        if reach > _LARGEST:
+            raise ConfigurationError(
+                f"{self._text.label}: {reach:.4g} m from joint 2 to the tool; lengths of a URDF are in m, "
+                "are these in mm?"
+            )
+        return max(reach, 1e-3)
 
     def _largest_inertia(self, payload: float, tip: RigidBody) -> np.ndarray:
         """The largest inertia that each joint moves, the payload a point at the tool, (6,) in kg m^2."""
@@ -312,6 +319,13 @@ def _for_drake(text: UrdfText, chain: Chain) -> str:
                 element.remove(part)
             if tag == "joint" and element.get("name") in held:
                 element.set("type", "fixed")
+            limit = element.find("limit")
+            if tag == "joint" and limit is not None and {"lower", "upper"} & set(limit.attrib):
+                for end in (
+                    "lower",
+                    "upper",
+                ):  # the one that is left out is zero; Drake takes it for infinite
+                    limit.set(end, limit.get(end, "0"))
     return ElementTree.tostring(root, encoding="unicode")
 
 

@@ -7,8 +7,8 @@ from scipy.signal import lfilter
 from diagrams.hardware_link import StationError
 from diagrams.runs.latency import LatencyConfig, LatencyRecord, measure_latency, motion
 from diagrams.scenario.scenario import load_scenario
-from experiments.station.latency import ImpossibleDelayError, Latency, delay_between, evaluate
 from experiments.station.found_delays import scenario_with
+from experiments.station.latency import ImpossibleDelayError, Latency, delay_between, evaluate
 from robots.description.model import load_robot
 from systems.link.clock import ClockQuality
 from tests.diagrams.lockstep import Lockstep

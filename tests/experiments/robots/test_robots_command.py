@@ -41,6 +41,14 @@ def test_a_urdf_without_inertia_needs_the_mass_of_the_robot_alone():
     assert load_robot("my.yaml").payload.largest_mass == 7.0
 
 
+def test_limits_that_look_like_degrees_are_named():
+    Path("arm.urdf").write_text(arm().replace('lower="-2" upper="2.5"', 'lower="-170" upper="170"', 2))
+    result = truetip("robots", "import", "arm.urdf")
+    assert "1800 degrees and more to a side: j1, j2; limits of a URDF are in radians" in " ".join(
+        result.output.split()
+    )
+
+
 def test_held_joints_and_lost_meshes_are_named():
     mesh = '<visual><geometry><mesh filename="package://lost/tool.obj"/></geometry></visual>'
     finger = link("finger", shape=mesh) + joint("slide", "l6", "finger", "prismatic")

@@ -216,6 +216,11 @@ REFUSED = {
     ),
     "no number": (arm().replace('value="2"', 'value="nan"'), "link 'l0': its mass must be zero or pos.* nan"),
     "no body": (arm().replace('ixx="0.02"', 'ixx="100"'), "link 'l0': its principal .* above the sum"),
+    "inertia alone": (
+        arm().replace('value="2"', 'value="0"'), r"line \d+: link 'l0': it has an inertia and no mass",
+    ),
+    "millimetres": (arm().replace("0.02 0.01 0.2", "20 10 200"), "805 m from joint 2 to the tool; .* in mm"),
+    "decimal commas": (arm().replace("0.02 0.01 0.2", "0,02 0,01 0,2"), "Drake cannot .*Expected 3 val"),
     "a negative moment": (arm().replace('izz="0.04"', 'izz="-0.04"'), "link 'l0': its principal moments"),
 }  # fmt: skip
 
@@ -228,6 +233,13 @@ def test_what_is_no_such_robot_is_refused_in_one_line(text: str, reason: str, tm
         load_robot(str(path))
     assert "arm.urdf" in str(refused.value)
     assert "\n" not in str(refused.value)
+
+
+def test_a_limit_that_is_left_out_beside_another_is_zero(tmp_path: Path):
+    path = tmp_path / "arm.urdf"
+    path.write_text(arm().replace('lower="-2" ', ""))
+    limits = load_robot(str(path)).joints[0].limits
+    assert (limits.lower_deg, limits.upper_deg) == pytest.approx((0.0, np.rad2deg(2.5)))
 
 
 @pytest.mark.parametrize(
