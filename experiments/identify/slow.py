@@ -10,7 +10,7 @@ from scipy.interpolate import CubicSpline
 from experiments.identify.recording_file import read_recording
 from experiments.identify.recording_map import Recording
 from robots.description.model import RobotModel
-from robots.identification.recording import RecordingError
+from robots.identification.recording import RecordingError, check_range
 from robots.identification.slow_motion import SlowIdentification, SlowMotion, identify_slow_motion
 
 _SOURCE = "identified from slow motion"
@@ -33,11 +33,12 @@ def identify_slow_motions(recording: Recording, robot: RobotModel) -> SlowIdenti
     """Finds payload, counterbalance and friction in slow motions with torques.
 
     Raises:
-        RecordingError: if a motion has no torques.
+        RecordingError: if a motion has no torques, or positions that no joint has.
         ValueError: if the motions do not show what is wanted.
     """
     if any(not len(case.torque) for case in recording.cases):
         raise RecordingError("slow motions need the torques of the motors")
+    check_range(recording.cases, robot.lower, robot.upper)
     payload = robot.payload.largest_mass if recording.payload is None else recording.payload
     parts = [
         (c.theta, c.rate, CubicSpline(c.time, c.rate).derivative()(c.time), c.torque) for c in recording.cases

@@ -21,7 +21,14 @@ from robots.identification.first_stage import (
     solve_from_afar,
 )
 from robots.identification.motion import MotionCase, SensorPlace
-from robots.identification.recording import RecordedCase, check_axes, check_excitation, lag_of
+from robots.identification.recording import (
+    RecordedCase,
+    check_axes,
+    check_excitation,
+    check_range,
+    check_sizes,
+    lag_of,
+)
 
 # Whether few motions alone, and how many steps; between rounds times, rests and equations become better.
 _ROUNDS = ((True, 8), (False, 5), (False, 5))
@@ -233,6 +240,7 @@ def identify_arm(
         ValueError: if a sensor sits on a body that the robot does not have.
     """
     tell = progress or (lambda share: None)
+    check_range(recorded, robot.lower, robot.upper)
     arms = _Arms(robot, payload, sensors)
     arm = arms.carrying()
     floor, some = sensor_floor(sensors), few(len(recorded))
@@ -241,6 +249,7 @@ def identify_arm(
     check_excitation([case.at_lag(0.0) for case in first.recorded], first.rigid, sensors)
     first.align(first.rigid)
     check_axes(first.cases, first.rigid, sensors)
+    check_sizes(first.cases, first.rigid, sensors)
 
     # Linear gears first: where the springs are far off, play only makes valleys to be lost in.
     plain = ElasticParameters(arm, gear_parts=False)

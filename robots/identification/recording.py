@@ -12,6 +12,9 @@ from robots.metrology.time_alignment import AlignmentError, align
 WINDOW = 0.25  # s, by which clocks may be apart
 _AXES = "xyz"
 _CLEAR = 0.3  # by which another order of axes has to fit better than the one that was given
+_ALIKE = 0.7  # correlation of a sensor with what motors make of it, above which their sizes are compared
+_LARGER = 5.0  # times as large as it should be, or as small: another unit
+_BEYOND = 2.0 * np.pi  # rad, beyond the range of a joint: another unit
 _EXCITED = 3.0  # times the noise, what a channel has to show to be compared
 
 
@@ -93,6 +96,61 @@ def check_excitation(
         )
 
 
+def check_range(cases: Sequence[RecordedCase], lower: np.ndarray, upper: np.ndarray) -> None:
+    """Refuses positions that no joint can have, such as degrees.
+
+    Args:
+        cases: the motions.
+        lower: limits of the joints in rad, (6,).
+        upper: likewise.
+
+    Raises:
+        RecordingError: if a joint is more than a turn beyond its range; names it.
+    """
+    for case in cases:
+        beyond = np.maximum(lower - case.theta, case.theta - upper)
+        row, joint = np.unravel_index(int(np.argmax(beyond)), beyond.shape)
+        if beyond[row, joint] > _BEYOND:
+            least, most, at = np.rad2deg([lower[joint], upper[joint], case.theta[row, joint]])
+            raise RecordingError(
+                f"case {case.name}: joint {joint + 1} is at {at:.4g} degrees, "
+                f"its range is {least:g} to {most:g}; are positions in degrees? angle_factor says so"
+            )
+
+
+def check_sizes(
+    cases: Sequence[MotionCase], modelled: Sequence[np.ndarray], sensors: Sequence[SensorPlace]
+) -> None:
+    """Refuses sensors whose readings are many times as large or small as the motors make them.
+
+    Raises:
+        RecordingError: if one resembles what it should show, but in another unit; names it.
+    """
+    for i, sensor in enumerate(sensors):
+        should, shown = _without_means(cases, modelled, i)
+        if not (should.std(0) > _EXCITED * sensor.sigma).any():
+            continue
+        product, square = float((should * shown).sum()), float((should**2).sum())
+        correlation = product / np.sqrt(square * max(float((shown**2).sum()), np.finfo(float).tiny))
+        size = product / square
+        if correlation > _ALIKE and not 1.0 / _LARGER < size < _LARGER:
+            unit = "rad/s" if sensor.kind == "gyro" else "m/s^2"
+            raise RecordingError(
+                f"{sensor.kind} '{sensor.name}': it shows {size:.3g} times what the motors make of it; "
+                f"in which unit are its columns? factor brings them to {unit}"
+            )
+
+
+def _without_means(
+    cases: Sequence[MotionCase], modelled: Sequence[np.ndarray], sensor: int
+) -> tuple[np.ndarray, np.ndarray]:
+    """What a sensor should show and what it does, where both are known, (n, 3) each."""
+    should = np.concatenate([each[:, sensor] for each in modelled])
+    shown = np.concatenate([case.readings[:, sensor] for case in cases])
+    known = np.isfinite(shown).all(1) & np.isfinite(should).all(1)
+    return should[known] - should[known].mean(0), shown[known] - shown[known].mean(0)
+
+
 def check_axes(
     cases: Sequence[MotionCase], modelled: Sequence[np.ndarray], sensors: Sequence[SensorPlace]
 ) -> None:
@@ -104,10 +162,7 @@ def check_axes(
     for i, sensor in enumerate(sensors):
         if sensor.kind != "gyro":
             continue
-        should = np.concatenate([each[:, i] for each in modelled])
-        shown = np.concatenate([case.readings[:, i] for case in cases])
-        known = np.isfinite(shown).all(1) & np.isfinite(should).all(1)
-        should, shown = (each[known] - each[known].mean(0) for each in (should, shown))
+        should, shown = _without_means(cases, modelled, i)
         loud = should.std(0) > _EXCITED * sensor.sigma
         norms = np.outer(np.linalg.norm(should, axis=0), np.linalg.norm(shown, axis=0))
         fits = should.T @ shown / np.where(norms > 0.0, norms, 1.0)

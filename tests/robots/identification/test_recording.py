@@ -11,6 +11,8 @@ from robots.identification.recording import (
     RecordingError,
     check_axes,
     check_excitation,
+    check_range,
+    check_sizes,
     lag_of,
 )
 
@@ -74,3 +76,22 @@ def test_a_recording_at_rest_says_what_it_cannot_show():
     still = replace(case, rate=0.0 * case.rate)
     with pytest.raises(RecordingError, match=r"no excitation.*gears, bearings and beams cannot be seen"):
         check_excitation([still], [0.0 * MODELLED], [GYRO])
+
+
+@pytest.mark.parametrize(("factor", "said"), [(np.rad2deg(1.0), "57.3"), (np.deg2rad(1.0), "0.0175")])
+def test_a_sensor_in_another_unit_is_named(factor: float, said: str):
+    case = recorded(noise=0.0).at_lag(0.0)
+    check_sizes([case], [MODELLED], [GYRO])
+    scaled = replace(case, readings=factor * case.readings)
+    with pytest.raises(RecordingError, match=rf"gyro 'hand': it shows {said} times .* brings them to rad/s"):
+        check_sizes([scaled], [MODELLED], [GYRO])
+
+
+def test_positions_in_degrees_are_named():
+    case, limits = recorded(), np.full(6, 2.0)
+    check_range([case], -limits, limits)
+    degrees = replace(case, theta=np.rad2deg(case.theta + 1.0))
+    with pytest.raises(
+        RecordingError, match=r"case 1: joint 1 is at .* is -114.592 to 114.592; .* angle_factor"
+    ):
+        check_range([case, degrees], -limits, limits)
