@@ -95,7 +95,7 @@ def _driven(name: str, plant: str | None) -> RobotModel | None:
     realistic = realistic_robot(name)
     if realistic is None and plant is not None:
         raise RobotFileError(
-            f"--plant realistic: there is no file {_variant(name)}; --plant exact needs no other file"
+            f"--plant realistic: there is no file {variant_name(name)}; --plant exact needs no other file"
         )
     return realistic
 
@@ -106,12 +106,13 @@ def realistic_robot(name: str) -> RobotModel | None:
     Raises:
         RobotFileError: if that file is no valid robot.
     """
-    variant = _variant(name)
+    variant = variant_name(name)
     is_there = variant in shipped_robots() or (Path(variant).suffix and Path(variant).is_file())
     return load_robot(variant) if is_there else None
 
 
-def _variant(name: str) -> str:
+def variant_name(name: str) -> str:
+    """What the file of the realistic variant of a robot is called."""
     stem = name.removesuffix(".yaml").removesuffix(".yml").removesuffix(".urdf")
     return f"{stem}-realistic{name[len(stem) :]}"
 

@@ -24,7 +24,7 @@ from experiments.cli.options import (
 from experiments.cli.prepare import noted_robot
 from experiments.cli.staging import PAGE, TABLE, YAML, refuse_replaced, staged_file
 from experiments.cli.workers import Executor
-from experiments.feedforward.command import realistic_robot
+from experiments.feedforward.command import realistic_robot, variant_name
 from experiments.identify.advice.report import ADVICE_HEAD, advice_rows
 from experiments.identify.cases import MotionCases, default_cases, load_cases
 from experiments.identify.closed_loop.drives import driven_motions
@@ -296,8 +296,8 @@ def _plant(robot: str, plant: str | None, is_recorded: bool) -> RobotModel | Non
     realistic = realistic_robot(robot)
     if realistic is None:
         raise RobotFileError(
-            f"robot '{robot}' has no variant named {robot}-realistic: say what moves by --plant NAME|FILE, "
-            "or give a --recording"
+            f"robot '{robot}' has no variant named {variant_name(robot)}: say what moves by --plant "
+            "NAME|FILE, or give a --recording"
         )
     return realistic
 

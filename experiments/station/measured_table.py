@@ -72,13 +72,14 @@ class MeasuredTable:
             raise ValueError(f"{path}, line {problems[0].row}: {problems[0].what}; it cannot be continued")
         for line, place, load in zip(found.rows, found.q, found.payload, strict=True):
             off = np.abs(q - place).max(axis=1)
-            number = int(np.argmin(off)) + 1
-            if off[number - 1] > _SAME or load != payload:
+            near = [int(row) + 1 for row in np.argsort(off) if off[row] <= _SAME]
+            if not near or load != payload:
                 raise ValueError(
                     f"{path}, line {line}: measured at another configuration or load than this run has; "
                     "name another file with --write"
                 )
-            self.measured.add(number)
+            # A design may visit a configuration more than once.
+            self.measured.add(next((number for number in near if number not in self.measured), near[0]))
 
     def append(self, number: int, row: Row) -> None:
         """Takes what was measured at the configuration with a number; on the disk when it returns."""

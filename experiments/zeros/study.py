@@ -77,7 +77,7 @@ def study_zeros(
     if not study.regular:
         raise ValueError(
             f"zeros of {robot.name}: the arm is singular at all {grid} x {grid} positions of axes 2 and 3; "
-            "a larger --grid has others"
+            "a larger --grid may have others"
         )
     return study
 

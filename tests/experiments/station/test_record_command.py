@@ -46,6 +46,14 @@ def test_every_row_is_on_the_disk_at_once_and_the_next_run_knows_it(tmp_path, de
         MeasuredTable(path, q[1:], 2.0)
 
 
+def test_a_configuration_that_the_design_visits_twice_is_measured_twice(tmp_path):
+    path, q = tmp_path / "measured.csv", Q[[0, 1, 0]]
+    table = MeasuredTable(path, q, 2.0)
+    for number, known in ((1, {1}), (2, {1, 2}), (3, {1, 2, 3})):
+        table.append(number, (q[number - 1] + 1e-4, np.array([0.5, 0.1, 0.1 * number]), np.eye(3)))
+        assert MeasuredTable(path, q, 2.0).measured == known
+
+
 def test_what_cannot_be_measured_is_refused_in_one_line(tmp_path, design):
     assert "2 or more exposures, got 0.5 s, 0.0 s" in refused("record", str(design), "--mean", "0")
     assert "must be between 0 and 1, got 2.0" in refused("record", str(design), "--speed", "2")

@@ -134,7 +134,7 @@ REFUSED = {
     ),
     "rigid": ("--elasticity=rigid", "elasticity must be joints or structure"),
     "grid": ("--grid=1", "--grid must be at least 2, got 1"),
-    "singular": ("--robot=ur10 --grid=2", "singular at all 2 x 2 positions of axes 2 and 3; a larger --grid"),
+    "singular": ("--robot=ur10 --grid=2", "singular at all 2 x 2 positions of axes 2 and 3; a larger"),
     "example of a robot": ("--example=beam --robot=kr210", "--robot has no effect with --example"),
     "load of an example": ("--payload=3 --example=beam", "--payload has no effect with --example"),
     "body on a grid": ("--body=nothing.sid --grid=15", "--grid has no effect with --body"),
