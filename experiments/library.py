@@ -252,7 +252,7 @@ def identify(
             no body; one line.
     """
     model, truth = _robot(robot), None if plant is None else _robot(plant)
-    of_slow = None if slow is None else identify_slow_motions(slow, model)
+    of_slow = None if slow is None else identify_slow_motions(slow, model, recording.payload)
     return study_recording(model, truth, recording, gear_parts, of_slow, progress)
 
 

@@ -247,7 +247,7 @@ def identify_command(
                 write_recording(table, recorded)
         if drives:
             driven_motions(recorded)  # refuses before the identification takes its time
-        of_slow = identify_slow_recording(slow, model) if slow else None
+        of_slow = identify_slow_recording(slow, model, recorded.payload) if slow else None
         with progress_bar(f"identification from {count(len(recorded.cases), 'motion')}") as progress:
             study = study_recording(model, truth, recorded, gear_parts, of_slow, progress)
         if drives:

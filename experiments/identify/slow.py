@@ -16,28 +16,46 @@ from robots.identification.slow_motion import SlowIdentification, SlowMotion, id
 _SOURCE = "identified from slow motion"
 
 
-def identify_slow_recording(path: Path, robot: RobotModel) -> SlowIdentification:
+def identify_slow_recording(
+    path: Path, robot: RobotModel, payload: float | None = None
+) -> SlowIdentification:
     """Reads a recording with torques and finds payload, counterbalance and friction.
 
+    Args:
+        path: of the recording.
+        robot: as it is believed to be.
+        payload: kg, of the short motions for which the load that is found will be taken; None if not known.
+
     Raises:
-        RecordingError: if the recording has no torques.
+        RecordingError: if the recording has no torques, or says that it has another payload.
         ValueError: if it cannot be read or does not show what is wanted.
     """
     recording = read_recording(path, needs_sensors=False)
     if any(not len(case.torque) for case in recording.cases):
         raise RecordingError(f"{path}: slow motions need the torques of the motors: six columns as torque")
-    return identify_slow_motions(recording, robot)
+    return identify_slow_motions(recording, robot, payload)
 
 
-def identify_slow_motions(recording: Recording, robot: RobotModel) -> SlowIdentification:
-    """Finds payload, counterbalance and friction in slow motions with torques.
+def identify_slow_motions(
+    recording: Recording, robot: RobotModel, payload: float | None = None
+) -> SlowIdentification:
+    """Finds payload, counterbalance and friction in slow motions with torques; arguments as above.
 
     Raises:
-        RecordingError: if a motion has no torques, or positions that no joint has.
+        RecordingError: if a motion has no torques, another payload than others, or positions no joint has.
         ValueError: if the motions do not show what is wanted.
     """
     if any(not len(case.torque) for case in recording.cases):
         raise RecordingError("slow motions need the torques of the motors")
+    if payload is not None and recording.payload not in (None, payload):
+        raise RecordingError(
+            f"slow motions have {recording.payload:g} kg at the flange and the others {payload:g} kg; what "
+            "is found of their load is taken for all: record both with one"
+        )
+    others = {case.name: case.payload for case in recording.cases if case.payload is not None}
+    if set(others.values()) - {recording.payload}:
+        said = ", ".join(f"{load:g} kg in {name}" for name, load in others.items())
+        raise RecordingError(f"slow motions must have one payload, got {said}")
     check_range(recording.cases, robot.lower, robot.upper)
     payload = robot.payload.largest_mass if recording.payload is None else recording.payload
     parts = [

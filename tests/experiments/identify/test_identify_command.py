@@ -16,7 +16,7 @@ from experiments.identify.slow import identify_slow_recording, slow_json, with_s
 from robots.description.model import load_robot
 from robots.identification.identified_robot import STIFFNESS_KNOWN
 from robots.identification.motion import SensorPlace
-from robots.identification.recording import RecordedCase
+from robots.identification.recording import RecordedCase, RecordingError
 from tests.experiments.browser import open_page
 from tests.experiments.commands import files, refusal, truetip
 from tests.robots.identification.test_slow_motion import (
@@ -219,6 +219,27 @@ def test_slow_motions_of_a_recording_give_load_spring_and_friction(tmp_path: Pat
     assert better.counterbalance.preload == pytest.approx(PRELOAD, rel=0.02)
     assert better.joints[0].drive_train.friction is not None
     assert slow_json(found)["friction"][0][0]["kind"] == "Stribeck"
+
+
+@pytest.mark.parametrize(
+    ("of_recording", "of_slow", "of_case", "message"),
+    [
+        (30.0, 100.0, None, "slow motions have 100 kg at the flange and the others 30 kg"),
+        (None, 100.0, 50.0, "slow motions must have one payload, got 50 kg in b"),
+    ],
+)
+def test_slow_motions_with_several_payloads_are_refused(
+    tmp_path: Path, of_recording: float | None, of_slow: float, of_case: float | None, message: str
+):
+    time = 0.01 * np.arange(60)
+    still, path = np.zeros((60, 6)), tmp_path / "slow.csv"
+    cases = [
+        RecordedCase(name, time, still, still, still, time, np.zeros((60, 0, 3)), payload=load)
+        for name, load in (("a", None), ("b", of_case))
+    ]
+    write_recording(path, Recording(of_slow, cases, []))
+    with pytest.raises(RecordingError, match=message):
+        identify_slow_recording(path, load_robot("kr210"), of_recording)
 
 
 def test_slow_motions_without_torques_are_refused(tmp_path: Path):
