@@ -12,6 +12,8 @@ from robots.metrology.least_squares import FitStatistics, UndeterminedError, fit
 
 MINIMUM_POSES = 3
 MINIMUM_TILT = np.deg2rad(2.0)  # root mean square of the orientations about their mean
+_WANDERING = 5e-3  # m, by which no tip that was put on a spot misses it in the median
+_WANDERING_SHARE = 0.1  # likewise, of how far the flange is from its mean
 
 _NEGLIGIBLE = 1e-9  # m, residuals that are rounding
 
@@ -46,7 +48,7 @@ def tool_centre(X_BF: np.ndarray) -> ToolCentre:
 
     Raises:
         UndeterminedError: for fewer than three poses, or orientations that are too much alike or differ
-            about one axis only.
+            about one axis only, or no tip stays on one spot.
     """
     X_BF = np.asarray(X_BF, dtype=float)
     n = len(X_BF)
@@ -60,7 +62,22 @@ def tool_centre(X_BF: np.ndarray) -> ToolCentre:
     jacobian = np.concatenate([R_BF, np.broadcast_to(-np.eye(3), (n, 3, 3))], axis=-1)
     solution = np.linalg.lstsq(jacobian.reshape(3 * n, 6), -p_BF.ravel(), rcond=None)[0]
     residual = p_BF + jacobian @ solution
-    return ToolCentre(solution[:3], solution[3:], residual, fit_statistics(jacobian, residual, _NEGLIGIBLE))
+    statistics = fit_statistics(jacobian, residual, _NEGLIGIBLE)
+    if not statistics.outliers:
+        _refuse_wandering(residual, p_BF)
+    return ToolCentre(solution[:3], solution[3:], residual, statistics)
+
+
+def _refuse_wandering(residual: np.ndarray, p_BF: np.ndarray) -> None:
+    """Refuses poses (n, 3) and (n, 3) in m of which most leave no tip on one spot, as other angles do."""
+    missed, moved = (
+        float(np.median(np.linalg.norm(each, axis=1))) for each in (residual, p_BF - p_BF.mean(axis=0))
+    )
+    if missed > max(_WANDERING, _WANDERING_SHARE * moved):
+        raise UndeterminedError(
+            f"no tip stays on one spot: the best one is {1e3 * missed:.3g} mm off it in the median, while "
+            f"the flange is {1e3 * moved:.3g} mm off its mean (other angles or another order of them?)"
+        )
 
 
 def refuse_alike_orientations(R: np.ndarray, body: str) -> None:

@@ -84,7 +84,7 @@ def test_a_tip_that_slipped_is_named_and_the_rest_is_not(slipped: int, seed: int
 def test_false_alarms_are_as_rare_as_promised():
     rng = np.random.default_rng(5)
     alarms = sum(
-        bool(tool_centre(flange_poses(tilts(rng), rng.standard_normal((POSES, 3)))).statistics.outliers)
+        bool(tool_centre(flange_poses(tilts(rng), rng.normal(0.0, SIGMA, (POSES, 3)))).statistics.outliers)
         for _ in range(500)
     )
     # One in a hundred at most; 500 trials scatter by 2.2.
@@ -112,6 +112,18 @@ REFUSED = {
 def test_poses_that_leave_the_tool_unknown_are_refused(turns, reason):
     with pytest.raises(UndeterminedError, match=reason):
         tool_centre(flange_poses(turns))
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_angles_in_another_order_leave_no_tip_on_one_spot(seed: int):
+    poses = flange_poses(tilts(np.random.default_rng(seed), largest=1.0))
+    poses[:, :3, :3] = np.swapaxes(poses[:, :3, :3], 1, 2)  # of the base in the flange
+    with pytest.raises(UndeterminedError, match=r"no tip stays on one spot: .* another order of them"):
+        tool_centre(poses)
+    still = flange_poses(
+        tilts(np.random.default_rng(seed)), np.random.default_rng(seed).normal(0, 1e-3, (POSES, 3))
+    )
+    assert tool_centre(still).standard_deviation_of_a_pose < 3e-3
 
 
 def test_two_poses_never_determine_the_tool():
