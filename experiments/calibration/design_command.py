@@ -31,6 +31,7 @@ from robots.measurement_design.design import MeasurementDesign, design_measureme
 from robots.measurement_design.obstacles import read_obstacles
 
 _ROUNDING = 1e-6  # deg
+_FARTHEST = 100.0  # m, of a camera or a corner: whoever writes more has written mm
 _NUMBER = r"[+-]?(?:\d+\.?\d*|\.\d+)"
 _MEASURES = {
     "b3": "smallest eigenvalue of the information matrix, in m and rad",
@@ -190,13 +191,15 @@ def _box(text: str | None) -> tuple[np.ndarray, np.ndarray] | None:
 
 
 def _numbers(option: str, text: str, count: str, example: str) -> list[float]:
-    """Finite numbers, as many as in an example. Raises ValueError that names the option."""
+    """Coordinates in m, as many as in an example. Raises ValueError that names the option."""
     try:
         values = [float(part) for part in text.split(",")]
     except ValueError:
         values = []
-    if len(values) != len(example.split(",")) or not np.isfinite(values).all():
-        raise ValueError(f"{option} must be {count} numbers in m such as {example}, got '{text}'")
+    if len(values) != len(example.split(",")) or not (np.abs(values) <= _FARTHEST).all():
+        raise ValueError(
+            f"{option} must be {count} numbers in m such as {example}, up to {_FARTHEST:g} m, got '{text}'"
+        )
     return values
 
 

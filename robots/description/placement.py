@@ -5,6 +5,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from pydrake.math import RigidTransform, RotationMatrix
 
+from robots.configuration.quantity import vector
 from robots.pose import rotation_from_zyx, zyx_from_rotation
 
 
@@ -12,8 +13,8 @@ from robots.pose import rotation_from_zyx, zyx_from_rotation
 class Placement:
     """A frame in its parent: translation in m, ZYX Euler angles (alpha, beta, gamma) in degrees."""
 
-    # m, of the origin, along the axes of the parent
-    translation: np.ndarray = field(default_factory=lambda: np.zeros(3))
+    # Of the origin, along the axes of the parent; whoever writes more has written mm
+    translation: np.ndarray = vector((0.0, 0.0, 0.0), -100.0, 100.0, unit="m")
     # Alpha, beta, gamma: turned about z, then the new y, then the new x
     zyx_deg: np.ndarray = field(default_factory=lambda: np.zeros(3))
     source: str = ""  # where the numbers come from, or ``assumed``

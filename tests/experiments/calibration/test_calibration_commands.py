@@ -122,9 +122,10 @@ def test_bad_rows_are_named_and_do_no_harm(calibrated: Path, tmp_path: Path):
         (["design", "--robot", "none"], "robot 'none': no file"),
         (
             ["design", "--camera-at", "here"],
-            "--camera-at must be three numbers in m such as 1.5,0,1.2, got",
+            "--camera-at must be three numbers in m such as 1.5,0,1.2, up to 100 m, got",
         ),
         (["design", "--camera-at", "nan,0,1"], "--camera-at must be three numbers in m"),
+        (["design", "--camera-at", "1500,0,1200"], "up to 100 m, got '1500,0,1200'"),
         (["design", "--box", "0,0,0,1,inf,1"], "--box must be six numbers in m"),
         (["design", "--range", "2=-4.5.5:90"], "--range must be like 2=-45:90"),
         (["design", "--range", "2=0:9", "--range", "2=0:90"], "--range of joint 2 is given twice"),

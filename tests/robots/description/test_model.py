@@ -117,6 +117,10 @@ REFUSED = {
         put("tool", "translation", [0, 1]),
         "tool.translation must be 3 numbers, got [0, 1]",
     ),
+    "a tool in mm": (
+        put("tool", "translation", [0, 0, 158]),
+        "tool.translation[2] must be between -100 and 100 m, got 158",
+    ),
     "axis without direction": (
         put("joints", 3, "axis", [0, 0, 0]),
         "joint 4: axis must have a direction, got [0.0, 0.0, 0.0]",
