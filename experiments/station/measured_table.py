@@ -27,6 +27,9 @@ def read_configurations(path: str | Path) -> np.ndarray:
     except TextTableError as error:
         raise ValueError(f"configurations {error}") from error
     head = table.rows[0]
+    twice = {name for name in head if name and head.count(name) > 1}
+    if twice:
+        raise ValueError(f"configurations {path}: column {min(twice)} is there twice")
     for unit in _UNITS:
         names = [f"q{number}_{unit}" for number in range(1, NUM_JOINTS + 1)]
         if all(name in head for name in names):

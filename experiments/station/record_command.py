@@ -60,7 +60,7 @@ def record_command(
 ) -> None:
     """Measure a robot on its controller: visit configurations, rest and average."""
     human = human_console(json_file)
-    with json_output(json_file) as output, refusing(ValueError, OSError, ChannelError):
+    with json_output(json_file) as output, refusing(ValueError, OSError, ChannelError), output.staged():
         rule = DwellRule(settle, mean)
         check_suffix(out, TABLE)
         check_suffix(mcap or "all.mcap", (".mcap",))

@@ -72,8 +72,12 @@ class ClearWays:
         """
         if self.is_clear(start, end):
             return np.zeros((0, NUM_JOINTS))
-        if not self._admissible(np.stack([start, end])).all():
-            raise ValueError("ways: a configuration is not admissible itself")
+        for place, is_admissible in zip((start, end), self._admissible(np.stack([start, end])), strict=True):
+            if not is_admissible:
+                raise ValueError(
+                    f"ways: {_degrees(place)} degrees is beyond a limit of a joint, or the arm is too near "
+                    "the floor, an obstacle or itself there"
+                )
         way = self._connected(start, end)
         if way is None:
             raise ValueError(f"ways: none was found from {_degrees(start)} to {_degrees(end)} degrees")

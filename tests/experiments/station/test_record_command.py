@@ -1,5 +1,7 @@
 """``truetip record``: goes on where it was interrupted, and refuses what it could not continue."""
 
+import json
+
 import numpy as np
 import pytest
 from typer.testing import CliRunner
@@ -7,6 +9,7 @@ from typer.testing import CliRunner
 from diagrams.record.run_record import RunRecord
 from diagrams.record.topics import JOINTS, POSE, pose_message
 from experiments.main import app
+from experiments.station import record_command
 from experiments.station.measured_table import MeasuredTable, read_configurations
 from robots.calibration.measurement_file import read_measurements
 
@@ -61,8 +64,29 @@ def test_what_cannot_be_measured_is_refused_in_one_line(tmp_path, design):
     assert "nothing.csv: no such file" in refused("record", str(tmp_path / "nothing.csv"))
     design.write_text(HEAD + "\n1,2,3,4,5,six\n")
     assert "design.csv, line 2: not six finite joint positions" in refused("record", str(design))
+    design.write_text(f"q1_deg,{HEAD}\n0,1,2,3,4,5,6\n")
+    assert "design.csv: column q1_deg is there twice" in refused("record", str(design))
+    design.write_text(HEAD + "\n0,20,10,0,40,0\n0,300,0,0,0,0\n")
+    assert "ways: 0.0, 300.0, 0.0, 0.0, 0.0, 0.0 degrees is beyond a limit" in refused(
+        "record", str(design), "--with-cell", "--write", str(tmp_path / "a.csv")
+    )
     design.write_text(HEAD + "\n1,5,2,0,3,0,4,0,5,0,6,0\n")  # decimal commas between commas
     assert "design.csv, line 2: 12 fields, but the head has 6" in refused("record", str(design))
+
+
+def test_the_numbers_of_a_run_are_written(tmp_path, design, monkeypatch: pytest.MonkeyPatch):
+    def measured(prepared, run, route, table, options):
+        table.measured |= {1, 2, 3}
+        return [2], "design", 0
+
+    monkeypatch.setattr(record_command, "_recorded", measured)
+    numbers, table = tmp_path / "run.json", tmp_path / "measured.csv"
+    options = ["--with-cell", "--write", str(table), "--json", str(numbers)]
+    result = CliRunner().invoke(app, ["record", str(design), *options], catch_exceptions=False)
+    assert result.exit_code == 0, result.output
+    assert json.loads(numbers.read_text()) == {
+        "configurations": 3, "measured": 3, "not_seen": [2], "ended": "design", "file": str(table)
+    }  # fmt: skip
 
 
 def test_a_recording_without_a_dwell_is_refused_in_one_line(tmp_path):
