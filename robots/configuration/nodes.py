@@ -47,6 +47,15 @@ class Node:
                 break
         return node
 
+    def check_count(self, key: str, count: int) -> None:
+        """Raises ConfigurationError if there is a list of another length under a key."""
+        entries = self.at([key])
+        if isinstance(entries.value, list) and len(entries.value) != count:
+            raise entries.refuse(
+                f"{key} must have {count} entries, got {len(entries.value)}; {{}} stands for one that is as "
+                "in the file that is extended"
+            )
+
     def refuse(self, reason: str) -> ConfigurationError:
         """The error that says what is wrong with this node."""
         return ConfigurationError(f"{self.place}: {reason}")

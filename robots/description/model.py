@@ -52,9 +52,8 @@ class JointLimits:
     source: str = ""  # where the numbers come from, or ``assumed``
     # Of a command; 0 where it is not known: the largest speed is then reached within `SPEED_UP`
     acceleration_deg_s2: float = quantity(0.0, 0.0, unit="deg/s^2")
-    jerk_deg_s3: float = quantity(
-        0.0, 0.0, unit="deg/s^3"
-    )  # of a command or a planned motion; 0 for no limit
+    # Of a command or a planned motion; 0 for no limit
+    jerk_deg_s3: float = quantity(0.0, 0.0, unit="deg/s^3")
 
 
 @dataclass
@@ -258,6 +257,8 @@ def robot_of(node: Node) -> RobotModel:
     Raises:
         ConfigurationError: if they describe none, or an impossible one.
     """
+    for key in ("joints", "links"):
+        node.check_count(key, NUM_JOINTS)
     robot = typed(node, RobotModel)
     keys, problem = _problem(robot)
     if problem:

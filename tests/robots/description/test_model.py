@@ -91,7 +91,7 @@ def test_a_file_is_found_by_its_path(tmp_path: Path):
 
 REFUSED = {
     "unknown key": (put("joints", 2, "drive_train", "stifness", 1.0), "stifness"),
-    "five joints": (lambda robot: robot["joints"].pop(), "needs 6 joints and links, got 5 and 6"),
+    "five joints": (lambda robot: robot["joints"].pop(), "joints must have 6 entries, got 5"),
     "crossed limits": (
         put("joints", 0, "limits", "lower_deg", 200),
         "joint 1: lower limit 200.0 deg is not below the upper 170.0 deg",
@@ -150,6 +150,16 @@ def test_an_impossible_robot_is_refused_in_one_line(tmp_path: Path, change: Call
     assert text.startswith(f"robot file {path}")
     assert message in text
     assert "\n" not in text
+
+
+def test_an_entry_of_an_extended_robot_may_stay_as_it_is_and_all_are_needed(tmp_path: Path):
+    path = tmp_path / "robot.yaml"
+    path.write_text("extends: kr16\njoints: [{drive_train: {stiffness: 1.0e+6}}, {}, {}, {}, {}, {}]\n")
+    stiffness = [joint.drive_train.stiffness for joint in load_robot(str(path)).joints]
+    assert stiffness == [1e6, *(joint.drive_train.stiffness for joint in load_robot("kr16").joints[1:])]
+    path.write_text("extends: kr16\njoints:\n- {drive_train: {stiffness: 1.0e+6}}\n")
+    with pytest.raises(RobotFileError, match=r"line 3: joints must have 6 entries, got 1; {} stands for one"):
+        load_robot(str(path))
 
 
 @pytest.mark.parametrize("content", ["joints: [1,\n  - 2", "just words", "", "- 1\n- 2"])
