@@ -60,8 +60,8 @@ class GainSearch:
     lower where speed loops are slow, whose own lag the model does not have.
 
     Where torques are sent, only drives softer than believed are looked for. Stiffer ones leave motors nearer
-    to their plan than anything else that is learnt needs, and friction that turns over otherwise than believed
-    looks like them.
+    to their plan than anything else that is learnt needs, and friction that turns over otherwise than
+    believed looks like them.
     """
 
     def __init__(
