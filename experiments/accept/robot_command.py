@@ -25,7 +25,7 @@ from experiments.accept.robot_cycle import (
     visits,
 )
 from experiments.accept.robot_page import Row, table_rows, verdict, write_acceptance_page
-from experiments.cli.console import print_files, progress_bar, refusing
+from experiments.cli.console import print_files, print_table, progress_bar, refusing
 from experiments.cli.json_output import human_console, json_output
 from experiments.cli.option_limits import at_least, positive
 from experiments.cli.options import (
@@ -116,7 +116,7 @@ def accept_robot_command(
         shown.add_column(name, justify="left" if number == 0 else "right")
     for line in table_rows(rows):
         shown.add_row(*line)
-    human.print(shown)
+    print_table(human, shown)
     human.print(escape(told))
     print_files(human, out)
 

@@ -11,6 +11,7 @@ from rich.markup import escape
 from rich.table import Table
 
 from experiments.calibration.calibrate import CalibrationStudy
+from experiments.cli.console import print_table
 from robots.calibration.identifiability import completeness
 from robots.calibration.identified import Identified
 from robots.calibration.measurement_file import RowProblem
@@ -264,7 +265,7 @@ def _print(console: Console, title: str, rows: Sequence[Sequence[str]]) -> None:
         table.add_column(head, justify="right" if head else "left", no_wrap=True)
     for row in rows:
         table.add_row(*row)
-    console.print(table)
+    print_table(console, table)
 
 
 def validation_rows(study: CalibrationStudy) -> list[list[str]]:

@@ -12,6 +12,7 @@ from rich.markup import escape
 from rich.table import Table
 
 from experiments.cameras.plots import SCENE
+from experiments.cli.console import print_table
 from experiments.report.plot_page import Section, html_table, write_plot_page
 from systems.vision.calibration.camera_parameters import LENS_NAMES, NUM_LENS, change_between
 from systems.vision.calibration.wand import CalibrationKit
@@ -97,7 +98,7 @@ def print_calibration(console: Console, found: CamerasFound) -> None:
         table.add_column(head, justify="left" if head == "camera" else "right", no_wrap=True)
     for row in _rows(found):
         table.add_row(*(escape(cell) for cell in row))
-    console.print(table)
+    print_table(console, table)
     console.print(escape(verdict(found)))
 
 

@@ -14,6 +14,7 @@ from experiments.cameras.laws import LawResult
 from experiments.cameras.plots import ENLARGED, ellipsoid_figure, sweep_figure, workspace_figure
 from experiments.cameras.study import CamerasStudy, study_verdict
 from experiments.cameras.sweeps import SWEEPS, SweepPoint
+from experiments.cli.console import print_table
 from experiments.report.plot_page import Section, html_table, write_plot_page
 from experiments.report.style import law_title
 
@@ -42,14 +43,14 @@ def print_study(console: Console, study: CamerasStudy) -> None:
             _micrometres(best),
             f"{best.value:g} {unit}",
         )
-    console.print(table)
+    print_table(console, table)
     if study.laws:
         laws = Table(title="Servo laws, true errors", **_TABLE)
         for head in LAW_HEAD:
             laws.add_column(head, justify="left" if head in LAW_HEAD[:2] else "right", no_wrap=True)
         for row in _law_rows(study.laws):
             laws.add_row(*(escape(cell) for cell in row))
-        console.print(laws)
+        print_table(console, laws)
     console.print(escape(study_verdict(study)))
 
 

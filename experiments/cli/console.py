@@ -1,4 +1,4 @@
-"""What all commands share: refusals in one line, progress bars, lists."""
+"""What all commands share: refusals in one line, progress bars, lists, tables."""
 
 import sys
 import time
@@ -18,6 +18,7 @@ from experiments.cli.ending import exit_code
 from experiments.cli.workers import SimulationError
 
 BAD_INPUT, BROKEN_OFF = 2, 1  # exit codes
+_NARROWEST = 12  # characters of a text that a line of a table has at least
 _OBSERVED, _LONG = 2.0, 20.0  # s: of progress before a time is said; what is worth a line
 
 
@@ -132,6 +133,28 @@ def print_list(rows: Iterable[tuple[str, str]]) -> None:
     for name, text in rows:
         table.add_row(escape(name), escape(text))
     Console().print(table)
+
+
+def print_table(console: Console, table: Table) -> None:
+    """Prints a table with all its numbers whole.
+
+    Texts are folded where a terminal or pipe is narrow. A number with its end cut off would be another
+    number: columns that are justified right are as wide as their numbers, and the table is rather wider than
+    a very narrow terminal.
+    """
+    least = 1
+    for column in table.columns:
+        head, *cells = (console.render_str(str(each)) for each in (column.header, *column.cells))
+        widest = max((cell.cell_len for cell in cells), default=0)
+        if column.justify == "right":
+            words = [head.plain] if column.no_wrap else head.plain.split()
+            column.min_width = max([widest, *(max(map(len, word.split("\n"))) for word in words)])
+        else:
+            column.no_wrap, column.overflow = False, "fold"
+            column.min_width = min(max(widest, head.cell_len), _NARROWEST)
+        least += column.min_width + table.padding[1] + table.padding[3] + 1
+    table.width = least if least > console.width else None
+    console.print(table, crop=False)
 
 
 def count(number: int, one: str, many: str = "") -> str:

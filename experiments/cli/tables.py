@@ -9,6 +9,7 @@ from rich.console import Console
 from rich.markup import escape
 from rich.table import Table
 
+from experiments.cli.console import print_table
 from experiments.report.error_rows import AXES, KINDS, error_row, format_cell, is_best, smallest_of_columns
 from experiments.report.style import law_colors, law_title
 
@@ -28,14 +29,14 @@ def print_summary(console: Console, result: Mapping[str, Any]) -> None:
     console.print()
     console.print(f"[bold]Scenario {escape(result['scenario'])}[/bold]")
     for source in SOURCES:
-        console.print(error_table(result, source))
+        print_table(console, error_table(result, source))
     if any("laps" in run for run in result["runs"].values()):
-        console.print(lap_table(result))
+        print_table(console, lap_table(result))
     for law, run in result["runs"].items():
         for line in learnt_lines(run.get("learnt") or {}):
             console.print(f"[italic]{escape(law_title(law))}: {escape(line)}[/italic]")
     if any(count for run in result["runs"].values() for count in run["guard"].values()):
-        console.print(guard_table(result))
+        print_table(console, guard_table(result))
     else:
         console.print("[italic]Guard: no intervention[/italic]\n")
 
@@ -43,7 +44,11 @@ def print_summary(console: Console, result: Mapping[str, Any]) -> None:
 def error_table(result: Mapping[str, Any], source: str) -> Table:
     """The errors of one source; the smallest number of each column and kind is bold."""
     table = Table(
-        box=box.SIMPLE_HEAD, title=f"Errors, {SOURCES[source]}", title_justify="left", title_style="italic"
+        box=box.SIMPLE_HEAD,
+        title=f"Errors, {SOURCES[source]}",
+        title_justify="left",
+        title_style="italic",
+        padding=(0, 1, 0, 0),  # so that 80 characters are enough for all laws
     )
     table.add_column("error", no_wrap=True)
     table.add_column("law", no_wrap=True)

@@ -9,7 +9,7 @@ from rich import box
 from rich.markup import escape
 from rich.table import Table
 
-from experiments.cli.console import count, print_files, progress_bar, refusing
+from experiments.cli.console import count, print_files, print_table, progress_bar, refusing
 from experiments.cli.json_output import human_console, json_output
 from experiments.cli.option_limits import at_least, one_of
 from experiments.cli.options import (
@@ -83,7 +83,7 @@ def feedforward_command(
             study = study_feedforward(model, mass, config, grid, processes, progress, realistic, timing)
         write_study_page(page, study)
         output.write(study_json(study))
-    human.print(_table(study))
+    print_table(human, _table(study))
     human.print(escape(study_verdict(study)))
     print_files(human, report)
 

@@ -11,6 +11,7 @@ from rich.console import Console
 from rich.markup import escape
 from rich.table import Table
 
+from experiments.cli.console import print_table
 from experiments.cli.json_output import json_output
 from robots.pose import zyx_from_rotation
 
@@ -35,7 +36,7 @@ def print_pose(console: Console, title: str, X: RigidTransform) -> None:
         table.add_column(name, justify="right", no_wrap=True)
     for name, row, coordinate in zip("xyz", X.rotation().matrix(), MM * X.translation(), strict=True):
         table.add_row(name, *(f"{value:z.6f}" for value in row), f"{coordinate:z.4f}")
-    console.print(table)
+    print_table(console, table)
     alpha, beta, gamma = np.rad2deg(zyx_from_rotation(X.rotation().matrix()))
     console.print(f"  ZYX angles {alpha:z.4f}°, {beta:z.4f}°, {gamma:z.4f}°\n")
 
@@ -69,7 +70,7 @@ def print_residuals(console: Console, result: Mapping[str, Any]) -> None:
         vectors = [result[name][row] for name in units]
         cells = [f"{value:z.4f}" for vector in vectors for value in (*vector, np.linalg.norm(vector))]
         table.add_row(str(line), *cells, "outlier" if line in result["outlier_lines"] else "")
-    console.print(table)
+    print_table(console, table)
 
 
 def _text(value: Any) -> str:

@@ -11,7 +11,7 @@ from rich.markup import escape
 from rich.table import Table
 
 from experiments.cli.cluster import executor
-from experiments.cli.console import count, print_files, progress_bar, refusing
+from experiments.cli.console import count, print_files, print_table, progress_bar, refusing
 from experiments.cli.json_output import human_console, json_output
 from experiments.cli.option_limits import at_least, refuse_given
 from experiments.cli.options import (
@@ -276,15 +276,15 @@ def identify_command(
         output.write(identify_json(study) | ({"searches": search_json(searches)} if searches else {}))
     _print(human, study)
     if study.verdict is not None:
-        human.print(_table(SUMMARY_HEAD, judge_summary(study.verdict)))
+        print_table(human, _table(SUMMARY_HEAD, judge_summary(study.verdict)))
     if study.advice is not None and study.advice.weak:
-        human.print(_table(ADVICE_HEAD, advice_rows(study.advice)))
+        print_table(human, _table(ADVICE_HEAD, advice_rows(study.advice)))
     if study.fine_tuning is not None:
-        human.print(_table(MOTIONS_HEAD, motion_rows(study.fine_tuning)))
+        print_table(human, _table(MOTIONS_HEAD, motion_rows(study.fine_tuning)))
         tuned = number_rows(study.fine_tuning)[: len(study.fine_tuning.changed)]  # the page has the others
-        human.print(_table(NUMBERS_HEAD, tuned))
+        print_table(human, _table(NUMBERS_HEAD, tuned))
     if searches:
-        human.print(_table(SEARCH_HEAD, search_rows(searches)))
+        print_table(human, _table(SEARCH_HEAD, search_rows(searches)))
     print_files(human, report, write, write_table)
 
 
@@ -310,7 +310,7 @@ def _simulated(
 
 
 def _print(human: Console, study: IdentifyStudy) -> None:
-    human.print(_table(table_head(study), table_rows(study)))
+    print_table(human, _table(table_head(study), table_rows(study)))
     human.print(escape(verdict(study)))
 
 

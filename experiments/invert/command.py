@@ -8,7 +8,7 @@ from rich import box
 from rich.markup import escape
 from rich.table import Table
 
-from experiments.cli.console import count, print_files, progress_bar, refusing
+from experiments.cli.console import count, print_files, print_table, progress_bar, refusing
 from experiments.cli.json_output import human_console, json_output
 from experiments.cli.option_limits import at_least, refuse_given
 from experiments.cli.options import (
@@ -69,7 +69,7 @@ def invert_command(
             )
         write_invert_page(page, study)
         output.write(invert_json(study))
-    human.print(_table(study))
+    print_table(human, _table(study))
     for line in [verdict(study), *refusals(study)]:
         human.print(escape(line))
     print_files(human, out)

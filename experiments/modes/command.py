@@ -11,7 +11,7 @@ from rich import box
 from rich.markup import escape
 from rich.table import Table
 
-from experiments.cli.console import print_files, progress_bar, refusing, wait_for_interrupt
+from experiments.cli.console import print_files, print_table, progress_bar, refusing, wait_for_interrupt
 from experiments.cli.json_output import human_console, json_output
 from experiments.cli.options import (
     GridOption,
@@ -69,9 +69,9 @@ def modes_command(
         write_modes_page(page, study)
         output.write(modes_json(study))
     title = f"{model.name}, {mass:g} kg, motors held, stretched"
-    human.print(_table(title, STRETCHED_HEAD, stretched_rows(study, joints=3)))
+    print_table(human, _table(title, STRETCHED_HEAD, stretched_rows(study, joints=3)))
     title = f"over {grid} x {grid} positions of axes 2 and 3"
-    human.print(_table(title, WORKSPACE_HEAD, workspace_rows(study, joints=2)))
+    print_table(human, _table(title, WORKSPACE_HEAD, workspace_rows(study, joints=2)))
     human.print(escape(modes_verdict(study)))
     print_files(human, out, animation)
     if meshcat:

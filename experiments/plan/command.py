@@ -10,7 +10,7 @@ from rich.markup import escape
 from rich.table import Table
 
 from diagrams.scenario.scenario import StationConfig
-from experiments.cli.console import print_files, progress_bar, refusing
+from experiments.cli.console import print_files, print_table, progress_bar, refusing
 from experiments.cli.json_output import human_console, json_output
 from experiments.cli.options import JsonOption, PayloadOption, StudiedRobotOption
 from experiments.cli.prepare import noted_robot
@@ -26,8 +26,6 @@ from robots.planning.limits import DUTY, RESERVE, motion_limits
 from robots.planning.path_dynamics import DYNAMICS
 from robots.programs.planned_moves import FILES, MOVES
 from systems.reference.planned_file import planned_text
-
-_NARROWEST = 12  # characters of the name of a leg in a line of the table
 
 
 def plan_command(
@@ -152,7 +150,7 @@ def plan_command(
             written += [report.parent / name for name in files]
         output.write(plan_json(plan, results))
     title = f"{model.name}, {mass:g} kg: {path}, least {objective}"
-    human.print(result_table(title, table_rows(plan, results), human.width), crop=False)
+    print_table(human, result_table(title, table_rows(plan, results)))
     human.print(escape(verdict(plan, results)))
     print_files(human, report, write, *written)
 
@@ -162,24 +160,17 @@ def _motion_text(robot: RobotModel, results: list[LegResult]) -> str:
     return planned_text(times, Kinematics(robot).forward(q), q)
 
 
-def result_table(title: str, rows: list[list[str]], width: int) -> Table:
+def result_table(title: str, rows: list[list[str]]) -> Table:
     """A line for each leg.
 
     Args:
         title: above them.
         rows: of `experiments.plan.plots.table_rows`.
-        width: of the terminal in characters. Names are folded to fit; a number with its end cut off would be
-            another number, so that the table is rather wider than a very narrow terminal.
     """
     heads = TABLE_HEAD[:-1]
-    cells = [heads, *(row[:-1] for row in rows)]
-    numbers = sum(max(map(len, column)) + 3 for column in list(zip(*cells, strict=True))[1:])
-    needed = numbers + _NARROWEST + 4
     table = Table(box=box.SIMPLE_HEAD, title=escape(title), title_justify="left", title_style="italic")
-    table.width = needed if needed > width else None
-    table.add_column(heads[0], overflow="fold")
-    for name in heads[1:]:
-        table.add_column(name, justify="right", no_wrap=True)
+    for name in heads:
+        table.add_column(name, justify="left" if name == heads[0] else "right", no_wrap=True)
     for row in rows:
         table.add_row(*map(escape, row[:-1]))
     return table

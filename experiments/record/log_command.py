@@ -14,7 +14,7 @@ from rich.markup import escape
 from rich.table import Table
 
 from diagrams.record.read_record import Contents, Topic, read_record
-from experiments.cli.console import print_files, refusing
+from experiments.cli.console import print_files, print_table, refusing
 from experiments.cli.staging import staged_file, staged_folder
 
 
@@ -51,7 +51,7 @@ def log_command(
     console.print(
         f"{escape(str(file))}: law {escape(str(said.get('law', 'unknown')))}, {escape(how)}", soft_wrap=True
     )
-    console.print(summary_table(contents))
+    print_table(console, summary_table(contents))
     print_files(console, csv, parquet, npz)
 
 

@@ -10,7 +10,7 @@ from rich.markup import escape
 from rich.table import Table
 
 from experiments.cli.cluster import executor
-from experiments.cli.console import count, progress_bar, refusing
+from experiments.cli.console import count, print_table, progress_bar, refusing
 from experiments.cli.json_output import human_console, json_output
 from experiments.cli.option_limits import at_least
 from experiments.cli.options import JobsOption, JsonOption, RobotOption, SchedulerOption, SetOption
@@ -123,7 +123,7 @@ def _print(console: Console, scenario: str, results: list[dict[str, Any]], title
             if has_events:
                 cells.append(pair(result["recovered_mm"], 3) if is_last and "recovered_mm" in result else "")
             table.add_row(label(result) if number == 1 else "", *cells)
-    console.print(table)
+    print_table(console, table)
     for result in results:
         if not is_single and "worst_seed" in result:
             robot = f" ({result['worst_robot']})" if "worst_robot" in result else ""

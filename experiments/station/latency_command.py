@@ -12,7 +12,7 @@ from rich.table import Table
 
 from diagrams.runs.latency import LatencyConfig, LatencyRecord, measure_latency
 from diagrams.scenario.scenario import Scenario, load_scenario
-from experiments.cli.console import BROKEN_OFF, fail, print_files, progress_bar, refusing
+from experiments.cli.console import BROKEN_OFF, fail, print_files, print_table, progress_bar, refusing
 from experiments.cli.json_output import human_console, json_output
 from experiments.cli.options import (
     JsonOption,
@@ -73,7 +73,7 @@ def latency_command(
         if write and written:
             write_text(written, scenario_with(scenario, found, settings or [], Path(write)))
         output.write(found.as_dict())
-    human.print(latency_table(found))
+    print_table(human, latency_table(found))
     print_files(human, report, write)
 
 

@@ -15,7 +15,7 @@ from rich.markup import escape
 from rich.table import Table
 
 from experiments.cli.cluster import executor
-from experiments.cli.console import count, fail, print_files, progress_bar, refusing
+from experiments.cli.console import count, fail, print_files, print_table, progress_bar, refusing
 from experiments.cli.json_output import human_console, json_output
 from experiments.cli.option_limits import at_least
 from experiments.cli.options import JobsOption, JsonOption, SchedulerOption
@@ -119,7 +119,7 @@ def _print(human: Console, study: Study, rows: Rows) -> None:
             table.add_column(name, justify="left" if name == "law" else "right")
         for line in _spread_lines(study, rows, metric):
             table.add_row(*map(escape, line))
-        human.print(table)
+        print_table(human, table)
     failed = int((rows["failure"] != "").sum())
     if failed:
         human.print(f"[red]{count(failed, 'run')} failed; the reasons are in the report[/red]")

@@ -1,6 +1,38 @@
-"""What a law has learnt, in lines that people read."""
+"""Numbers on a terminal are whole however narrow it is; what a law has learnt is said in lines."""
 
-from experiments.cli.tables import learnt_lines
+import io
+
+import pytest
+from rich.console import Console
+
+from experiments.cli.tables import learnt_lines, print_summary
+
+
+def shown(width: int, law: str, laps: int) -> str:
+    """The summary of a run on a terminal of that many characters."""
+    errors = {f"{kind}_{unit}": 3 * [12.345] for kind in ("max", "static") for unit in ("mm", "deg")}
+    run = {
+        "true": errors,
+        "measured": errors,
+        "laps": [{"max_norm_mm": 67.891, "max_angle_deg": 67.891}] * laps,
+        "guard": {"position_limit": 246810, "joint_step": 246810},
+    }
+    console = Console(width=width, file=io.StringIO(), record=True)
+    print_summary(console, {"scenario": "everything", "runs": {law: run}})
+    return console.export_text()
+
+
+@pytest.mark.parametrize("width", [20, 80, 200])
+def test_no_number_is_cut_off(width: int):
+    text = shown(width, "self_calibrating", laps=9)
+    assert "…" not in text
+    assert text.count("12.345") == 2 * 12
+    assert text.count("67.891") == 9 * 2
+    assert text.count("246810") == 2
+
+
+def test_eighty_characters_are_enough_for_the_errors_of_the_law_with_the_longest_name():
+    assert shown(80, "disturbance_observer", laps=2).count("Disturbance observer") == 6
 
 
 def test_events_and_what_the_path_needs_are_said_in_units_of_the_trade():

@@ -9,6 +9,7 @@ import pytest
 from rich.console import Console
 from typer.testing import Result
 
+from experiments.cli.console import print_table
 from experiments.plan.command import result_table
 from experiments.plan.study import STILL
 from systems.reference.paths import ReferenceConfig, make_path
@@ -95,7 +96,7 @@ def test_the_table_folds_names_and_never_cuts_a_number_off(width: int):
     numbers = ["12.345", "13.456", "-35.2", "123456", "234567", "+123.4", "0.010", "0.011"]
     name = "to somebody/robots/programs/welding_of_the_left_door.mod, line 123"
     console = Console(width=width, file=io.StringIO(), record=True)
-    console.print(result_table("welding", [[name, *numbers, "kept"]] * 2, width), crop=False)
+    print_table(console, result_table("welding", [[name, *numbers, "kept"]] * 2))
     text = console.export_text()
     assert all(text.count(each) == 2 for each in numbers)
     assert "…" not in text
