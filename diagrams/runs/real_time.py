@@ -133,7 +133,8 @@ class RealTimeRun:
     ) -> RealTimeRecord:
         """Runs the law on the station at the other end.
 
-        However it ends before its end, the robot is sent a smooth stop as long as its controller speaks.
+        However it ends before its end, also by an error of a law or Ctrl-C, the robot is sent a smooth stop
+        as long as its controller speaks.
 
         Args:
             client: to the controller.
@@ -170,6 +171,11 @@ class RealTimeRun:
                 ended = self._follow(wire, progress or (lambda share: None), now, is_asked_to_end)
             except EndedOnRequest:
                 began, ended = now(), REQUESTED
+            except BaseException as error:
+                wire.stop_smoothly()
+                if len(self._reports):
+                    self._record({}, camera, wire, f"{type(error).__name__}: {error}")
+                raise
             if ended != "path":
                 wire.stop_smoothly()
                 if ended != REQUESTED:

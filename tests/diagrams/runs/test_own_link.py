@@ -1,11 +1,14 @@
 """A controller and a camera of another maker: whatever fits the protocols runs a servo."""
 
+from pathlib import Path
 from types import SimpleNamespace
 from typing import Any, NamedTuple
 
 import numpy as np
 import pytest
 
+from diagrams.record.read_record import read_record
+from diagrams.record.run_record import RunRecord
 from diagrams.runs.real_time import RealTimeRun
 from diagrams.runs.simulation import run
 from diagrams.runs.virtual_cell import Exposure, VirtualCell
@@ -14,6 +17,8 @@ from robots.description.model import load_robot
 from robots.pose import pose_error
 from systems.link.clock import ClockQuality
 from systems.samples import PoseSample
+from systems.servo.law import LawInput, LawOutput
+from systems.servo.open_loop import OpenLoop
 
 SHORT = ["reference.path=circle", "reference.acceleration=6", "reference.settle=1", "reference.dwell=0.6"]
 
@@ -36,6 +41,7 @@ class OwnLink:
         self.references = self.following = np.full(6, np.nan), np.full(6, np.nan)
         self.exposures: list[Exposure] = []
         self.arrived, self.sent, self.velocity, self.effort = 0.0, 0, np.zeros(6), np.zeros(6)
+        self.fastest = 0.0  # speed that it was sent, rad/s
 
     def now(self) -> float:
         return self.cell.time
@@ -52,6 +58,7 @@ class OwnLink:
 
     def send(self, position: np.ndarray, velocity: np.ndarray, is_speed_only: bool = False) -> bool:
         self.following = np.full(6, np.nan) if is_speed_only else position, velocity
+        self.fastest = max(self.fastest, float(np.abs(velocity).max()))
         self.sent += 1
         return True
 
@@ -105,6 +112,37 @@ def test_a_servo_runs_on_it_as_in_simulation():
     )
     assert heard.mean() > 0.99
     assert over_the_link == pytest.approx(expected, rel=0.05)
+
+
+class Breaks(OpenLoop):
+    """A law with a defect that shows itself on the way."""
+
+    error: type[BaseException] = ZeroDivisionError
+
+    def step(self, moment: LawInput, memory: np.ndarray) -> LawOutput:
+        if np.abs(moment.V_WD).max() > 0.2:  # in full motion
+            raise self.error("of the law")
+        return super().step(moment, memory)
+
+
+class Interrupted(Breaks):
+    error = KeyboardInterrupt
+
+
+@pytest.mark.parametrize("law", [Breaks, Interrupted])
+def test_a_law_that_breaks_on_the_way_leaves_the_robot_at_rest_and_the_record_whole(
+    law: type[Breaks], tmp_path: Path
+):
+    scenario = load_scenario("cell", SHORT)
+    link, record = OwnLink(scenario), RunRecord(tmp_path / "broken.mcap", "")
+    with pytest.raises(law.error, match="of the law"):
+        RealTimeRun(scenario, law).run(link, OwnCamera(link), now=link.now, record=record)
+    assert link.fastest > 0.1
+    np.testing.assert_allclose(link.following[1], 0.0, atol=1e-12)
+    contents = read_record(tmp_path / "broken.mcap")
+    assert contents.is_complete
+    assert contents.run["ended"] == f"{law.error.__name__}: of the law"
+    assert len(contents.topics["/joint_sample"].time) > 1.0 / scenario.station.period
 
 
 def _largest_error(time: np.ndarray, wanted: np.ndarray, true: np.ndarray, start: float) -> float:
