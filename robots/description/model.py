@@ -299,9 +299,6 @@ _Keys = tuple[str | int, ...]
 
 def _problem(robot: RobotModel) -> tuple[_Keys, str]:
     """The place of the first reason why the robot is impossible, and the reason, empty if there is none."""
-    if len(robot.joints) != NUM_JOINTS or len(robot.links) != NUM_JOINTS:
-        counts = f"{len(robot.joints)} and {len(robot.links)}"
-        return (), f"needs {NUM_JOINTS} joints and links, got {counts}"
     problems: list[tuple[_Keys, str]] = [
         (("joints", index), _joint_problem(joint, index + 1)) for index, joint in enumerate(robot.joints)
     ]

@@ -88,9 +88,13 @@ class Feedforward(LeafSystem):
             extra_memory: numbers that the model remembers beside its class's ``memory_size``.
 
         Raises:
-            ValueError: if an error makes a stiffness or a mass vanish, or the prefilter's order is too low.
+            ValueError: if an error makes a stiffness or a mass vanish, the prefilter's order is too low, or the
+                class has no `drive_under`.
         """
         super().__init__()
+        own, base = type(self), Feedforward
+        if (own.drive_under, own.drive, own._tick) == (base.drive_under, base.drive, base._tick):
+            raise ValueError(f"feedforward: class {own.__name__} needs a method 'drive_under'")
         robot, period, payload = model.robot, model.period, model.payload
         self._between = BetweenTicks(period, _LONGEST_SUBSTEP)
         self.substep = self._between.substep

@@ -100,9 +100,11 @@ class ServoLaw(LeafSystem):
             guard: when to use a sample.
 
         Raises:
-            ValueError: if a gain or a limit is not positive.
+            ValueError: if a gain or a limit is not positive, or the class has no `step`.
         """
         super().__init__()
+        if type(self).step is ServoLaw.step and type(self)._tick is ServoLaw._tick:
+            raise ValueError(f"servo law: class {type(self).__name__} needs a method 'step'")
         for label in ("translation", "rotation", "correction_limit", "correction_limit_deg"):
             if not getattr(config, label) > 0.0:
                 raise ValueError(f"servo law: {label} must be positive, got {getattr(config, label)}")

@@ -44,6 +44,14 @@ def test_one_that_is_not_there_is_refused_in_one_line():
         load_scenario("misaligned", ["servo.feedforward.kind=magic"])
 
 
+def test_one_that_computes_nothing_is_refused_before_anything_runs(tmp_path: Path):
+    text = "from systems.feedforward.feedforward import Feedforward\nclass Mine(Feedforward): pass\n"
+    (tmp_path / "own.py").write_text(text)
+    kind = f"servo.feedforward.kind={tmp_path / 'own.py'}:Mine"
+    with pytest.raises(ValueError, match="class Mine needs a method 'drive_under'"):
+        run(load_scenario("misaligned", [*SETTINGS, kind]), "open_loop")
+
+
 def test_every_shipped_model_says_what_it_is():
     for name, model in FEEDFORWARDS.items():
         assert FEEDFORWARDS.name_of(model) == name

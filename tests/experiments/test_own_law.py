@@ -156,8 +156,12 @@ def test_what_is_no_law_is_refused_in_one_line(tmp_path: Path):
             "Config must be a dataclass that extends LawConfig",
         ),
         ("class Mine:\n    pass\n", "Mine"),
+        (
+            "from systems.servo.law import ServoLaw\nclass Mine(ServoLaw):\n    pass\n",
+            "class Mine needs a method 'step'",
+        ),
     ],
-    ids=["syntax", "import", "missing port", "unknown port", "config", "no system"],
+    ids=["syntax", "import", "missing port", "unknown port", "config", "no system", "no step"],
 )
 def test_a_file_that_cannot_be_used_is_refused_in_one_line(tmp_path: Path, text: str, why: str):
     assert why in refused(tmp_path, text)

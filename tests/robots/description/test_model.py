@@ -92,6 +92,7 @@ def test_a_file_is_found_by_its_path(tmp_path: Path):
 REFUSED = {
     "unknown key": (put("joints", 2, "drive_train", "stifness", 1.0), "stifness"),
     "five joints": (lambda robot: robot["joints"].pop(), "joints must have 6 entries, got 5"),
+    "seven links": (lambda robot: robot["links"].append({}), "links must have 6 entries, got 7"),
     "crossed limits": (
         put("joints", 0, "limits", "lower_deg", 200),
         "joint 1: lower limit 200.0 deg is not below the upper 170.0 deg",
