@@ -73,7 +73,8 @@ function tell() {
 }
 
 /* Views: a free one that turns about the path, one that goes with the tool, one from above. */
-const eye = new THREE.PerspectiveCamera(42, 1, 0.005, 60);
+const field = 42;  // degrees of the view's height, or of its width where that is less
+const eye = new THREE.PerspectiveCamera(field, 1, 0.005, 60);
 eye.up.set(0, 0, 1);
 const orbit = {target: new THREE.Vector3(0.5 * middle.x, 0.5 * middle.y, 0.75 * middle.z), azimuth: 0.42,
   height: 0.36, distance: 2.4 * reach};
@@ -222,6 +223,8 @@ function keepPace(now) {
 function fit() {
   renderer.setSize(holder.clientWidth, holder.clientHeight);
   eye.aspect = holder.clientWidth / Math.max(holder.clientHeight, 1);
+  eye.fov = 2 * THREE.MathUtils.radToDeg(
+    Math.atan(Math.tan(THREE.MathUtils.degToRad(0.5 * field)) / Math.min(eye.aspect, 1)));
   eye.updateProjectionMatrix();
   isStale = true;
 }
