@@ -3,6 +3,7 @@
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from pathlib import Path
 from typing import Any
 
 from diagrams.record.log import RunLog
@@ -25,7 +26,8 @@ from robots.calibration.identification import identify as identify_geometry
 from robots.calibration.identified import Identified
 from robots.calibration.measurements import Measurements
 from robots.calibration.validation import ErrorStatistics
-from robots.description.model import RobotModel, load_robot
+from robots.description.model import RobotModel, load_robot, shipped_robots
+from robots.description.robot_file import robot_text
 from robots.measurement_design.design import MeasurementDesign, design_measurements
 from systems.servo import LAWS
 
@@ -94,9 +96,9 @@ class Calibration:
 
 
 def simulate(
-    scenario: Scenario | str,
+    scenario: Scenario | str | Path,
     law: str | None = None,
-    robot: RobotModel | str | None = None,
+    robot: RobotModel | str | Path | None = None,
     seed: int | None = None,
     progress: Progress | None = None,
 ) -> RunLog:
@@ -123,9 +125,9 @@ def simulate(
 
 
 def compare(
-    scenario: Scenario | str,
+    scenario: Scenario | str | Path,
     laws: Sequence[str] | None = None,
-    robot: RobotModel | str | None = None,
+    robot: RobotModel | str | Path | None = None,
     cycles: int = 1,
     executor: Executor | None = None,
     progress: Progress | None = None,
@@ -156,7 +158,7 @@ def compare(
     return Comparison(scenario, run_laws(scenario, known, chosen, cycles, executor, progress))
 
 
-def design(robot: RobotModel | str, count: int = 75, **options: Any) -> MeasurementDesign:
+def design(robot: RobotModel | str | Path, count: int = 75, **options: Any) -> MeasurementDesign:
     """Chooses the configurations at which measurements determine a robot's errors best.
 
     Args:
@@ -171,7 +173,7 @@ def design(robot: RobotModel | str, count: int = 75, **options: Any) -> Measurem
 
 
 def calibrate(
-    robot: RobotModel | str,
+    robot: RobotModel | str | Path,
     measurements: Measurements,
     fresh: Measurements | None = None,
     config: IdentificationConfig | None = None,
@@ -179,7 +181,8 @@ def calibrate(
     """Finds the errors of a robot, and tries the calibrated one at configurations that it has not seen.
 
     Args:
-        robot: the nominal robot, a shipped one's name or the path of a file.
+        robot: the nominal robot, a shipped one's name or the path of a file. A scenario takes the calibrated
+            one where it names the same robot: one from a file of one's own is given by its path.
         measurements: such as `robots.calibration.measurement_file.read_measurements` reads.
         fresh: further ones for validation.
         config: what to identify; geometry alone unless it says more.
@@ -190,14 +193,14 @@ def calibrate(
     """
     model = _robot(robot)
     identified = identify_geometry(model, measurements, config)
-    calibrated = identified.calibrated_robot(robot if isinstance(robot, str) else model.name)
+    calibrated = identified.calibrated_robot(_name_of(robot))
     checked = validate(identified, calibrated, fresh)
     return Calibration(calibrated, identified, checked.before, checked.after)
 
 
 def record_motions(
-    robot: RobotModel | str,
-    plant: RobotModel | str,
+    robot: RobotModel | str | Path,
+    plant: RobotModel | str | Path,
     motions: MotionCases | None = None,
     seed: int = 0,
     processes: int | None = None,
@@ -226,9 +229,9 @@ def record_motions(
 
 
 def identify(
-    robot: RobotModel | str,
+    robot: RobotModel | str | Path,
     recording: Recording,
-    plant: RobotModel | str | None = None,
+    plant: RobotModel | str | Path | None = None,
     slow: Recording | None = None,
     gear_parts: bool = True,
     progress: Progress | None = None,
@@ -285,9 +288,18 @@ def fine_tune(
     return with_fine_tuning(study, LocalProcesses(processes), share, seed, progress)
 
 
-def _scenario(scenario: Scenario | str) -> Scenario:
-    return load_scenario(scenario) if isinstance(scenario, str) else scenario
+def _scenario(scenario: Scenario | str | Path) -> Scenario:
+    return load_scenario(str(scenario)) if isinstance(scenario, str | Path) else scenario
 
 
-def _robot(robot: RobotModel | str) -> RobotModel:
-    return load_robot(robot) if isinstance(robot, str) else robot
+def _robot(robot: RobotModel | str | Path) -> RobotModel:
+    return load_robot(str(robot)) if isinstance(robot, str | Path) else robot
+
+
+def _name_of(robot: RobotModel | str | Path) -> str:
+    """What a scenario calls a robot: a shipped one that was read already by its name again."""
+    if isinstance(robot, str | Path):
+        return str(robot)
+    text = robot_text(robot)
+    same = (name for name in shipped_robots() if robot_text(load_robot(name)) == text)
+    return next(same, robot.name)

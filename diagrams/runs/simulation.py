@@ -86,6 +86,8 @@ class Experiment:
         end = make_path(scenario.reference).duration
         check_events(scenario.station.events, end, scenario.station.drive.dead_time)
         self.seed = scenario.seed if seed is None else seed
+        if not (isinstance(self.seed, int | np.integer) and 0 <= self.seed < 2**32):
+            raise ScenarioError(f"seed must be a whole number between 0 and {2**32 - 1}, got {seed}")
         drawn = plant or nominal_robot(scenario, robot)
         robot = robot or drawn
         builder = DiagramBuilder()
@@ -162,7 +164,12 @@ class Experiment:
             until: in s; None for the end of the path.
             progress: is called now and then with the share that is done, 0 to 1.
             show: is called about 30 times a simulated second, on ticks, and at the end.
+
+        Raises:
+            ValueError: if the time is not finite.
         """
+        if until is not None and not np.isfinite(until):
+            raise ValueError(f"cannot be advanced to {until} s")
         # Chunks that end on a tick cost nothing: the integrator stops there anyway.
         ticks = max(1, round(_CHUNK / self.scenario.station.period))
         started = time.perf_counter()

@@ -6,6 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from diagrams.runs.simulation import Experiment
 from diagrams.scenario.scenario import load_scenario
 from experiments.identify.cases import default_cases
 from experiments.identify.recording_map import Recording
@@ -64,6 +65,18 @@ def test_a_law_that_does_not_exist_is_refused_before_anything_runs():
         compare("misaligned", ["pbvz"])
 
 
+@pytest.mark.parametrize("seed", [-1, 1.5, 2**32])
+def test_a_seed_that_is_none_is_refused_in_one_line(seed: float):
+    with pytest.raises(ValueError, match=f"seed must be a whole number between 0 and 4294967295, got {seed}"):
+        simulate("misaligned", "open_loop", seed=seed)  # pyright: ignore[reportArgumentType]
+
+
+def test_an_experiment_is_not_advanced_to_no_time():
+    experiment = Experiment(load_scenario("nominal", SETTINGS), "open_loop")
+    with pytest.raises(ValueError, match="cannot be advanced to nan s"):
+        experiment.advance(until=float("nan"))
+
+
 @pytest.mark.slow
 def test_a_design_is_nearly_as_good_as_any():
     chosen = design("irb1200", count=12)
@@ -90,6 +103,14 @@ def test_a_robot_with_known_errors_is_found_and_tried_where_it_was_not_measured(
     assert found.after.mean_norm_mm < 0.05
     assert found.robot.is_calibrated
     assert found.robot.calibration.of == "irb1200"
+    assert calibrate(robot, *tables).robot.calibration.of == "irb1200"  # as scenarios call it
+
+
+def test_files_may_be_given_as_paths(tmp_path: Path):
+    with pytest.raises(ValueError, match=r"scenario '.*mine\.yaml': no file"):
+        simulate(tmp_path / "mine.yaml", "open_loop")
+    with pytest.raises(ValueError, match=r"robot '.*arm\.yaml': no file"):
+        simulate("nominal", "open_loop", tmp_path / "arm.yaml")
 
 
 @pytest.mark.slow
