@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from robots.configuration.quantity import quantity
 from robots.description.error_parameters import (
     FRAMES,
     OFFSET,
@@ -23,9 +24,11 @@ from robots.description.model import NUM_JOINTS, RobotModel
 class RandomErrors:
     """Errors drawn uniformly within bounds, the same ones for the same seed; zero bounds draw none."""
 
-    seed: int = 0  # of the random draw
-    translation_mm: float = 0.0  # largest translation, of a frame or the tool, along each axis
-    rotation_deg: float = 0.0  # largest rotation, of a joint, body or the tool, about each axis
+    seed: int = quantity(0, 0, 2**32 - 1)  # of the random draw
+    # Largest translation, of a frame or the tool, along each axis
+    translation_mm: float = quantity(0.0, 0.0, unit="mm")
+    # Largest rotation, of a joint, body or the tool, about each axis
+    rotation_deg: float = quantity(0.0, 0.0, 180.0, "deg")
 
     def vector(self, robot: RobotModel) -> np.ndarray:
         """One draw in m and rad, in the order of `error_parameters`, shape (48,).
