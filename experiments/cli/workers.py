@@ -97,7 +97,8 @@ class LocalProcesses:
                         progress(sum(shares) / len(shares))
             except BrokenProcessPool as error:
                 raise SimulationError(
-                    "a worker process was ended from outside, or ran out of memory"
+                    "a worker process was ended from outside, ran out of memory, or could not import the "
+                    'script, a file that calls this below `if __name__ == "__main__":`'
                 ) from error
             finally:
                 stop.set()
