@@ -11,7 +11,7 @@ from experiments.metrics.run_metrics import Comparison, judged_by, known_poses, 
 from experiments.report.curves import coded
 from experiments.report.style import law_colors, law_title
 
-TRUE_SAMPLES = 2500  # per law and axis at most
+LINE_SAMPLES = 2500  # per law and axis at most
 MEASURED_SAMPLES = 900
 PATH_SAMPLES = 700
 EVENTS_PER_LAW = 500
@@ -24,7 +24,7 @@ def plot_data(result: Mapping[str, Any], logs: Comparison) -> dict[str, Any]:
     ``result`` is the `metrics.summary` of ``logs``.
     """
     longest = max((cycles[0] for cycles in logs.values()), key=lambda log: log.path_end)
-    colors = law_colors(logs)
+    colors, source = law_colors(logs), judged_by(result)
     return {
         "marks": {name: getattr(longest, name) for name in ("path_start", "dwell_start", "path_end")},
         "laws": [
@@ -32,15 +32,15 @@ def plot_data(result: Mapping[str, Any], logs: Comparison) -> dict[str, Any]:
                 "id": law,
                 "title": law_title(law),
                 "color": colors[law],
-                "true": _error_traces(cycles[0], "true", TRUE_SAMPLES),
+                "line": _error_traces(cycles[0], source, LINE_SAMPLES),
                 "measured": _error_traces(cycles[0], "measured", MEASURED_SAMPLES),
                 "path": _path(cycles[0]),
-                "bars": _bars(result["runs"][law][judged_by(result)]),
+                "bars": _bars(result["runs"][law][source]),
                 "events": _events(cycles[0]),
             }
             for law, cycles in logs.items()
         ],
-        "axis_range": _axis_ranges(logs),
+        "axis_range": _axis_ranges(logs, source),
     }
 
 
@@ -88,10 +88,10 @@ def norm(values: list[float | None]) -> float | None:
     return math.hypot(*known) if len(known) == len(values) else None
 
 
-def _axis_ranges(logs: Comparison) -> dict[str, list[float]]:
+def _axis_ranges(logs: Comparison, source: str) -> dict[str, list[float]]:
     """Ranges that fit the laws on the path: the open loop would press them all flat."""
     laws = [law for law in logs if law != "open_loop"] or list(logs)
-    on_path = [pose_errors(logs[law][0], "true")[path_window(logs[law][0])] for law in laws]
+    on_path = [pose_errors(logs[law][0], source)[path_window(logs[law][0])] for law in laws]
     ranges = {}
     for name, columns, scale in (("mm", slice(3, 6), 1e3), ("deg", slice(0, 3), math.degrees(1.0))):
         largest = max((float(np.nanmax(np.abs(e[:, columns]), initial=0.0)) for e in on_path), default=0.0)

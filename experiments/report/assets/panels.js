@@ -43,7 +43,7 @@ function drawPanel(panel) {
     const n = i ? i + 1 : "";
     extra["xaxis" + n] = axis({type: axes.x_log ? "log" : "linear", domain: cells[i].x, anchor: "y" + n,
       title: cells[i].isLowest || axes.x !== panel.axes[panel.axes.length - 1].x ? titled(axes.x) : undefined,
-      range: axes.over_time ? [data.laws[0].true.t[0], data.marks.path_end] : undefined, exponentformat: "none",
+      range: axes.over_time ? [data.laws[0].line.t[0], data.marks.path_end] : undefined, exponentformat: "none",
       dtick: axes.x_log ? 1 : undefined, nticks: axes.x_log ? undefined : 7});
     extra["yaxis" + n] = axis({type: axes.y_log ? "log" : "linear", domain: cells[i].y, anchor: "x" + n,
       title: titled(axes.y), exponentformat: "none", range: axes.fits_path ? rangeOnPath(panel, i) : undefined, dtick: axes.y_log ? 1 : undefined,

@@ -1,6 +1,6 @@
 "use strict";
 const data = JSON.parse(document.getElementById("data").textContent);
-for (const law of data.laws) for (const traces of [law.true, law.measured]) {
+for (const law of data.laws) for (const traces of [law.line, law.measured]) {
   for (const name of ["t", "norm_mm", "angle_deg"]) traces[name] = decoded(traces[name]);
   for (const name of ["mm", "deg"]) traces[name] = traces[name].map(decoded);
 }
@@ -53,7 +53,7 @@ function stacked(id, rows, log) {
   const gap = 0.055, height = (1 - gap * (rows.length - 1)) / rows.length;
   const extra = {shapes: marks(), annotations: markLabels(), margin: {l: 58, r: 14, t: narrow() ? 26 : 50,
     b: 44},
-    hovermode: "x", xaxis: axis({title: titled("time in s"), range: [data.laws[0].true.t[0],
+    hovermode: "x", xaxis: axis({title: titled("time in s"), range: [data.laws[0].line.t[0],
       data.marks.path_end], anchor: "y" + (rows.length > 1 ? rows.length : "")})};
   rows.forEach((row, i) => {
     const name = i ? "y" + (i + 1) : "y", isFirst = i === 0, top = 1 - i * (height + gap);
@@ -62,11 +62,11 @@ function stacked(id, rows, log) {
       type: log ? "log" : "linear", range: row.range && row.range.slice(), exponentformat: "none",
       dtick: log ? 1 : undefined, nticks: 6});
     for (const law of data.laws) {
-      const noise = row.of(law.measured), truth = row.of(law.true);
+      const noise = row.of(law.measured), line = row.of(law.line);
       if (showMeasured && !log) traces.push({x: law.measured.t, y: noise, yaxis: name, type: "scatter",
         mode: "markers", showlegend: false,
         marker: {color: law.color, size: 2.5, opacity: 0.28}, hoverinfo: "skip", visible: shown(law)});
-      traces.push({x: law.true.t, y: truth, yaxis: name, type: "scatter", mode: "lines", name: law.title,
+      traces.push({x: law.line.t, y: line, yaxis: name, type: "scatter", mode: "lines", name: law.title,
         showlegend: isFirst,
         /* In a range that fits the laws the open loop only passes through: keep it in the background. */
         line: {color: law.color, width: !log && law.id === "open_loop" ? 0.8 : 1.7}, visible: shown(law),
@@ -139,7 +139,7 @@ function drawEvents() {
       line: {width: 2}},
     hovertemplate: "%{x:.3f} s<br>%{customdata}<extra>" + law.title + "</extra>"}));
   show("events", traces, layout({shapes: marks(), margin: {l: 10, r: 14, t: 10, b: 44},
-    xaxis: axis({title: titled("time in s"), range: [data.laws[0].true.t[0], data.marks.path_end]}),
+    xaxis: axis({title: titled("time in s"), range: [data.laws[0].line.t[0], data.marks.path_end]}),
     yaxis: axis({type: "category", tickfont: {color: css("--ink"), size: 12}})}), bare);
 }
 

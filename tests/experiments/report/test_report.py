@@ -14,6 +14,7 @@ from rich.console import Console
 from experiments.cli.tables import print_summary
 from experiments.metrics.run_metrics import summary, timing
 from experiments.replay.replay import write_replay
+from experiments.report.data import plot_data
 from experiments.report.report import verdict, write_report
 from experiments.report.style import law_colors, law_title
 from robots.description.model import load_robot
@@ -184,6 +185,23 @@ def test_an_initial_error_that_settles_has_a_section(tmp_path):
     html = (tmp_path / "report.html").read_text()
     # log(20) / 10 = 0.2996 s, found at the next sample of 10 ms.
     assert re.search(r"Initial error.*?PBVS</td><td>0\.300</td><td>0\.000</td>", html, re.DOTALL)
+
+
+def test_where_nobody_knows_the_truth_the_lines_are_what_the_camera_says(logs):
+    seen = {
+        law: [
+            dataclasses.replace(
+                cycle, X_WE_true=np.full_like(cycle.X_WE_true, np.nan), X_WE_measured=cycle.X_WE_true
+            )
+            for cycle in cycles
+        ]
+        for law, cycles in logs.items()
+    }
+    known, unknown = (plot_data(summary("misaligned", each), each) for each in (logs, seen))
+    assert unknown["axis_range"] == known["axis_range"]
+    for law, other in zip(unknown["laws"], known["laws"], strict=True):
+        assert len(law["line"]["t"]["d"]) > 100
+        assert law["line"] == other["line"]
 
 
 def test_a_replay_of_a_law_that_did_not_run_is_refused(logs, tmp_path):
