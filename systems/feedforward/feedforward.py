@@ -88,8 +88,8 @@ class Feedforward(LeafSystem):
             extra_memory: numbers that the model remembers beside its class's ``memory_size``.
 
         Raises:
-            ValueError: if an error makes a stiffness or a mass vanish, the prefilter's order is too low, or the
-                class has no `drive_under`.
+            ValueError: if an error makes a stiffness or a mass vanish, the prefilter's order is too low, or
+                the class has no `drive_under`.
         """
         super().__init__()
         own, base = type(self), Feedforward
