@@ -62,7 +62,7 @@ def import_command(
         typer.Option(
             metavar="KG",
             min=0.0,
-            help="Of the whole robot, where links do not say theirs or all say the same; from its data sheet.",
+            help="Of the whole robot, from its data sheet, where links do not say theirs or all the same.",
         ),
     ] = None,
     payload: Annotated[

@@ -12,9 +12,9 @@ from robots.description.model import RobotModel
 from robots.kinematics.error_kinematics import ErrorKinematics
 
 _CONFIGURATIONS = 200  # random ones; 24 would do for 48 columns, the rest makes the gap wide
-# What a column adds to those before it, as a share of its length, if it is independent of them. Less than that
-# is added where axes miss each other by 0.1 mm, as in files made from drawings: it lies on columns that follow,
-# or no measurement shows it, and of an error of 6 mm less than a micrometre is lost.
+# What a column adds to those before it, as a share of its length, if it is independent of them. Less than
+# that is added where axes miss each other by 0.1 mm, as in files made from drawings: it lies on columns that
+# follow, or no measurement shows it, and of an error of 6 mm less than a micrometre is lost.
 _INDEPENDENT = 1e-4
 _NEGLIGIBLE = 1e-9  # a coefficient below this is rounding
 

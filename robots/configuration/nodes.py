@@ -48,8 +48,8 @@ class Node:
         return node
 
     def check_count(self, key: str, count: int) -> None:
-        """Raises ConfigurationError if there is a list of another length under a key."""
-        entries = self.at([key])
+        """Raises ConfigurationError if under a key there is nothing, or a list of another length."""
+        entries = self.value.get(key, Node([], self.place)) if isinstance(self.value, dict) else self
         if isinstance(entries.value, list) and len(entries.value) != count:
             raise entries.refuse(
                 f"{key} must have {count} entries, got {len(entries.value)}; {{}} stands for one that is as "

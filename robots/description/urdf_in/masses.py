@@ -99,8 +99,8 @@ def correct_inertias(text: UrdfText) -> dict[str, str]:
 def _flat(moments: np.ndarray) -> np.ndarray:
     """Of principal moments in rising order, the largest too large: those of the mass with no thickness.
 
-    I = (yy + zz, xx + zz, xx + yy) with the second moments of mass xx, yy and zz. That along the third axis is
-    negative: it is zero instead, and the largest moment stays.
+    I = (yy + zz, xx + zz, xx + yy) with the second moments of mass xx, yy and zz. That along the third axis
+    is negative: it is zero instead, and the largest moment stays.
     """
     return moments + 0.5 * (moments[2] - moments[0] - moments[1]) * np.array([1.0, 1.0, 0.0])
 

@@ -86,7 +86,7 @@ REFUSED = {
     "compare --cycles 0": "--cycles must be at least 1, got 0",
     "compare --jobs 0": "--jobs must be at least 1, got 0",
     "compare --write robot.yaml --laws pbvs": "--write: needs one law that calibrates the robot, such as",
-    "compare --robot robot.yaml": "robot file robot.yaml, line 1: needs 6 joints, got 0",
+    "compare --robot robot.yaml": "robot file robot.yaml, line 1: joints must have 6 entries, got 0",
     "compare --robot typo-robot.yaml": "robot file typo-robot.yaml, line 2: unknown key 'joint'",
     "compare --robot mesh-robot.yaml": "robot file mesh-robot.yaml, line 2: base_link: no mesh ",
     "compare --robot arm.urdf": "robot file arm.urdf: no readable URDF: no element found: line 1, column",

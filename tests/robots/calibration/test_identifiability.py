@@ -56,7 +56,7 @@ def test_an_elbow_somewhat_beside_its_arm_has_the_same_parameters():
     """A hundredth of one here: an error across the arm is then one along it, too, and must not be lost."""
     robot = plain()
     placement = robot.joints[2].placement
-    robot.joints[2].placement = replace(placement, translation=placement.translation + [1e-5, 0.0, 0.0])
+    robot.joints[2].placement = replace(placement, translation=placement.translation + np.array([1e-5, 0, 0]))
     found = identifiable_parameters(robot)
     assert [found.names[i] for i in found.independent] == WITH_POSE
     assert found.explain()["pl_23x"]["pl_23z"] == pytest.approx(1e-5 / 0.35, rel=0.01)

@@ -111,7 +111,7 @@ def test_a_file_that_extends_another_says_only_what_is_different(tmp_path: Path)
     np.testing.assert_array_equal(robot.gear_ratio, base.gear_ratio)
     assert robot.name == "mine"
     (tmp_path / "two.yaml").write_text("extends: base.yaml\njoints:\n- drive_train: {damping: 1}\n- {}\n")
-    with pytest.raises(RobotFileError, match=r"two.yaml, line 3: needs 6 joints, got 2"):
+    with pytest.raises(RobotFileError, match=r"two.yaml, line 3: joints must have 6 entries, got 2"):
         load_robot(str(tmp_path / "two.yaml"))
     (tmp_path / "base.yaml").write_text("extends: mine.yaml\n")
     with pytest.raises(RobotFileError, match="circle"):
