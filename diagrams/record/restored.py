@@ -11,6 +11,7 @@ from diagrams.record.topics import (
     DESIRED,
     EVENT,
     JOINTS,
+    PATH_TIME,
     POSE,
     TRUE_LINKS,
     TRUE_POSE,
@@ -76,7 +77,16 @@ def restored(contents: Contents, name: str) -> RunLog:
         dwell_start=float(run["dwell_start"]),
         path_end=float(run["path_end"]),
         lap_starts=tuple(run.get("lap_starts", ())),
+        path_time=_path_time(time, topics.get(PATH_TIME)),
     )
+
+
+def _path_time(time: np.ndarray, topic: Topic | None) -> np.ndarray | None:
+    """Where the path was at times of the log, (n,) in s; None where it was run as planned."""
+    if topic is None:
+        return None
+    on_path = np.interp(time, topic.time, topic.columns["time"][:, 0])
+    return on_path if np.abs(on_path - time).max(initial=0.0) > _SAME else None
 
 
 def _poses(topic: Topic) -> np.ndarray:

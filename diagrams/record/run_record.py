@@ -17,6 +17,7 @@ from diagrams.record.topics import (
     DESIRED,
     EVENT,
     JOINTS,
+    PATH_TIME,
     POSE,
     SCHEMAS,
     TRUE_LINKS,
@@ -116,6 +117,7 @@ def write_tick(
     command: tuple[np.ndarray, np.ndarray],
     correction: np.ndarray,
     X_WE_desired: np.ndarray,
+    path_time: float | None = None,
 ) -> None:
     """Logs what there is at every tick.
 
@@ -127,6 +129,7 @@ def write_tick(
         command: position (6,) rad and velocity (6,) rad/s.
         correction: (6,) rad and m.
         X_WE_desired: (4, 4).
+        path_time: s on the path where it is slowed; None where it is run as planned.
     """
     names = (JOINTS, ("position", "effort"), joints), (COMMAND, ("position", "velocity"), command)
     for topic, fields, values in names:
@@ -137,6 +140,8 @@ def write_tick(
     turn, shift = _numbers(correction[:3]), _numbers(correction[3:])
     record.write(CORRECTION, at, {"rotation": turn, "translation": shift})
     record.write(DESIRED, at, pose_message(X_WE_desired, at))
+    if path_time is not None:
+        record.write(PATH_TIME, at, {"time": path_time})
 
 
 def write_event(record: RunRecord, event: GuardEvent) -> None:
@@ -166,6 +171,7 @@ def write_log(path: str | Path, scenario: str, log: RunLog, ended: str = "path")
             (log.position_command[n], log.velocity_command[n]),
             log.correction[n],
             log.X_WE_desired[n],
+            None if log.path_time is None else float(log.path_time[n]),
         )
         # The measured pose stands in the log where it was exposed.
         if np.isfinite(log.X_WE_measured[n]).all():

@@ -10,7 +10,7 @@ import numpy as np
 from pydrake.math import RigidTransform, RotationMatrix
 
 JOINTS, POSE, DESIRED = "/joint_sample", "/pose_sample", "/desired_pose"
-COMMAND, CORRECTION, EVENT = "/command", "/correction", "/guard_event"
+COMMAND, CORRECTION, EVENT, PATH_TIME = "/command", "/correction", "/guard_event", "/path_time"
 TRUE_POSE, TRUE_LINKS = "/truth/tip_pose", "/truth/link_position"
 # Of recordings for `truetip identify`
 MOTION, INERTIAL, TOLD = "/motion", "/inertial_sample", "/drive_command"
@@ -44,6 +44,7 @@ SCHEMAS: dict[str, dict[str, Any]] = {
     DESIRED: _POSE_IN_FRAME,
     COMMAND: _record("truetip.JointCommand", position=_SIX, velocity=_SIX),
     CORRECTION: _record("truetip.Correction", rotation=_THREE, translation=_THREE),
+    PATH_TIME: _record("truetip.PathTime", time=_NUMBER),  # s on a path that is slowed
     EVENT: _record("truetip.GuardEvent", kind=_TEXT, detail=_TEXT),
     TRUE_POSE: _POSE_IN_FRAME,
     TRUE_LINKS: _record("truetip.LinkPosition", position=_SIX),

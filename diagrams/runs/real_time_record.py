@@ -62,7 +62,9 @@ def write_run_tick(
     context = servo.GetMyContextFromRoot(root_context)
     correction = servo.GetOutputPort("correction").Eval(context)
     X_WE_desired = servo.GetOutputPort("X_WE_desired").Eval(context).GetAsMatrix4()
-    write_tick(stream, time, report.time, (report.position, effort), command, correction, X_WE_desired)
+    path_time = servo.path_time(root_context) if servo.reference.is_slowed else None
+    joints = report.position, effort
+    write_tick(stream, time, report.time, joints, command, correction, X_WE_desired, path_time)
     if new.valid:
         stream.write(POSE, time, pose_message(new.X_WE.GetAsMatrix4(), new.time))
 

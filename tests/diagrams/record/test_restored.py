@@ -36,6 +36,16 @@ def test_a_simulated_run_has_the_same_summary_again(log: RunLog, tmp_path: Path)
     np.testing.assert_array_equal(again.correction, log.correction)
 
 
+def test_where_the_path_was_slowed_it_is_known_where_it_was(log: RunLog, tmp_path: Path):
+    slowed = log.time - 0.3 * np.clip(log.time - 1.0, 0.0, 0.5)
+    write_log(tmp_path / "run.mcap", "", replace(log, path_time=slowed))
+    again = restored(read_record(tmp_path / "run.mcap"), "run.mcap")
+    assert again.path_time is not None
+    np.testing.assert_allclose(again.path_time, slowed, atol=2e-9)  # times are in nanoseconds
+    write_log(tmp_path / "run.mcap", "", log)
+    assert restored(read_record(tmp_path / "run.mcap"), "run.mcap").path_time is None
+
+
 def test_on_hardware_the_wanted_pose_is_that_of_the_exposure(log: RunLog, tmp_path: Path):
     """Exposures fall between ticks: the pose of the nearest tick would be off by half a period."""
     ticks = np.arange(0.0, 4.0, 0.004)
