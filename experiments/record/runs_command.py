@@ -23,6 +23,7 @@ from experiments.report.style import law_title
 
 _FIGURES = ("largest mm", "rms mm", "at rest mm", "largest °")
 _HEAD = ("folder", "scenario", "law", "judged by", *_FIGURES, "guard", "made")
+_NAMED = 3  # files that are left out, by name
 _PAGES = ("report.html", "replay.html")
 _NOTE = (
     "A line for each law of each comparison below the folder. Click on a head to sort; words in the field "
@@ -59,24 +60,33 @@ def runs_command(
 
 def _index(folder: Path, report: Path, page: Path, output: Any) -> str:
     """Writes the page of all runs below a folder; returns its sentence."""
+    others: list[Path] = []
     with progress_bar("reading") as progress:
-        found = list(runs_below(folder, progress))
+        found = list(runs_below(folder, others, progress))
     if not found:
-        raise ValueError(f"{folder}: there is no summary.json below it, which compare and run write")
+        foreign = f", {others[0]} is none of theirs" if others else ""
+        raise ValueError(f"{folder}: there is no summary.json below it, which compare and run write{foreign}")
     rows = [_row(run, folder, report.parent) for run in found]
     comparisons = count(len({run["folder"] for run in found}), "comparison")
     verdict = f"{count(len(found), 'law')} in {comparisons} below {folder.resolve()}."
+    if others:
+        verdict += f" Left out, as no comparison wrote it: {', '.join(map(str, others[:_NAMED]))}"
+        verdict += f" and {len(others) - _NAMED} more." if len(others) > _NAMED else "."
     table = sortable_table("runs", _HEAD, rows, has_filter=True)
     write_plot_page(page, "Runs", verdict, [Section("Runs", _NOTE, table)])
     output.write(found)
     return verdict
 
 
-def runs_below(folder: Path, progress: Any = None) -> Iterator[dict[str, Any]]:
+def runs_below(folder: Path, others: list[Path], progress: Any = None) -> Iterator[dict[str, Any]]:
     """Key figures of every law of every ``summary.json`` below a folder, the newest first.
 
+    Args:
+        folder: to look in.
+        others: takes the files of this name that are not what compare and run write.
+        progress: is called with the share that is done, 0 to 1.
+
     Raises:
-        ValueError: if a summary is not what compare and run write.
         OSError: if a file cannot be read.
     """
     files = sorted(folder.rglob("summary.json"), key=lambda file: (-file.stat().st_mtime, str(file)))
@@ -84,8 +94,8 @@ def runs_below(folder: Path, progress: Any = None) -> Iterator[dict[str, Any]]:
         try:
             result = json.loads(file.read_text(encoding="utf-8"))
             source = judged_by(result)
-            for law, run in result["runs"].items():
-                yield {
+            rows = [
+                {
                     "folder": str(file.parent),
                     "scenario": result["scenario"],
                     "law": law,
@@ -97,8 +107,12 @@ def runs_below(folder: Path, progress: Any = None) -> Iterator[dict[str, Any]]:
                     "guard": sum(run["guard"].values()),
                     "made": time.strftime("%Y-%m-%d %H:%M", time.localtime(file.stat().st_mtime)),
                 }
-        except (KeyError, TypeError, AttributeError, json.JSONDecodeError) as error:
-            raise ValueError(f"{file}: no summary of a comparison") from error
+                for law, run in result["runs"].items()
+            ]
+        except (KeyError, TypeError, AttributeError, ValueError):
+            others.append(file)
+        else:
+            yield from rows
         if progress:
             progress((number + 1) / len(files))
 

@@ -65,7 +65,7 @@ def test_an_index_has_a_line_for_each_law_with_its_figures(logs: dict[str, list[
         (tmp_path / name).mkdir(parents=True)
         write_json(tmp_path / name / "summary.json", summary(f"scenario {name}", logs))
         (tmp_path / name / "report.html").write_text("")
-    found = list(runs_below(tmp_path))
+    found = list(runs_below(tmp_path, []))
     assert len(found) == 4
     expected = summary("", logs)["runs"]["pbvs"]["true"]["max_norm_mm"]
     assert {each["max_norm_mm"] for each in found if each["law"] == "pbvs"} == {expected}
@@ -74,6 +74,16 @@ def test_an_index_has_a_line_for_each_law_with_its_figures(logs: dict[str, list[
     page = (tmp_path / "pages" / "runs.html").read_text()
     assert 'href="../b/c/report.html"' in page
     assert "4 laws in 2 comparisons" in page
+
+
+def test_a_summary_of_something_else_is_left_out_and_named(logs: dict[str, list[RunLog]], tmp_path: Path):
+    write_json(tmp_path / "summary.json", summary("it", logs))
+    for name, text in (("x", '{"runs": {"pbvs": {}}}'), ("y", "no JSON")):
+        (tmp_path / name).mkdir()
+        (tmp_path / name / "summary.json").write_text(text)
+    result = truetip("runs", tmp_path, "--report", tmp_path / "runs.html")
+    assert "2 laws in 1 comparison" in result.output
+    assert {str(tmp_path / name / "summary.json") in result.output for name in "xy"} == {True}
 
 
 def test_words_in_the_filter_hide_the_other_lines(logs: dict[str, list[RunLog]], tmp_path: Path):
@@ -146,7 +156,7 @@ def test_a_folder_that_is_no_run_is_refused_beside_another(tmp_path: Path):
 
 
 @pytest.mark.parametrize(
-    ("text", "reason"), [("{}", "no summary of a comparison"), (None, "no summary.json")]
+    ("text", "reason"), [("{}", "summary.json is none of theirs"), (None, "there is no summary.json")]
 )
 def test_a_folder_without_runs_is_refused(text: str | None, reason: str, tmp_path: Path):
     if text is not None:
