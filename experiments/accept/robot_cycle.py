@@ -122,7 +122,7 @@ def visits(log: RunLog, scenario: Scenario, cycle: Cycle, cycles: int) -> Visits
 
 
 def pose_results(found: Visits, cycle: Cycle) -> dict[str, float | None]:
-    """AP, RP, vAP, distances, drift, stabilisation and overshoot, in mm, degrees and s.
+    """AP, RP, vAP, distances, drift, stabilisation and overshoot, in mm, degrees and s; None for none.
 
     Accuracy, repeatability and drift are those of visits from one side, each pose from the one before it, as
     the standard has them (ISO 9283:1998, 7.2): what another side changes is vAP.
@@ -139,6 +139,7 @@ def pose_results(found: Visits, cycle: Cycle) -> dict[str, float | None]:
     lengths = np.linalg.norm(found.of_pair(1, 0)[::2] - second, axis=1)
     wanted = float(np.linalg.norm(cycle.poses[1, :3, 3] - cycle.poses[3, :3, 3]))
     quarter = max(1, len(attained[0]) // 4)
+    stable = float(found.stable.max())
     drift = attained[0][-quarter:].mean(axis=0) - attained[0][:quarter].mean(axis=0)
     return {
         "AP_mm": 1e3 * max(accuracy),
@@ -148,7 +149,7 @@ def pose_results(found: Visits, cycle: Cycle) -> dict[str, float | None]:
         "AD_mm": 1e3 * float(lengths.mean() - wanted),
         "RD_mm": 1e3 * 3.0 * float(lengths.std(ddof=1)) if count > 1 else None,
         "dAP_mm": 1e3 * float(np.linalg.norm(drift)),
-        "stabilisation_s": float(found.stable.max()),
+        "stabilisation_s": stable if np.isfinite(stable) else None,
         "overshoot_mm": 1e3 * float(found.overshoot.max()),
     }
 
@@ -207,9 +208,13 @@ def _on_path(log: RunLog) -> np.ndarray:
 
 
 def _settled(away: np.ndarray, since: np.ndarray, band: float) -> tuple[float, float]:
-    """When a tip stays within a band, in s from the end of the command, and how far it was then."""
+    """When a tip stays within a band, in s from the end of the command, and how far it was then.
+
+    Infinite where it is still outside when the next motion begins.
+    """
     outside = np.flatnonzero(away > band)
-    seconds = float(since[min(outside[-1] + 1, len(since) - 1)]) if len(outside) else 0.0
+    last = int(outside[-1]) + 1 if len(outside) else 0
+    seconds = (float(since[last]) if last < len(since) else np.inf) if last else 0.0
     inside = np.flatnonzero(away <= band)
     return seconds, float(away[inside[0] :].max()) if len(inside) else float(away.max())
 

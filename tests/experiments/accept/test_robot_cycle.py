@@ -115,6 +115,12 @@ def test_a_tip_that_rings_out_needs_the_time_until_its_amplitude_is_that_of_the_
     assert 0.1 < overshoot < 1.0
 
 
+def test_a_tip_that_never_stays_within_the_band_has_no_stabilisation_time():
+    scenario = pose_scenario(BASE, CYCLE, CYCLES, 1.0)
+    found = poses_of(scenario, lambda t: np.outer(2e-4 * np.sin(2e3 * t), [0.0, 0.0, 1.0]))
+    assert found["stabilisation_s"] is None
+
+
 def test_a_tip_that_is_late_is_on_the_path_and_one_beside_it_is_not():
     scenario = path_scenario(BASE, CYCLE, CYCLES, 1.0)
     path = make_path(scenario.reference)
