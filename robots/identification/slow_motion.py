@@ -23,6 +23,7 @@ TURNED_ROUND = 0.05  # s after a reversal in which friction and gears are not se
 _KNOTS = 12  # of the curve of a joint's friction
 _ROUNDS = 4  # the inertia of the load depends on what is found of it
 _RANK = 1e-8  # of the largest singular value
+_NO_LOAD = 3.0  # standard deviations of a mass that may be none
 
 
 @dataclass(frozen=True)
@@ -89,7 +90,7 @@ def identify_slow_motion(robot: RobotModel, payload: float, motion: SlowMotion) 
         )
     knots = [_knots(np.abs(motion.rate[moving[:, joint], joint])) for joint in range(NUM_JOINTS)]
     friction = _friction_columns(motion.rate, knots)
-    believed, mass, sigma, of_load = robot, payload, np.zeros(0), 0
+    believed, mass, asked, sigma, of_load = robot, payload, payload, np.zeros(0), 0
     for _ in range(_ROUNDS):
         known, load = _torques(believed, mass, motion), load_columns(believed, mass, motion.theta)
         Y = np.concatenate([load, friction], axis=2)[moving]
@@ -103,10 +104,18 @@ def identify_slow_motion(robot: RobotModel, payload: float, motion: SlowMotion) 
         found[used] = np.linalg.lstsq(Y[:, used], wanted, rcond=None)[0]
         left = wanted - Y @ found
         of_load = load.shape[2]
-        mass, believed = _updated(believed, mass, found[:of_load])
         variance = float(left @ left) / max(len(left) - int(used.sum()), 1)
         sigma = np.zeros(len(used))
         sigma[used] = np.sqrt(variance * np.diagonal(np.linalg.inv(Y[:, used].T @ Y[:, used])))
+        asked = mass + float(found[0])
+        mass, believed = _updated(believed, mass, found[:of_load])
+    if abs(asked - mass) > _NO_LOAD * sigma[0]:
+        raise ValueError(
+            f"slow motion: it asks for a payload of {asked:.1f} kg; {robot.name} carries up to "
+            f"{robot.payload.largest_mass:g} kg"
+        )
+    if mass <= _NO_LOAD * sigma[0]:
+        mass, believed = 0.0, replace(believed, payload=robot.payload)
     lost = motion.torque - _torques(believed, mass, motion)
     frictions = [
         fit_frictions(motion.rate[rows, joint], lost[rows, joint]) if len(knots[joint]) else []
@@ -209,13 +218,11 @@ def _spring_columns(robot: RobotModel, q: np.ndarray) -> np.ndarray:
 
 
 def _updated(robot: RobotModel, payload: float, change: np.ndarray) -> tuple[float, RobotModel]:
-    mass = payload + float(change[0])
-    if not 0.0 < mass <= robot.payload.largest_mass:
-        raise ValueError(
-            f"slow motion: it asks for a payload of {mass:.1f} kg; {robot.name} carries up to "
-            f"{robot.payload.largest_mass:g} kg"
-        )
-    centre = (payload * robot.payload.center_of_mass + change[1:4]) / mass
+    """Mass and robot with what was found; a mass that no load has is none, or the largest, until the end."""
+    mass = min(max(payload + float(change[0]), 0.0), robot.payload.largest_mass)
+    centre = robot.payload.center_of_mass
+    if mass > 0.0:
+        centre = (payload * centre + change[1:4]) / mass
     spring = robot.counterbalance
     if spring is not None:
         spring = replace(

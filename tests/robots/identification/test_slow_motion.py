@@ -37,7 +37,7 @@ def motion(robot: RobotModel) -> SlowMotion:
     return slow_motion(robot)
 
 
-def slow_motion(robot: RobotModel) -> SlowMotion:
+def slow_motion(robot: RobotModel, load: float = TRUE_LOAD) -> SlowMotion:
     """Sines of different periods, and a rest in which the motors hold any torque."""
     t = PERIOD * np.arange(1500)
     middle = np.deg2rad([0.0, -70.0, 30.0, 20.0, 40.0, 0.0])
@@ -52,7 +52,7 @@ def slow_motion(robot: RobotModel) -> SlowMotion:
         payload=replace(robot.payload, center_of_mass=CENTRE),
         counterbalance=replace(spring, stiffness=STIFFNESS, preload=PRELOAD),
     )
-    torque = needed(true, theta, rate, acceleration)
+    torque = needed(true, theta, rate, acceleration, load)
     torque += np.stack([f.part().torque(v) for f, v in zip(FRICTIONS, rate.T, strict=True)], axis=1)
     torque += NOISE * np.random.default_rng(4).normal(size=torque.shape)
     resting = slice(700, 760)
@@ -61,10 +61,12 @@ def slow_motion(robot: RobotModel) -> SlowMotion:
     return SlowMotion(PERIOD, theta, rate, acceleration, torque)
 
 
-def needed(robot: RobotModel, theta: np.ndarray, rate: np.ndarray, acceleration: np.ndarray) -> np.ndarray:
+def needed(
+    robot: RobotModel, theta: np.ndarray, rate: np.ndarray, acceleration: np.ndarray, load: float
+) -> np.ndarray:
     """Torques of the rigid robot without friction, with its rotors."""
     plant = MultibodyPlant(0.0)
-    parts = add_robot(plant, robot, "rigid", TRUE_LOAD)
+    parts = add_robot(plant, robot, "rigid", load)
     plant.Finalize()
     context = plant.CreateDefaultContext()
     found = np.empty_like(theta)
@@ -83,6 +85,21 @@ def test_payload_and_counterbalance_are_found_to_a_hundredth(robot: RobotModel, 
     assert found.spring_preload == pytest.approx(PRELOAD, rel=0.01)
     assert abs(found.payload - TRUE_LOAD) < 4.0 * found.sigma[0]
     assert not found.moving[700:760].any()
+
+
+def test_a_flange_without_load_is_one_though_noise_may_make_its_mass_negative(robot: RobotModel):
+    found = identify_slow_motion(robot, BELIEVED_LOAD, slow_motion(robot, 0.0))
+    assert found.payload == 0.0
+    np.testing.assert_array_equal(found.payload_centre, robot.payload.center_of_mass)
+    assert 0.0 < found.sigma[0] < 2.0
+
+
+def test_a_load_that_the_robot_cannot_carry_is_refused(robot: RobotModel, motion: SlowMotion):
+    weaker = replace(robot, payload=replace(robot.payload, largest_mass=100.0))
+    with pytest.raises(
+        ValueError, match=r"asks for a payload of 1[45]\d\.\d kg; KUKA .* carries up to 100 kg"
+    ):
+        identify_slow_motion(weaker, 90.0, motion)
 
 
 def test_friction_curves_are_found_to_three_hundredths_and_their_kinds_told_apart(
