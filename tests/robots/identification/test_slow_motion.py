@@ -62,7 +62,7 @@ def slow_motion(robot: RobotModel, load: float = TRUE_LOAD) -> SlowMotion:
 
 
 def needed(
-    robot: RobotModel, theta: np.ndarray, rate: np.ndarray, acceleration: np.ndarray, load: float
+    robot: RobotModel, theta: np.ndarray, rate: np.ndarray, acceleration: np.ndarray, load: float = TRUE_LOAD
 ) -> np.ndarray:
     """Torques of the rigid robot without friction, with its rotors."""
     plant = MultibodyPlant(0.0)
