@@ -98,6 +98,11 @@ SECTIONS: dict[str, tuple[Row, ...]] = {
             "--cases mixed --paths circle --seeds 60 --first-seed 100",
             "ten robots, and of all that may differ a mixture that the seed draws",
         ),
+        Row(
+            "mixed-unseen",
+            "--cases mixed --paths circle --seeds 40 --first-seed 400",
+            "mixtures on which nothing was tuned",
+        ),
     ),
     "robots": tuple(
         Row(name, f"--robot {name} --seeds 4 --first-seed 3000", what)
