@@ -150,7 +150,7 @@ class _Arm:
     def share(self, mass: float) -> dict[int, str]:
         """Writes masses into the text for links that have none, and says where they are from.
 
-        Where all links have the same, as files do that were made for planning, it is that of none.
+        The same mass of all links, as in files that were made for planning, counts for none.
 
         Args:
             mass: of the whole robot in kg.
@@ -321,10 +321,7 @@ def _for_drake(text: UrdfText, chain: Chain) -> str:
                 element.set("type", "fixed")
             limit = element.find("limit")
             if tag == "joint" and limit is not None and {"lower", "upper"} & set(limit.attrib):
-                for end in (
-                    "lower",
-                    "upper",
-                ):  # the one that is left out is zero; Drake takes it for infinite
+                for end in ("lower", "upper"):  # zero is what is left out; Drake takes it for infinite
                     limit.set(end, limit.get(end, "0"))
     return ElementTree.tostring(root, encoding="unicode")
 
