@@ -11,7 +11,7 @@ from rich.markup import escape
 
 from experiments.cli.console import print_files, refusing
 from experiments.cli.json_output import human_console, json_output
-from experiments.cli.option_limits import at_least, positive, without_effect
+from experiments.cli.option_limits import at_least, positive, refuse_given
 from experiments.cli.options import JsonOption, PictureOption
 from experiments.cli.staging import PAGE, staged_file
 from experiments.report.plot_page import Section, html_table, write_plot_page
@@ -32,7 +32,7 @@ _NAMES = {
     "passed": "passed",
 }
 LINES, LEAST_LENGTHS = 7, 5
-_CELL, _EDGE, _NOISE = "probst", 1000.0, 0.1  # of a simulation: cameras, mm of the cube, px
+_OF_SIMULATION = "cell", "calibration", "cube_mm", "pixel_sigma", "count", "seed"  # options
 _IN_METRES = 20.0  # mm; no bar is shorter, but one of 20 m in metres
 _PROBED = 25  # times that one ball is measured for the probing error
 # Directions of the lines in a box: its space diagonals, and three parallel to its edges.
@@ -42,6 +42,7 @@ _DIRECTIONS = np.array(
 
 
 def accept_cameras_command(
+    context: typer.Context,
     lengths: Annotated[
         str | None,
         typer.Option(
@@ -49,33 +50,21 @@ def accept_cameras_command(
         ),
     ] = None,
     cell: Annotated[
-        str | None,
-        typer.Option(metavar="NAME|FILE", help="The true cameras of a simulation.", show_default=_CELL),
-    ] = None,
+        str, typer.Option(metavar="NAME|FILE", help="The true cameras of a simulation.")
+    ] = "probst",
     calibration: Annotated[
         str | None,
         typer.Option(metavar="FILE.yaml", help="What is believed of the cameras.", show_default="the truth"),
     ] = None,
     limit: Annotated[float, typer.Option(metavar="MM", help="Largest permissible error of a length.")] = 0.2,
     cube_mm: Annotated[
-        float | None,
-        typer.Option(
-            "--cube", metavar="MM", help="Edge of the cube that is tested.", show_default=f"{_EDGE}"
-        ),
-    ] = None,
+        float, typer.Option("--cube", metavar="MM", help="Edge of the cube that is tested.")
+    ] = 1000.0,
     pixel_sigma: Annotated[
-        float | None,
-        typer.Option(
-            "--pixel-sigma", metavar="PX", help="Noise of an image coordinate.", show_default=f"{_NOISE}"
-        ),
-    ] = None,
-    count: Annotated[
-        int | None,
-        typer.Option(metavar="N", help="Lengths on each line.", show_default=f"{LEAST_LENGTHS}"),
-    ] = None,
-    seed: Annotated[
-        int | None, typer.Option(metavar="N", help="Seed of the noise.", show_default="0")
-    ] = None,
+        float, typer.Option("--pixel-sigma", metavar="PX", help="Noise of an image coordinate.")
+    ] = 0.1,
+    count: Annotated[int, typer.Option(metavar="N", help="Lengths on each line.")] = LEAST_LENGTHS,
+    seed: Annotated[int, typer.Option(metavar="N", help="Seed of the noise.")] = 0,
     out: PictureOption = Path("out/accept-cameras.html"),
     json_file: JsonOption = None,
 ) -> None:
@@ -88,25 +77,9 @@ def accept_cameras_command(
             positive(name, value)
         probing = None
         if lengths is None:
-            truth = cell or _CELL
-            table, probing = simulated(
-                truth,
-                calibration or truth,
-                1e-3 * (cube_mm or _EDGE),
-                pixel_sigma or _NOISE,
-                count or LEAST_LENGTHS,
-                seed or 0,
-            )
+            table, probing = simulated(cell, calibration or cell, 1e-3 * cube_mm, pixel_sigma, count, seed)
         else:
-            for name, value in (
-                ("--cell", cell),
-                ("--calibration", calibration),
-                ("--cube", cube_mm),
-                ("--pixel-sigma", pixel_sigma),
-                ("--count", count),
-                ("--seed", seed),
-            ):
-                without_effect(name, value, "--lengths: nothing is simulated")
+            refuse_given(context, _OF_SIMULATION, "with --lengths: nothing is simulated")
             table = read_lengths(lengths)
         numbers = judged(table, probing, limit)
         page = stack.enter_context(staged_file(out, *PAGE))

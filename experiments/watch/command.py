@@ -12,7 +12,7 @@ from diagrams.scenario.scenario import load_scenario
 from diagrams.scenario.scenario_file import OptionSetting
 from experiments.cli.console import BROKEN_OFF, fail, print_files, progress_bar, refusing
 from experiments.cli.json_output import human_console, json_output
-from experiments.cli.option_limits import at_least, not_negative, positive, without_effect
+from experiments.cli.option_limits import at_least, not_negative, positive, refuse_given
 from experiments.cli.options import JsonOption, PictureOption, RobotOption, SetOption, WithCellOption
 from experiments.cli.prepare import prepare
 from experiments.cli.staging import PAGE, staged_file
@@ -26,11 +26,11 @@ from systems.link.udp_channel import ChannelError
 from systems.vision.people.person_networks import PersonNetwork
 from systems.vision.people.surroundings import load_surroundings
 
-_EMPTY, _PLACES, _MINUTES, _EVERY = 10, 30, 10.0, 2.0  # of the options
 _CELLS = {"egm": "cell-watched", "rsi": "cell-kuka-watched"}  # the shipped scenario of each link
 
 
 def watch_command(
+    context: typer.Context,
     scenario: Annotated[
         str | None,
         typer.Option(
@@ -51,36 +51,18 @@ def watch_command(
         ),
     ] = None,
     empty: Annotated[
-        int | None,
-        typer.Option(
-            metavar="N",
-            help="How many of the first recorded sets show the empty cell.",
-            show_default=f"{_EMPTY}",
-        ),
-    ] = None,
+        int, typer.Option(metavar="N", help="How many of the first recorded sets show the empty cell.")
+    ] = 10,
     study: Annotated[
         bool, typer.Option("--study", help="How well people are seen at random places, and false stops.")
     ] = False,
-    places: Annotated[
-        int | None,
-        typer.Option(metavar="N", help="Number of places in a study.", show_default=f"{_PLACES}"),
-    ] = None,
+    places: Annotated[int, typer.Option(metavar="N", help="Number of places in a study.")] = 30,
     minutes: Annotated[
-        float | None,
-        typer.Option(
-            metavar="MIN",
-            help="Minutes of the empty cell in a study; 0 for none.",
-            show_default=f"{_MINUTES}",
-        ),
-    ] = None,
+        float, typer.Option(metavar="MIN", help="Minutes of the empty cell in a study; 0 for none.")
+    ] = 10.0,
     every: Annotated[
-        float | None,
-        typer.Option(
-            metavar="S",
-            help="Time between two sets of images of the empty cell in a study.",
-            show_default=f"{_EVERY}",
-        ),
-    ] = None,
+        float, typer.Option(metavar="S", help="Time between two sets of images of the empty cell in a study.")
+    ] = 2.0,
     network: Annotated[
         str | None,
         typer.Option(
@@ -116,15 +98,13 @@ def watch_command(
         at_least("--empty", 1, empty)
         positive("--every", every)
         positive("--duration", duration)
-        if minutes is not None:
-            not_negative("--minutes", minutes)
+        not_negative("--minutes", minutes)
         if study and images:
             raise ValueError("--study draws its own images; leave out --images")
         if study and network:
             raise ValueError("--study is of the hull alone; leave out --network")
         if not study:
-            for name, value in (("--places", places), ("--minutes", minutes), ("--every", every)):
-                without_effect(name, value, "images that are watched: it is of --study")
+            refuse_given(context, ("places", "minutes", "every"), "without --study")
         people = PersonNetwork(network) if network else None
         if (station or with_cell) and (study or images):
             raise ValueError("--station and --with-cell watch a running cell; leave out --study and --images")
@@ -133,29 +113,29 @@ def watch_command(
         if duration is not None and not is_live:
             raise ValueError("--duration is of a running cell: add --station egm, or --with-cell")
         if not is_live and not images:
-            without_effect("--empty", empty, "simulated images: it is of --images and of a running cell")
-        first_sets = _EMPTY if empty is None else empty
+            refuse_given(
+                context, ("empty",), "with simulated images: it is of --images and of a running cell"
+            )
         chosen, ground = prepared.scenario, load_surroundings(prepared.scenario.station.overview.surroundings)
         page = stack.enter_context(staged_file(out, *PAGE))
         stack.enter_context(output.staged())
         title = f"Watch, {prepared.title}"
         problem = ""
         if study:
-            number, span = places or _PLACES, _MINUTES if minutes is None else minutes
-            with progress_bar(f"{number} places, {span:g} minutes of the empty cell") as progress:
-                found = study_watch(chosen, prepared.robot, number, span, every or _EVERY, progress)
+            with progress_bar(f"{places} places, {minutes:g} minutes of the empty cell") as progress:
+                found = study_watch(chosen, prepared.robot, places, minutes, every, progress)
             verdict = study_verdict(found)
             write_study_page(page, title, found)
             output.write(found.as_dict())
         else:
             if is_live:
-                run, problem = watch_station(human, prepared, with_cell, first_sets, duration)
+                run, problem = watch_station(human, prepared, with_cell, empty, duration)
             else:
                 with progress_bar(
                     "recorded images" if images else "images are drawn and searched"
                 ) as progress:
                     run = (
-                        watch_recorded(chosen, prepared.robot, images, first_sets, progress)
+                        watch_recorded(chosen, prepared.robot, images, empty, progress)
                         if images
                         else watch_simulated(chosen, prepared.robot, chosen.law, progress)
                     )

@@ -124,7 +124,7 @@ def test_what_is_wrong_with_a_recording_is_said_in_one_line(recording: Path, tmp
         (["--images", "none"], "--images none: must be a folder with joints.csv"),
         (["--study", "--minutes", "-1"], "--minutes must be zero or positive, got -1"),
         (["--study", "--minutes", "nan"], "--minutes must be zero or positive, got nan"),
-        (["--places", "3"], "--places has no effect with images that are watched: it is of --study"),
+        (["--places", "3"], "--places has no effect without --study"),
         (["--empty", "3"], "--empty has no effect with simulated images"),
         (["--scenario", "nominal"], "takes images of the whole cell; use --scenario watched"),
     ],
