@@ -17,7 +17,8 @@ from experiments.cli.prepare import noted_robot
 from experiments.cli.staging import PAGE, TABLE, staged_file, staged_folder
 from experiments.plan.plots import TABLE_HEAD, table_rows, verdict, write_plan_page
 from experiments.plan.program_option import check_language, program_files
-from experiments.plan.study import OBJECTIVES, LegResult, Plan, joint_table, plan_json, study_plan
+from experiments.plan.results import joint_table, plan_json
+from experiments.plan.study import OBJECTIVES, LegResult, Plan, study_plan
 from experiments.report.files import write_text
 from robots.description.model import RobotModel, load_robot
 from robots.kinematics.forward import Kinematics

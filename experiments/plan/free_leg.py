@@ -10,7 +10,7 @@ from robots.description.model import RobotModel
 from robots.measurement_design.clear_ways import ClearWays
 from robots.measurement_design.constraints import AdmissibleConfig, AdmissibleConfigurations
 from robots.measurement_design.obstacles import Obstacle
-from robots.planning.free_motion import free_way
+from robots.planning.free_motion import free_motion
 from robots.planning.joint_path import Curve, PathError, straight_joint_path
 from robots.planning.limits import MotionLimits
 from robots.planning.optimum import optimum
@@ -52,10 +52,9 @@ def free_legs(
         PathError: if all ways are blocked, with the place, or the limits admit no motion.
     """
     start, goal = leg.path.at(np.array([0.0, 1.0]))
-    straight, bent = straight_joint_path(start, goal), free_way(robot, payload, start, goal, limits).path
+    straight, bent = straight_joint_path(start, goal), free_motion(robot, payload, start, goal, limits).way
     legs = [replace(leg, path=blended(straight, bent, share), is_straight=False) for share in _BENT]
-    config = AdmissibleConfig(obstacles=obstacles)
-    ways = ClearWays(robot, AdmissibleConfigurations(robot, config), config.clearance)
+    ways = _clear_ways(robot, obstacles)
     blocked = [_blocked(ways, each.path) for each in (*legs, leg)]
     clear = [each for each, place in zip((*legs, leg), blocked, strict=True) if place is None]
     if not clear:
@@ -66,6 +65,16 @@ def free_legs(
     durations = [_duration(robot, payload, each.path, limits, dynamics, sharpness) for each in clear]
     ranked = [clear[i] for i in np.argsort(durations) if durations[i] <= _AS_QUICK * min(durations)]
     return ranked[:_TRIED]
+
+
+def is_clear(robot: RobotModel, path: Curve, obstacles: tuple[Obstacle, ...] = ()) -> bool:
+    """Whether the arm touches neither itself, the floor nor an obstacle on a path."""
+    return _blocked(_clear_ways(robot, obstacles), path) is None
+
+
+def _clear_ways(robot: RobotModel, obstacles: tuple[Obstacle, ...]) -> ClearWays:
+    config = AdmissibleConfig(obstacles=obstacles)
+    return ClearWays(robot, AdmissibleConfigurations(robot, config), config.clearance)
 
 
 def blended(straight: Curve, bent: Curve, share: float) -> Curve:

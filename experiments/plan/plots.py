@@ -6,7 +6,8 @@ import numpy as np
 import plotly.graph_objects as go
 from plotly.subplots import make_subplots
 
-from experiments.plan.study import STILL, LegResult, Plan, plan_json
+from experiments.plan.results import plan_json
+from experiments.plan.study import STILL, LegResult, Plan
 from experiments.report.plot_page import Section, html_table, write_plot_page
 from robots.planning.limit_use import BINDING, Use
 
@@ -85,25 +86,22 @@ def binding_figure(plan: Plan, result: LegResult) -> go.Figure:
 
 
 def motion_figure(result: LegResult) -> go.Figure:
-    """Speed along the path and torques of gears, planned and usual."""
+    """Speed of the tool as planned and torques of gears, planned and usual."""
     figure = make_subplots(4, 1, shared_xaxes=True, vertical_spacing=0.05)
     for name, kept, colour in (
         ("planned", result.planned, _PLANNED),
         ("usual", result.baseline, _USUAL),
     ):
-        style, timing = {"color": colour}, kept.timing
-        times = np.linspace(0.0, timing.duration, 200)
-        rate = 100.0 * timing.rates(times)[1]
-        figure.add_trace(
-            go.Scatter(x=1e3 * times, y=rate, name=name, line=style, legendgroup=name), row=1, col=1
-        )
-        moving = kept.run.times <= timing.duration + 0.05
+        style = {"color": colour}
+        moving = kept.run.times <= kept.timing.duration + 0.05
+        of_tool = go.Scatter(x=1e3 * kept.run.times[moving], y=kept.run.demand.tool_speed[moving], line=style)
+        figure.add_trace(of_tool.update(name=name, legendgroup=name), row=1, col=1)
         for joint in range(3):
             torque = kept.run.demand.gear_torque[moving, joint]
             trace = go.Scatter(x=1e3 * kept.run.times[moving], y=torque, line=style, legendgroup=name)
             figure.add_trace(trace.update(showlegend=False, name=name), row=joint + 2, col=1)
             figure.update_yaxes(title=f"gear {joint + 1} in N m", row=joint + 2, col=1)
-    figure.update_yaxes(title="path in %/s", row=1, col=1)
+    figure.update_yaxes(title="tool in m/s", row=1, col=1)
     return figure.update_xaxes(title="time in ms", row=4)
 
 
@@ -131,7 +129,7 @@ def write_plan_page(path: Path, plan: Plan, results: list[LegResult]) -> None:
     for each in results:
         note = "Share of each limit that motors and gears of the plant use; red where it binds."
         sections.append(Section(f"Limits, {each.leg.name}", note, binding_figure(plan, each), 460))
-        note = "Speed along the path, usual and planned, and torques of the gears as measured in the plant."
+        note = "Speed of the tool, usual and planned, and torques of the gears as measured in the plant."
         sections.append(Section(f"Motion, {each.leg.name}", note, motion_figure(each), 760))
     sections.insert(1, Section("All legs", text, html_table(TABLE_HEAD, table_rows(plan, results))))
     title = f"Plan, {plan.robot.name}, {plan.payload:g} kg, {plan.path}"

@@ -5,25 +5,25 @@ import time
 from collections.abc import Callable
 from dataclasses import dataclass
 from itertools import product
-from typing import Any
 
 import numpy as np
 
 from experiments.cli.option_limits import one_of
-from experiments.plan.free_leg import free_legs
+from experiments.plan.free_leg import free_legs, is_clear
 from experiments.plan.legs import Leg, legs_of
 from experiments.plan.plant_run import PlantDriver
+from experiments.plan.timed_leg import TimedLeg, timed_leg
 from experiments.plan.timings import SineSquared, Timing, quickest
 from experiments.plan.within_limits import ROUNDING, Kept, kept_in_plant, largest_share, lowered_there
 from robots.description.model import RobotModel
 from robots.measurement_design.obstacles import Obstacle
 from robots.planning.jerk_profile import best_jerk_profile
-from robots.planning.joint_path import PathError
+from robots.planning.joint_path import Curve, PathError
 from robots.planning.limit_use import energy, require_standing
 from robots.planning.limits import MotionLimits
 from robots.planning.optimum import ITERATIONS, Optimum, calmed, optimum
 from robots.planning.path_dynamics import PathDynamics
-from robots.planning.rigid_start import quickest_rigid, rigid_start
+from robots.planning.rigid_start import rigid_start
 from robots.planning.ringing import ringing_band
 from robots.planning.time_spline import TimeSpline, fitted
 
@@ -99,16 +99,24 @@ class Plan:
             return _FRUGAL
         return COEFFICIENTS, 1.0
 
+    @property
+    def times_joints(self) -> bool:
+        """Whether each joint may have a time law of its own."""
+        tool = np.isfinite([self.limits.tool_speed, self.limits.tool_acceleration]).any()
+        is_quick = self.objective == "time" and self.may_ring and not self.is_for_law
+        return self.is_free and is_quick and self.dynamics == "elastic_structure" and not tool
+
 
 @dataclass(frozen=True)
 class LegResult:
     """One leg, planned and with the timing that it replaces."""
 
     leg: Leg
+    way: Curve  # q(s) over the share of the way, the leg's path unless that is over the time
     dynamics: PathDynamics  # of the robot with an elastic structure
-    planned: Kept[TimeSpline]
+    planned: Kept[Timing]
     baseline: Kept[Timing]
-    found: Optimum  # the last one
+    iterations: int  # of the last optimum
     seconds: float  # that one plan took
     front: list[tuple[float, float]]  # s and J as the planner believes; empty unless it is asked for
 
@@ -131,14 +139,14 @@ def study_legs(
     plan: Plan, legs: list[Leg], progress: Callable[[float], None] | None = None
 ) -> list[LegResult]:
     """The same for legs that are known, whatever ``plan.path`` says; arguments and errors likewise."""
-    ready: list[list[_Ready]] = []
+    ready: list[_ReadyLeg] = []
     results: list[LegResult] = []
     for number, leg in enumerate([*legs, *legs]):
         try:
             if number < len(legs):
                 ready.append(_made_ready(plan, leg))
             else:
-                allowed = np.inf if plan.may_ring else max(ways[0].usual.run.criterion for ways in ready)
+                allowed = np.inf if plan.may_ring else max(each.usual.run.criterion for each in ready)
                 results.append(_planned(plan, ready[number - len(legs)], max(allowed, STILL)))
         except PathError as error:
             raise PathError(f"{leg.name}: {error}") from error
@@ -158,8 +166,22 @@ class _Ready:
     usual: Kept[Timing]
 
 
-def _made_ready(plan: Plan, leg: Leg) -> list[_Ready]:
-    """The ways of a leg; one, if it is not free."""
+@dataclass(frozen=True)
+class _ReadyLeg:
+    """What is known of a leg before its motion is planned.
+
+    Attributes:
+        usual: the motion that is replaced.
+        timed: the motion of joints that are timed one by one, None where it is not wanted, or not found.
+        ways: one, or more if it is free; none where it is timed.
+    """
+
+    usual: Kept[Timing]
+    timed: TimedLeg | None
+    ways: list[_Ready]
+
+
+def _made_ready(plan: Plan, leg: Leg) -> _ReadyLeg:
     dynamics, elastic, driver = _of_way(plan, leg)
     require_standing(dynamics, plan.limits)
 
@@ -170,9 +192,22 @@ def _made_ready(plan: Plan, leg: Leg) -> list[_Ready]:
 
     usual = kept_in_plant(baseline, driver, plan.limits)
     if not plan.is_free:
-        return [_Ready(leg, dynamics, elastic, driver, usual)]
+        return _ReadyLeg(usual, None, [_Ready(leg, dynamics, elastic, driver, usual)])
+    timed = _timed(plan, leg) if plan.times_joints else None
+    if timed is not None and timed.kept.timing.duration < usual.timing.duration:
+        return _ReadyLeg(usual, timed, [])
     known = plan.robot, plan.payload, leg, plan.limits, plan.dynamics, plan.obstacles
-    return [_Ready(way, *_of_way(plan, way), usual) for way in free_legs(*known, plan.sharpness(leg))]
+    ways = free_legs(*known, plan.sharpness(leg))
+    return _ReadyLeg(usual, None, [_Ready(way, *_of_way(plan, way), usual) for way in ways])
+
+
+def _timed(plan: Plan, leg: Leg) -> TimedLeg | None:
+    """The leg with joints that are timed one by one; None where there is none, or it is not clear."""
+    try:
+        timed = timed_leg(plan.robot, plan.payload, leg, plan.limits, plan.plant)
+    except PathError:
+        return None
+    return timed if is_clear(plan.robot, timed.way, plan.obstacles) else None
 
 
 def _of_way(plan: Plan, leg: Leg) -> tuple[PathDynamics, PathDynamics, PlantDriver]:
@@ -181,8 +216,13 @@ def _of_way(plan: Plan, leg: Leg) -> tuple[PathDynamics, PathDynamics, PlantDriv
     return dynamics, elastic, PlantDriver(plan.robot, plan.payload, elastic, plan.plant, plan.is_for_law)
 
 
-def _planned(plan: Plan, ways: list[_Ready], allowed: float) -> LegResult:
+def _planned(plan: Plan, leg: _ReadyLeg, allowed: float) -> LegResult:
     """The leg on the way on which it is quickest in the plant."""
+    if leg.timed is not None:
+        timed = leg.timed
+        found = timed.found.iterations, timed.seconds
+        return LegResult(timed.leg, timed.way, timed.dynamics, timed.kept, leg.usual, *found, [])
+    ways = leg.ways
     ready = ways[0]
     kept, best, seconds = _within_limits(plan, ready)
     for other in ways[1:]:
@@ -195,7 +235,8 @@ def _planned(plan: Plan, ways: list[_Ready], allowed: float) -> LegResult:
     if kept.run.criterion > allowed:
         kept, best = calm_enough(plan, ready, kept, best, allowed)
     front = _front(plan, ready.dynamics, kept) if plan.objective == "front" else []
-    return LegResult(ready.leg, ready.elastic, kept, ready.usual, best, seconds, front)
+    path = ready.leg.path
+    return LegResult(ready.leg, path, ready.elastic, kept, ready.usual, best.iterations, seconds, front)
 
 
 class _SlowerError(Exception):
@@ -335,56 +376,3 @@ def _front(plan: Plan, dynamics: PathDynamics, kept: Kept[TimeSpline]) -> list[t
         demand = dynamics.demand(motion.rates(motion.times))
         points.append((duration, energy(demand, motion.times, plan.recuperation)))
     return points
-
-
-def plan_json(plan: Plan, results: list[LegResult]) -> dict[str, Any]:
-    """The numbers: sums over the legs, the worst of criterion, iterations and seconds."""
-    binding = sorted({name for each in results for name in each.planned.run.use(plan.limits).binding})
-    return {
-        "robot": plan.robot.name,
-        "payload_kg": plan.payload,
-        "path": plan.path,
-        "objective": plan.objective,
-        "dynamics": plan.dynamics,
-        "time_s": sum(each.planned.timing.duration for each in results),
-        "baseline_s": sum(each.baseline.timing.duration for each in results),
-        "energy_j": sum(each.planned.run.energy(plan.recuperation) for each in results),
-        "baseline_energy_j": sum(each.baseline.run.energy(plan.recuperation) for each in results),
-        "criterion": max(each.planned.run.criterion for each in results),
-        "baseline_criterion": max(each.baseline.run.criterion for each in results),
-        "limits_kept": all(each.planned.keeps for each in results),
-        "baseline_limits_kept": all(each.baseline.keeps for each in results),
-        "binding": binding,
-        "iterations": max(each.found.iterations for each in results),
-        "seconds": max(each.seconds for each in results),
-        "front": [[{"time_s": t, "energy_j": e} for t, e in each.front] for each in results if each.front],
-        "legs": [
-            {
-                "name": each.leg.name,
-                "inverse": each.planned.run.inverse,
-                "time_s": each.planned.timing.duration,
-                "baseline_s": each.baseline.timing.duration,
-                "rigid_s": float(quickest_rigid(plan.robot, plan.payload, each.leg.path, plan.limits)[0][-1]),
-                "energy_j": each.planned.run.energy(plan.recuperation),
-                "baseline_energy_j": each.baseline.run.energy(plan.recuperation),
-                "criterion": each.planned.run.criterion,
-                "baseline_criterion": each.baseline.run.criterion,
-            }
-            for each in results
-        ],
-    }
-
-
-def joint_table(results: list[LegResult], period: float) -> tuple[np.ndarray, np.ndarray]:
-    """All legs one after the other: times in s, shape (n,), and joint positions in rad, shape (n, 6)."""
-    times, rows, begin = [], [], 0.0
-    for each in results:
-        duration = each.planned.timing.duration
-        t = np.arange(0.0, duration, period)
-        s = each.planned.timing.rates(t)[0]
-        times.append(begin + t)
-        rows.append(each.leg.path.at(s))
-        begin += np.ceil(duration / period) * period
-    times.append(np.array([begin]))
-    rows.append(results[-1].leg.path.at(np.array([1.0])))
-    return np.concatenate(times), np.concatenate(rows)

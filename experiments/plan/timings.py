@@ -35,6 +35,25 @@ class Timing(Protocol):
         ...
 
 
+class EvenTiming:
+    """A path whose parameter is the share of the time: rest at both ends is a matter of the path itself."""
+
+    def __init__(self, duration: float) -> None:
+        """Takes so many s."""
+        self.duration = duration
+
+    @property
+    def times(self) -> np.ndarray:
+        """Times in s that resolve the motion."""
+        return np.linspace(0.0, self.duration, _SAMPLES)
+
+    def rates(self, t: np.ndarray) -> np.ndarray:
+        """s and four derivatives, shape (5, n)."""
+        rates = np.zeros((ORDERS, len(t)))
+        rates[0], rates[1] = np.clip(t / self.duration, 0.0, 1.0), 1.0 / self.duration
+        return rates
+
+
 class SineSquared:
     """The present timing: two sin^2 humps of acceleration, Probst (2024), eq. (5.2)."""
 

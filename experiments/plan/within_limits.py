@@ -10,6 +10,7 @@ from experiments.plan.plant_run import PlantDriver, PlantRun
 from experiments.plan.timings import Timing
 from robots.description.model import NUM_JOINTS
 from robots.planning.limits import JOINT_LIMITS, OVER_TIME, MotionLimits
+from robots.planning.path_dynamics import Demand
 
 _MARGIN = 0.99  # of every limit: what a planner may use at first
 _ROUNDS = 12
@@ -18,9 +19,13 @@ _TIMES = 61  # of a motion, between which limits are lowered evenly
 _NEAR = 0.012  # s, and 1.5 of these times: what the plant exceeds is somewhat late, and moves
 _MORE = 1.1  # power of what it was too much
 _STEP = 0.995  # beyond what a motion was too much
+_ALL_BUT = 0.998  # of a limit: what the plant shall use of it
+_BINDS = 0.97  # of what it may use, from which on a planner is held back by a limit
+_HIGHER = 1.06  # times a limit at most, and in one step times
+_HIGHER_AT_ONCE = 1.02
 ROUNDING = 1e-6
 
-T = TypeVar("T", bound=Timing)
+T = TypeVar("T", bound=Timing, covariant=True)
 
 
 @dataclass(frozen=True)
@@ -81,8 +86,7 @@ def lowered_there(margins: MotionLimits, run: PlantRun, limits: MotionLimits) ->
     A quick motion exceeds its limits for some hundredths of a second, at its start and end most of all. With
     lower limits at all times it would be slower than it has to be in between.
     """
-    used = np.stack([np.abs(getattr(run.demand, name)) / getattr(limits, name) for name in OVER_TIME], axis=1)
-    mean = run.use(limits).mean_torque[:NUM_JOINTS]
+    used = _used(run.demand, limits)
     if used[run.times > run.duration].max(initial=0.0) > 1.0 + ROUNDING:
         return lowered(margins, run, limits)
     x = np.linspace(0.0, 1.0, _TIMES)
@@ -91,8 +95,57 @@ def lowered_there(margins: MotionLimits, run: PlantRun, limits: MotionLimits) ->
         there = np.abs(np.clip(run.times / run.duration, 0.0, 1.0) - at) <= near
         most = used[there].max(axis=0, initial=1.0)
         share *= np.where(most > 1.0, (_STEP / most) ** _MORE, 1.0)
-    continuous = margins.continuous_torque * np.where(mean > 1.0, _STEP / np.maximum(mean, 1.0), 1.0)
-    return replace(margins, shares=shares, continuous_torque=continuous)
+    return replace(margins, shares=shares, continuous_torque=_cooler(margins, run, limits))
+
+
+def adapted(
+    margins: MotionLimits,
+    run: PlantRun,
+    planned: Demand,
+    limits: MotionLimits,
+    power: float,
+    is_raised: bool,
+) -> MotionLimits:
+    """What a planner may use next, so that the plant comes close to its limits and keeps them.
+
+    About times at which the plant has exceeded a limit it is lower, for all times where that was after the
+    end. Where the planner was held back by a limit and the plant was not, it may be higher.
+
+    Args:
+        margins: with which the motion was planned.
+        run: of it.
+        planned: what the planner believes of it, at even times from its start to its end.
+        limits: that the plant has to keep.
+        power: of what was too much or too little; below 1 for small steps, as a step at one time moves
+            what happens at the next.
+        is_raised: whether limits may be higher, too.
+    """
+    used, wanted = _used(run.demand, limits), _used(planned, limits)
+    after = used[run.times > run.duration].max(axis=0, initial=1.0)
+    moving = (run.times >= 0.0) & (run.times <= run.duration)
+    x = np.linspace(0.0, 1.0, _TIMES)
+    even = np.linspace(0.0, 1.0, len(wanted))
+    shares, near = margins.shares_at(x), max(1.5 / (_TIMES - 1), _NEAR / run.duration)
+    for share, at in zip(shares, x, strict=True):
+        most = used[moving & (np.abs(run.times / run.duration - at) <= near)].max(axis=0, initial=0.0)
+        factor = (_ALL_BUT / np.maximum(most, 0.5)) ** power
+        binds = wanted[np.abs(even - at) <= near].max(axis=0) > _BINDS * share
+        higher = np.where(binds & is_raised, np.minimum(factor, _HIGHER_AT_ONCE), 1.0)
+        share *= np.where(most > 1.0, factor, np.where(most < _ALL_BUT, higher, 1.0))
+        np.minimum(share, _HIGHER, out=share)
+        share *= np.where(after > 1.0, (_ALL_BUT / after) ** power, 1.0)
+    return replace(margins, shares=shares, continuous_torque=_cooler(margins, run, limits))
+
+
+def _used(demand: Demand, limits: MotionLimits) -> np.ndarray:
+    """Shares of `OVER_TIME`, (n, limits, 6)."""
+    return np.stack([np.abs(getattr(demand, name)) / getattr(limits, name) for name in OVER_TIME], axis=1)
+
+
+def _cooler(margins: MotionLimits, run: PlantRun, limits: MotionLimits) -> np.ndarray:
+    """The continuous torque, lower where motors would become too warm."""
+    mean = run.use(limits).mean_torque[:NUM_JOINTS]
+    return margins.continuous_torque * np.where(mean > 1.0, _STEP / np.maximum(mean, 1.0), 1.0)
 
 
 def exceeded(run: PlantRun, limits: MotionLimits) -> dict[str, np.ndarray]:

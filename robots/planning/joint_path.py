@@ -2,13 +2,15 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from itertools import takewhile
 
 import numpy as np
 from numpy.polynomial import chebyshev
 
 from robots.description.model import RobotModel
 
-_DEGREES = (6, 8, 10, 12, 15, 18, 22, 27, 33, 40, 50)  # of the polynomials that are tried
+_DEGREES = (6, 8, 10, 12, 15, 18, 22, 27, 33, 40, 50, 60, 70, 85, 100)  # of the polynomials that are tried
+HIGHEST = 50  # of them: what needs more is not smooth, as a rule
 _LOOKED_AT = 201  # parameters
 _ROUNDING = 1e-9  # rad
 _NEGLIGIBLE = 3e-6  # rad: a motion by less lasts no tick, and its timing is all rounding
@@ -53,6 +55,7 @@ def smooth_curve(
     what: str,
     scale: np.ndarray | float = 1.0,
     accuracy: float = _SMALL,
+    highest: int = HIGHEST,
 ) -> Curve:
     """The polynomial of low degree that a function of s is.
 
@@ -61,11 +64,12 @@ def smooth_curve(
         what: the function is, for the refusal.
         scale: of its values, shape (k,) or one number.
         accuracy: share of the scale by which the polynomial may be off.
+        highest: degree that is tried.
 
     Raises:
         PathError: if it has a corner or is singular; with the place.
     """
-    for degree in _DEGREES:
+    for degree in takewhile(lambda each: each <= highest, _DEGREES):
         curve = interpolated(function(nodes(degree)))
         if (np.abs(curve.coefficients[-3:]) <= accuracy * scale).all():
             return curve

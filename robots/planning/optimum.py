@@ -11,7 +11,7 @@ from robots.planning.limit_use import energy
 from robots.planning.limits import OVER_TIME, MotionLimits
 from robots.planning.path_dynamics import ORDERS, PathDynamics
 from robots.planning.ringing import Band, ringing_rows
-from robots.planning.spline_program import PointProgram, Solution, solve
+from robots.planning.spline_program import SOLVED, PointProgram, Solution, solve
 from robots.planning.time_spline import AT_REST, TimeSpline, at_rest, bases, points, weights
 
 OBJECTIVES = ("time", "energy")
@@ -36,7 +36,7 @@ class Optimum:
     @property
     def is_solved(self) -> bool:
         """Whether the optimiser has converged."""
-        return self.status in ("Solve_Succeeded", "Solved_To_Acceptable_Level")
+        return self.status in SOLVED
 
 
 @dataclass(frozen=True)

@@ -16,7 +16,7 @@ from pydrake.multibody.tree import JacobianWrtVariable, MultibodyForces
 from robots.description.model import NUM_JOINTS, RobotModel
 from robots.dynamics.friction_line import friction_line
 from robots.dynamics.plant import PlantRobot, add_robot
-from robots.planning.joint_path import Curve, smooth_curve
+from robots.planning.joint_path import HIGHEST, Curve, smooth_curve
 
 # What the planner knows to yield, and what of the plant that is.
 DYNAMICS = {"rigid": "rigid", "flexible_joint": "joints", "elastic_structure": "structure"}
@@ -65,7 +65,9 @@ class PathDynamics:
             of the tool, squared. At the place it and its first two derivatives are exact.
     """
 
-    def __init__(self, robot: RobotModel, payload: float, path: Curve, dynamics: str) -> None:
+    def __init__(
+        self, robot: RobotModel, payload: float, path: Curve, dynamics: str, highest: int = HIGHEST
+    ) -> None:
         """Takes the coefficients from inverse dynamics along the path.
 
         Args:
@@ -73,6 +75,7 @@ class PathDynamics:
             payload: mass at the flange in kg.
             path: q(s) in rad, shape (6,).
             dynamics: of `DYNAMICS`.
+            highest: degree of the polynomials that the coefficients may need.
 
         Raises:
             ValueError: if there are no such dynamics, or the robot may not carry the payload.
@@ -84,7 +87,7 @@ class PathDynamics:
         self._robot = robot
         arm = _Arm(robot, payload, dynamics)
         self._curve = smooth_curve(
-            lambda s: arm.coefficients(path, s), "the load of the gears", _SCALE, _ACCURATE
+            lambda s: arm.coefficients(path, s), "the load of the gears", _SCALE, _ACCURATE, highest
         )
         self.places, self.near = self._functions()
         s = ca.MX.sym("s", ORDERS)

@@ -12,6 +12,7 @@ import casadi as ca
 import numpy as np
 
 TOLERANCE = 1e-5
+SOLVED = ("Solve_Succeeded", "Solved_To_Acceptable_Level")  # of IPOPT's words
 _ACCEPTABLE = 1e-4
 
 

@@ -29,7 +29,7 @@ WRITERS = {
     "invert/study.py": ("invert_json",),
     "metrics/run_metrics.py": ("summary",),
     "modes/study.py": ("modes_json",),
-    "plan/study.py": ("plan_json",),
+    "plan/results.py": ("plan_json",),
     "record/runs_command.py": ("runs_below",),
     "station/guided.py": ("_link_json", "link_json"),
     "station/latency.py": ("as_dict",),
