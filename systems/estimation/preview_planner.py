@@ -17,6 +17,7 @@ from systems.estimation.tip_model import TipModel
 _BLEND = 1.5  # s, in which the robot is led from where it starts onto the path
 _NEWTON_STEP = 1e-5  # rad; what a step of this size leaves is its square
 _GEOMETRY_STEP = 1e-4  # m or rad, within which poses are linear in the parameters
+_LOST = 0.02  # rad, a last step of Newton's method on an arm that is not on the path
 
 
 class Wanted(NamedTuple):
@@ -146,6 +147,9 @@ class PreviewPlanner:
             since_start: s.
             step: s since the last instant that was planned.
             likely: how likely each model of the gears is, (6, 6).
+
+        Raises:
+            RuntimeError: if the robot as it is known does not reach the path there.
         """
         x, rate = parameters
         model = self._model
@@ -167,7 +171,10 @@ class PreviewPlanner:
         ratios, others = np.empty(6), np.zeros((NUM_MODELS, 6))
         planned = Planned(motion, moving, loads, columns, states, others, ratios)
         arm = constants, model.loads.masses, model.unknowns(x), self._gears
-        kernels.plan.plan(*arm, instant, state, planned)
+        if not kernels.plan.plan(*arm, instant, state, planned) < _LOST:
+            raise RuntimeError(
+                "the robot as it is known now does not reach its path here: the arm is stretched"
+            )
         theta, velocity, acceleration, twist = motion
         links = moving[1:].ravel()
         return MotorPlan(theta, velocity, acceleration, loads, links, twist, columns, states, others, ratios)

@@ -14,6 +14,8 @@ from systems.estimation.kernels.tip import deflect, move_by_geometry
 
 # s, in which models of gears come to count as much as they are likely, so that no plan jerks
 _LED = 0.5
+# Of the search for the nearest pose: m for a rad, what damps it in m, and where it ends
+_ARM, _DAMPING, _NEAR, _MOST_STEPS = 0.25, 0.01, 1e-5, 20
 
 
 @inner
@@ -66,6 +68,8 @@ def _newton(c, x, q, start_error, wanted, frames, columns, inverse):
 def _follow(c, masses, unknowns, wanted, state, moving, columns, loads, yields):
     """The joints behind the gears where a stiff arm is on the path, and what motion and load bend there.
 
+    Returns the last step of Newton's method, in rad.
+
     Args:
         c, masses, unknowns: the arm.
         wanted: `PathInstant`.
@@ -77,8 +81,9 @@ def _follow(c, masses, unknowns, wanted, state, moving, columns, loads, yields):
     q, rates, wander, start = state.q, state.rates, state.wander, state.start_error
     for i in range(6):
         q[i] += wanted.step * (1.5 * rates[0, i] - 0.5 * rates[1, i] + wander[i])
-    if _newton(c, unknowns.x, q, start, wanted, frames, columns, inverse) > wanted.newton_step:
-        _newton(c, unknowns.x, q, start, wanted, frames, columns, inverse)
+    missed = _newton(c, unknowns.x, q, start, wanted, frames, columns, inverse)
+    if missed > wanted.newton_step:
+        missed = _newton(c, unknowns.x, q, start, wanted, frames, columns, inverse)
     drift = np.empty(6)
     for i in range(6):
         drift[i] = wanted.fading * start[i]
@@ -108,6 +113,7 @@ def _follow(c, masses, unknowns, wanted, state, moving, columns, loads, yields):
             for j in range(6, 18):
                 tilt += columns[k, j] * deflection[j]
             yields[i] -= inverse[i, k] * tilt
+    return missed
 
 
 @inner
@@ -176,17 +182,65 @@ def plan(c, masses, unknowns, gears, wanted, state, planned):
         wanted: `PathInstant`.
         state: `FollowerState`; is renewed.
         planned: `Planned`; is written.
+
+    Returns:
+        The last step of Newton's method, in rad: none to speak of where the arm is on the path.
     """
     yields, g = np.empty(6), len(c.chosen)
     for j in range(6):
         planned.ratios[j] = 1.0
-    _follow(c, masses, unknowns, wanted, state, planned.moving, planned.columns, planned.loads, yields)
+    moving, columns = planned.moving, planned.columns
+    missed = _follow(c, masses, unknowns, wanted, state, moving, columns, planned.loads, yields)
     if len(unknowns.x) > g + 24:
         _add_gear_errors(gears, unknowns, g, wanted, planned, state, yields)
     for i in range(6):
         yields[i] += wanted.left * state.start_yield[i]
-    columns, history = planned.columns, state.yields
-    _motors(planned.moving, state.wander, yields, history, wanted.step, gears.lag, columns, planned.motion)
+    history = state.yields
+    _motors(moving, state.wander, yields, history, wanted.step, gears.lag, columns, planned.motion)
+    return missed
+
+
+@compiled
+def missing(c, x, X_WE, q):
+    """How far the tip stays from a pose at best, in m, turns counted at an arm of 0.25 m.
+
+    Levenberg's method, which a stretched arm does not throw about as it does Newton's.
+
+    Args:
+        c, x: the arm, without its loads.
+        X_WE: the pose, (4, 4).
+        q: near to it, rad, (6,); is renewed.
+    """
+    frames, columns, X = np.empty((7, 4, 4)), np.empty((6, len(c.frame))), np.empty((4, 4))
+    r, normal, inverse, slope = np.empty(6), np.empty((6, 6)), np.empty((6, 6)), np.empty(6)
+    left = math.inf
+    for _ in range(_MOST_STEPS):
+        place(c, q, X, frames, columns)
+        move_by_geometry(c, x, columns, X, r)
+        error(X_WE, X, r)
+        square = 0.0
+        for i in range(6):
+            arm = _ARM if i < 3 else 1.0
+            r[i] *= arm
+            square += r[i] * r[i]
+            for j in range(6):
+                columns[i, j] *= arm
+        left = math.sqrt(square)
+        if left < _NEAR:
+            break
+        for i in range(6):
+            slope[i] = 0.0
+            for k in range(6):
+                slope[i] += columns[k, i] * r[k]
+            for j in range(6):
+                normal[i, j] = _DAMPING * _DAMPING if i == j else 0.0
+                for k in range(6):
+                    normal[i, j] += columns[k, i] * columns[k, j]
+        invert(normal, inverse)
+        for i in range(6):
+            for j in range(6):
+                q[i] += inverse[i, j] * slope[j]
+    return left
 
 
 @inner

@@ -13,7 +13,7 @@ from systems.reference.cartesian_path import CartesianPath
 _MOST_INSTANTS = 48  # of the lap, evenly spaced in time
 _INVERSE_STEP = 0.05  # s, between two poses of the inverse kinematics
 # An angle counts as a way of the tip at an arm of 0.25 m.
-_SCALE = np.array([0.25, 0.25, 0.25, 1.0, 1.0, 1.0])
+SCALE = np.array([0.25, 0.25, 0.25, 1.0, 1.0, 1.0])
 
 
 class Standing(NamedTuple):
@@ -108,7 +108,7 @@ class PathNeeds:
 
     def standing(self, P: np.ndarray) -> Standing:
         """How well the tip is known on the path with the covariance P of the unknowns, (size, size)."""
-        rows = _SCALE[:, None] * self.H
+        rows = SCALE[:, None] * self.H
         variance = np.einsum("nij,nij->n", rows @ P, rows)
         worst = int(variance.argmax())
         return self._standing(P, worst, math.sqrt(variance[worst]))
@@ -135,7 +135,7 @@ class PathNeeds:
         inside = (
             (chosen >= first) & (chosen <= last) if first <= last else (chosen >= first) | (chosen <= last)
         )
-        return _SCALE[:, None] * self.H[inside]
+        return SCALE[:, None] * self.H[inside]
 
     def _nearest(self, t: float) -> int:
         """Which instant is nearest to a time on the path in s, on whatever lap."""
@@ -148,14 +148,14 @@ class PathNeeds:
         for k, H in enumerate(self.H):
             if k >= self._blind:
                 A += rate * self._seconds * self._informations[k - self._blind]
-            Z = solve_triangular(np.linalg.cholesky(A), (_SCALE[:, None] * H).T, lower=True)
+            Z = solve_triangular(np.linalg.cholesky(A), (SCALE[:, None] * H).T, lower=True)
             variance = float((Z * Z).sum())
             if variance > largest:
                 largest, worst, then = variance, k, A.copy()
         return math.sqrt(largest), worst, then
 
     def _standing(self, P: np.ndarray, worst: int, sigma: float) -> Standing:
-        effects = ((_SCALE[:, None] * self.H[worst] @ P) ** 2).sum(axis=0) / np.diag(P)
+        effects = ((SCALE[:, None] * self.H[worst] @ P) ** 2).sum(axis=0) / np.diag(P)
         unknown = int(effects.argmax())
         share = float(effects[unknown]) / sigma**2
         own = float(self._model.sigma[unknown] * math.sqrt(P[unknown, unknown]))

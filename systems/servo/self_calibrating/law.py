@@ -1,5 +1,6 @@
 """A law that puts the tip on the path by knowing the robot: it calibrates robot, load and delays at work."""
 
+from functools import partial
 from types import SimpleNamespace
 from typing import Any
 
@@ -16,6 +17,7 @@ from systems.estimation.memory import Layout, Views
 from systems.estimation.parameter_lead import ParameterLead
 from systems.estimation.preview_planner import PreviewPlanner, Wanted
 from systems.estimation.probing.path_needs import PathNeeds, Standing
+from systems.estimation.probing.path_reach import PathReach
 from systems.estimation.probing.probe import Probe
 from systems.estimation.probing.probe_design import designed
 from systems.estimation.tip_model import Pair
@@ -28,6 +30,7 @@ from systems.servo.self_calibrating.config import SelfCalibratingConfig
 from systems.servo.self_calibrating.learning import UNREST, Learning
 
 _STARTING, _LED_IN = 1.5, 2.0  # s
+_IN_REACH = 0.3  # s before the path begins, from which on the robot as it is known has to reach it
 _FOLLOWED = 4.0  # rad of the lead's frequency, after which nine tenths of a step are followed
 
 
@@ -74,8 +77,9 @@ class SelfCalibrating(LeafSystem):
         """
         super().__init__()
         self._model, self._config = model, config
-        self._needs: PathNeeds | None = None  # both once the path is known
+        self._needs: PathNeeds | None = None  # all three once the path is known
         self._forecast: Standing | None = None
+        self._reach: PathReach | None = None
         self.period = model.period
         self._learning = learning = Learning(model, config)
         self.tip_model, self.estimator = learning.tip_model, learning.estimator
@@ -128,7 +132,7 @@ class SelfCalibrating(LeafSystem):
             self._needs = PathNeeds(self.tip_model, self.estimator.weights, path, home, self._late)
         except ValueError:
             return  # out of reach of the nominal robot: whoever starts the run says so
-        self._pace.needs = self._needs
+        self._pace.needs, self._reach = self._needs, PathReach(self._needs, path)
         rate = 1.0 / max(self.period, self._model.camera_period)  # of a tick one sample is taken
         sharp = self._config.probe.sharp
         found = designed(self._needs, self._probe, path.path_start, rate, sharp)
@@ -386,3 +390,7 @@ class SelfCalibrating(LeafSystem):
         coming.begins_path[0] = last < path_start <= instant
         coming.is_led_in[0] = last < first + _LED_IN <= instant
         self._pace.look(memory, reference, time)
+        if self._reach is not None and coming.path_time[0] > path_start - _IN_REACH:
+            constants = self._planner.constants(memory.planner, lead.x)
+            covariance = partial(self.estimator.covariance, memory.estimator)
+            self._reach.look(constants, lead.x, covariance, round(time / self.period))
