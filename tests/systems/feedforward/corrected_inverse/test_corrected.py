@@ -8,12 +8,15 @@ import pytest
 from robots.description.drive_parts import Cubic
 from robots.description.model import NUM_JOINTS, RobotModel, load_robot
 from robots.dynamics.friction_line import friction_line
+from robots.kinematics.forward import Kinematics
 from systems.controller_model import ControllerModel
 from systems.feedforward import FEEDFORWARDS, FeedforwardConfig, JointReference
 from systems.feedforward.corrected_inverse.corrected import CorrectedFeedforward
 from systems.feedforward.elastic_structure import ElasticStructureFeedforward
 from systems.feedforward.prefilter import PrefilterConfig
-from systems.reference.timing import TIMINGS
+from systems.reference.cartesian_path import CartesianPath
+from systems.reference.segment import line
+from systems.reference.timing import TIMINGS, PolynomialProfile
 
 PERIOD, SETTLE = 4e-3, 0.2
 HOME = np.deg2rad([10.0, -60.0, 80.0, 0.0, 40.0, 0.0])
@@ -94,3 +97,24 @@ def test_springs_that_stiffen_are_refused():
     stiffening = replace(robot, joints=[replace(first, drive_train=train), *robot.joints[1:]])
     with pytest.raises(ValueError, match="its forward model knows linear springs, play and one hysteresis"):
         FEEDFORWARDS[KIND](believed(stiffening), FeedforwardConfig(KIND))
+
+
+class Unsimulated(CorrectedFeedforward):
+    def play(self, references):
+        return np.array([[each.position, each.velocity, np.zeros(NUM_JOINTS)] for each in references])
+
+
+@pytest.mark.parametrize("preview", [0.0, 0.006, 0.012, 0.036, 0.06])
+def test_it_is_on_the_path_as_much_ahead_as_it_is_looked_ahead(preview: float):
+    model = replace(believed(load_robot("kr16-realistic")), preview=preview)
+    forward = Kinematics(model.robot).forward
+    start, end = (forward(HOME + turn * AXES) for turn in (0.0, 0.1))
+    path = CartesianPath([line(start, end)], PolynomialProfile.lasting(1.0), SETTLE, 0.1, 0.0)
+    inverse = Unsimulated(model, FeedforwardConfig(KIND))
+    inverse.prepare(path, HOME)
+    context = inverse.CreateDefaultContext()
+    for time in (0.0, 0.4, 0.6, 0.8):
+        context.SetTime(time)
+        context.SetDiscreteState(inverse.EvalUniquePeriodicDiscreteUpdate(context))
+        told = forward(inverse.GetOutputPort("position_command").Eval(context))
+        assert told[:3, 3] == pytest.approx(path.sample(time + preview)[0][:3, 3], abs=1e-6)
