@@ -387,7 +387,8 @@ class SelfCalibrating(LeafSystem):
         velocity = (1.0 + memory.delay.rate[0]) * command.velocity
         coming.commands[:] = command.position, velocity, command.torque
         memory.planned[0], coming.path_time[0] = instant, reference.path_time(instant)
-        coming.begins_path[0] = last < path_start <= instant
+        # Later than planned where the probe has waited or begun anew.
+        coming.begins_path[0] = reference.path_time(float(last)) < path_start <= coming.path_time[0]
         coming.is_led_in[0] = last < first + _LED_IN <= instant
         self._pace.look(memory, reference, time)
         if self._reach is not None and coming.path_time[0] > path_start - _IN_REACH:

@@ -101,3 +101,20 @@ def test_a_command_that_is_taken_back_leaves_no_trace(law):
         left = [name for name, array in arrays(memory) if not np.array_equal(array, before[name], True)]
         assert [name for name in left if not name.startswith("next.")] == [], k
     assert {"drives.wound", "by_knowledge", "planner.q"} <= moved
+
+
+def test_a_path_begins_when_its_own_time_says_so(law):
+    """Held before its begin for 0.3 s, as where the probe begins anew, it begins so much later."""
+    path = make_path(replace(load_scenario("misaligned").reference, settle=0.4))
+    held = PathTime(0.05).changed(0.0, 0.1, 0.0).changed(0.0, 0.4, 1.0)
+    ahead, context = PathAhead(path, PERIOD, time=held), law.CreateDefaultContext()
+    still = JointSample(0.0, START, running=True)
+    for name, value in {"reference": ahead, "joint_sample": still, "pose_sample": PoseSample()}.items():
+        law.GetInputPort(name).FixValue(context, Value[object](ahead) if value is ahead else Value(value))
+    begins = []
+    for k in range(200):
+        context.SetTime(k * PERIOD)
+        context.SetDiscreteState(law.EvalUniquePeriodicDiscreteUpdate(context))
+        memory = law.memory(context)
+        begins += [float(memory.planned[0])] * int(memory.next.begins_path[0])
+    assert begins == [pytest.approx(0.7, abs=PERIOD)]
