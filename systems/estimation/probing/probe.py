@@ -183,13 +183,14 @@ class Probe:
         Oscillations come later by what they have waited, in s; the path has to be held for as long.
         """
         begin, length = self.window(path_start)
+        motion = np.zeros((3, NUM_JOINTS))
         if 0.0 < time - _KNOCK_BEGIN < _KNOCK_LENGTH:
             # sin^4: a step of the acceleration would be a step of the gears' deflection.
             s, w = 2.0 * np.pi * (time - _KNOCK_BEGIN) / _KNOCK_LENGTH, 2.0 * np.pi / _KNOCK_LENGTH
             u, du, ddu = 0.5 - 0.5 * np.cos(s), 0.5 * w * np.sin(s), 0.5 * w * w * np.cos(s)
-            return np.outer((u * u, 2.0 * u * du, 2.0 * (du * du + u * ddu)), amplitude[0])
+            motion += np.outer((u * u, 2.0 * u * du, 2.0 * (du * du + u * ddu)), amplitude[0])
         time -= waited
-        if not 0.0 < time - begin < length:
-            return np.zeros((3, NUM_JOINTS))
-        pattern = self.pattern._replace(size=amplitude[1])
-        return np.concatenate(pattern.at(np.array([time - begin]), length))
+        if 0.0 < time - begin < length:  # begun early they go on beside the knock
+            pattern = self.pattern._replace(size=amplitude[1])
+            motion += np.concatenate(pattern.at(np.array([time - begin]), length))
+        return motion

@@ -28,6 +28,16 @@ def test_rates_are_derivatives_and_both_ends_are_at_rest():
     assert not np.any(probe.at(PATH_START, PATH_START, size))
 
 
+@pytest.mark.parametrize("begin", [0.0, 0.2, 0.5, 0.8])
+def test_no_joint_leaps_whenever_oscillations_begin(begin):
+    robot = load_robot("irb1200")
+    probe, period = Probe(robot, ProbeConfig(begin=begin)), 1e-3
+    size = probe.amplitude(HOME, JACOBIAN, PATH_START)
+    motion = np.array([probe.at(t, PATH_START, size) for t in np.arange(0.0, PATH_START, period)])
+    steps = np.diff(motion[:, 0], axis=0)
+    np.testing.assert_allclose(steps, period * 0.5 * (motion[1:, 1] + motion[:-1, 1]), atol=1e-6)
+
+
 def test_oscillations_that_have_to_wait_begin_later_and_are_the_same():
     probe = Probe(load_robot("irb1200"), ProbeConfig())
     size, waited = probe.amplitude(HOME, JACOBIAN, PATH_START), 0.0
