@@ -1,5 +1,6 @@
 """Named arrays in one vector, so that what an estimator remembers can be a discrete state of the Context."""
 
+import math
 from types import SimpleNamespace
 
 import numpy as np
@@ -75,6 +76,11 @@ class History:
         memory.times[place], memory.rows[place] = time, row
         memory.count[0] = count + 1
         return True
+
+    def since(self, memory: SimpleNamespace) -> float:
+        """From which time in s on all rows are there; minus infinity as long as none has been forgotten."""
+        count = int(memory.count[0])
+        return float(memory.times[count % self.length]) if count > self.length else -math.inf
 
     def ordered(self, memory: SimpleNamespace) -> tuple[np.ndarray, np.ndarray]:
         """Times in s, (n,), and rows, (n, width), from the oldest to the newest; copies."""

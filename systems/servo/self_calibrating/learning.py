@@ -133,6 +133,8 @@ class Learning:
     def pair(self, memory: SimpleNamespace, stamp: float, X_WE: np.ndarray) -> Pair | None:
         """The encoders and the plan at the instant of an exposure; None if they are not known, or astray.
 
+        A pose that comes later than anything is remembered is left alone: the oldest row is not that of then.
+
         The pair is made of windows of the memory, in which the next one takes its place.
 
         Args:
@@ -146,6 +148,9 @@ class Learning:
             return None
         newest = float(encoders.times[(count - 1) % self.motors.encoders.length])
         exposure = min(stamp + self.estimator.clock_offset(memory.estimator, stamp), newest)
+        oldest = max(self.motors.encoders.since(encoders), self.motors.plan.since(plan) + self._load_lag)
+        if exposure < oldest:
+            return None
         then, now = at.then, at.now
         rings = Ring(encoders.count, encoders.times, encoders.rows), Ring(plan.count, plan.times, plan.rows)
         # As it would have been seen had the clock been right: the column stands for all of the offset.
