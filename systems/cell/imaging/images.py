@@ -1,9 +1,9 @@
 """What the cameras record of the markers on the level of images: pixels in windows about the body.
 
 A camera reads only the window in which the body is expected, as Probst (2024) section 8.1 plans. Each marker
-is a lit ellipse in it (`rendering`); what hides the centre of a sphere hides all of it. The noise is a stream
-that the numbers from outside are the key of: to bring tens of thousands of numbers for each exposure through
-a port would cost more than everything else.
+is a lit ellipse in it (`systems.vision.rendering`); what hides the centre of a sphere hides all of it. The
+noise is a stream that the numbers from outside are the key of: to bring tens of thousands of numbers for each
+exposure through a port would cost more than everything else.
 """
 
 from dataclasses import dataclass

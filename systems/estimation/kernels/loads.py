@@ -96,7 +96,7 @@ def load(masses, frames, q, velocity, acceleration, loads):
         masses: `Masses`.
         frames: of the world and the links in the world, (7, 4, 4).
         q, velocity, acceleration: of the joints, (6,).
-        loads: (5, 18) as `systems.estimation.arm.loads.ArmLoads.at` gives them, is written.
+        loads: (5, 18) as `systems.estimation.arm_loads.ArmLoads.at` gives them, is written.
     """
     motion = np.zeros((6, 3, 3))  # of the links
     w, alpha, a, way = np.zeros(3), np.zeros(3), np.zeros(3), np.empty(3)
