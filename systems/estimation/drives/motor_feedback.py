@@ -40,7 +40,9 @@ class MotorFeedback:
             has_shares: whether there are motors of which something is fed back, ever.
             period: between commands, s.
         """
-        self._gain = config.feedback if kind == "cascade" and not has_play else 0.0
+        # A step of the lag in time is stable up to two periods.
+        gain = min(config.feedback, 1.0 / period)
+        self._gain = gain if kind == "cascade" and not has_play else 0.0
         self.acts = self._gain > 0.0 and has_shares  # else it changes no command
         self._period = period
         self.layout = Layout(beside=(NUM_JOINTS,))  # rad

@@ -17,8 +17,9 @@ class DisturbanceObserver(ServoLaw):
 
     The tip is where it was commanded plus a disturbance. At an exposure the disturbance is the error that the
     camera sees plus the correction that was in force then, as believed delays say; a filter of first order
-    with the gains as its bandwidths makes the correction from it. Were the delays and the robot as believed,
-    no bandwidth would be unstable; they are not. What changes is followed late by delays and filter.
+    with the gains as its bandwidths, of one over the period at most, makes the correction from it. Were the
+    delays and the robot as believed, no bandwidth would be unstable; they are not. What changes is followed
+    late by delays and filter.
 
     The memory holds the joints of the last tick, the correction, and those of the ticks before until the one
     that is in force.
@@ -33,6 +34,8 @@ class DisturbanceObserver(ServoLaw):
         late = round((model.camera_delay + model.command_delay) / model.period)
         self.memory_size = _CORRECTION.stop + 6 * (late + 1)
         super().__init__(model, config, guard)
+        # With these a tick makes up for all that is observed; with twice as much it would go on to and fro.
+        self._bandwidths = np.minimum(self.gains, 1.0 / model.period)
 
     def initial_state(self, moment: LawInput) -> np.ndarray:
         """At the measured positions, at rest, nothing observed."""
@@ -44,7 +47,7 @@ class DisturbanceObserver(ServoLaw):
         if moment.measured is not None:
             in_force = memory[-6:]
             disturbance = pose_error(*moment.measured) + in_force
-            wish = self.gains * (disturbance - correction)
+            wish = self._bandwidths * (disturbance - correction)
             rate = self.within_limits(wish, correction)
         correction = correction + self.period * rate
         X = integrate_twist(moment.X_WD, correction)

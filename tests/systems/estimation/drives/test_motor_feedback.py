@@ -66,6 +66,13 @@ def test_no_dead_time_makes_it_unstable(delay):
     assert np.abs(fed_back[-100:]).max() < 1e-3 * np.abs(alone).max()
 
 
+@pytest.mark.parametrize("gain", [100.0, 250.0, 1000.0, 1e6])
+def test_no_gain_makes_it_unstable(gain):
+    alone, fed_back = (behind_by(lambda t: 2.0 * (t < 0.1), 8e-3, feedback=gain) for gain in (0.0, gain))
+    assert np.abs(fed_back).max() < 1.02 * np.abs(alone).max()
+    assert np.abs(fed_back[-100:]).max() < 1e-3 * np.abs(alone).max()
+
+
 def test_a_motor_that_sticks_does_not_move_in_steps():
     """In place of the lag an integral would make it hang and leap by 0.18 mrad, for ever."""
     fed_back = behind_by(lambda _: 0.0, 8e-3, 6.0, planned_speed=1e-4, sticks=2.0, feedback=20.0)
