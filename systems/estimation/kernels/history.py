@@ -9,7 +9,7 @@ from systems.estimation.kernels.tip import largest_change
 
 @inner
 def around(count, times, time):
-    """Places of the rows before and behind a time in a ring, and which share of the way between them it is."""
+    """Places of the rows before and behind a time in a ring, and which share of the way from one it is."""
     length = len(times)
     held, first = min(count, length), count % length if count > length else 0
     newest = (count - 1) % length

@@ -22,8 +22,8 @@ from systems.samples import JointSample, PersonSample
 ZONES = ("free", "slow", "stop")
 STATUS = ("distance", "protective_distance", "zone", "age")  # of the output ``separation``; m, m, index, s
 _FREE, _SLOW, _STOP = 0.0, 1.0, 2.0
-_SHARE, _STOPPED, _TRUSTED, _STATUS, _FULL = 0, 1, 2, slice(3, 7), slice(7, 13)
-_WIDTH = 13
+_SHARE, _STOPPED, _TRUSTED, _STATUS, _FULL, _ALONG = 0, 1, 2, slice(3, 7), slice(7, 13), slice(13, 19)
+_WIDTH = 19
 _STEP = 1e-4  # s, over which speeds of the arm are told from differences
 _LEAST_RATE = 0.2  # below which the full speed of the path is not told from the commands
 _FORGET = 0.02  # of the largest full speed per decision
@@ -119,11 +119,20 @@ class SeparationMonitor(LeafSystem):
 
         return calc
 
-    def terms(self, velocity: np.ndarray, q: np.ndarray, human_speed: float = 0.0) -> ProtectiveDistance:
-        """The protective distance at joint speeds (6,) in rad/s and positions (6,) in rad."""
-        now, later = self._arm.at(q), self._arm.at(q + _STEP * velocity)
-        ends = np.concatenate([later.start - now.start, later.end - now.end])
-        speed = max(float(np.linalg.norm(ends, axis=1).max()) / _STEP, self._path_speed)
+    def terms(
+        self, velocity: np.ndarray, q: np.ndarray, human_speed: float = 0.0, along: np.ndarray | None = None
+    ) -> ProtectiveDistance:
+        """The protective distance at joint speeds (6,) in rad/s and positions (6,) in rad.
+
+        Of speeds without signs joints that turn against each other seem to be slower together than they are:
+        ``along`` are the same with signs, rad/s, (6,), and the faster of both counts.
+        """
+        now = self._arm.at(q)
+        speed = self._path_speed
+        for each in (velocity, velocity if along is None else along):
+            later = self._arm.at(q + _STEP * each)
+            ends = np.concatenate([later.start - now.start, later.end - now.end])
+            speed = max(speed, float(np.linalg.norm(ends, axis=1).max()) / _STEP)
         stop = stopping_time(self._stop_time, velocity, self._acceleration)
         fastest = max(self._config.human_speed, human_speed)
         return protective_distance(self._config, self._reaction, speed, stop, fastest)
@@ -138,7 +147,8 @@ class SeparationMonitor(LeafSystem):
             state[_TRUSTED] = max(state[_TRUSTED], sample.time)
         age = time - state[_TRUSTED]
         rate = float(self._path_time.Eval(context)[1])
-        full = self._full_speed(state, np.nan_to_num(self._velocity.Eval(context)), rate)
+        velocity = np.nan_to_num(self._velocity.Eval(context))
+        full, along = self._full_speed(state, velocity, rate)
         arm = self._arm.at(joints.position)
         distance = min(
             (
@@ -148,7 +158,7 @@ class SeparationMonitor(LeafSystem):
             default=FAR,
         )
         walking = max((float(np.linalg.norm(each.velocity)) for each in sample.people), default=0.0)
-        terms = self.terms(full, joints.position, walking)
+        terms = self.terms(full, joints.position, walking, along)
         allowed = min(largest_share(distance, terms), self._by_age(age))
         needed = terms.at_rest
         if state[_STOPPED]:
@@ -160,16 +170,23 @@ class SeparationMonitor(LeafSystem):
             state[_STOPPED] = float(distance < needed or age >= config.stop_after)
         share = min(allowed, state[_SHARE] + config.rise * self._every * self._tick)
         state[_SHARE] = 0.0 if state[_STOPPED] else share
-        state[_FULL] = full
+        state[_FULL], state[_ALONG] = full, along
         zone = _STOP if state[_STOPPED] else (_SLOW if allowed < 1.0 else _FREE)
         state[_STATUS] = distance, terms.total, zone, min(age, FAR)
         discrete_state.set_value(self._state, state)
 
-    def _full_speed(self, state: np.ndarray, velocity: np.ndarray, rate: float) -> np.ndarray:
-        """The joint speeds that the path has at full speed, as commands at another one tell, rad/s (6,)."""
+    def _full_speed(
+        self, state: np.ndarray, velocity: np.ndarray, rate: float
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """The joint speeds that the path has at full speed, as commands at another one tell, rad/s.
+
+        Returns:
+            How large they have lately been at most, (6,), and what they were last, with signs, (6,).
+        """
         if rate < _LEAST_RATE:
-            return state[_FULL]
-        return np.maximum(np.abs(velocity) / rate, (1.0 - _FORGET) * state[_FULL])
+            return state[_FULL], state[_ALONG]
+        along = velocity / rate
+        return np.maximum(np.abs(along), (1.0 - _FORGET) * state[_FULL]), along
 
     def _by_age(self, age: float) -> float:
         """The share that images of an age in s allow."""

@@ -10,7 +10,7 @@ from systems.link.qualisys.server import CameraServerConfig, VirtualCameraServer
 
 @dataclass
 class Qualisys(MocapReceiverConfig):
-    """A camera server, its clock, and the body it tracks; fits `systems.link.protocols.PoseSourceMaker`."""
+    """A camera server, its clock, and the body it tracks."""
 
     def connect(
         self, X_WM: RigidTransform, X_BE: RigidTransform, delay: float, port: int | None = None

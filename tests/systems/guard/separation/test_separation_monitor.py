@@ -9,7 +9,11 @@ from pydrake.systems.analysis import Simulator
 
 from robots.description.model import load_robot
 from robots.kinematics.arm_capsules import ArmCapsules
-from systems.guard.separation.protective_distance import ReactionTime, SeparationConfig
+from systems.guard.separation.protective_distance import (
+    ReactionTime,
+    SeparationConfig,
+    protective_distance,
+)
 from systems.guard.separation.separation_monitor import STATUS, SeparationMonitor
 from systems.samples import JointSample, Person, PersonSample
 
@@ -18,7 +22,7 @@ ARM = ArmCapsules(ROBOT)
 REACTION = ReactionTime(images=0.05, transport=0.03, computation=0.05, decision=0.02, command=0.01)
 CONFIG = SeparationConfig(acknowledge=False)
 SPEED = np.array([1.0, 0.5, 0.0, 0.0, 0.0, 0.0])
-NEVER = np.inf
+HOME, NEVER = np.zeros(6), np.inf
 
 
 class Walk:
@@ -33,7 +37,15 @@ class Walk:
     def port(self, name: str) -> np.ndarray:
         return self.monitor.GetOutputPort(name).Eval(self.context)
 
-    def step(self, x: float | None, trusted: bool = True, last: float = NEVER, acknowledge: bool = False):
+    def step(
+        self,
+        x: float | None,
+        trusted: bool = True,
+        last: float = NEVER,
+        acknowledge: bool = False,
+        speed: np.ndarray = SPEED,
+        q: np.ndarray = HOME,
+    ):
         """One decision; images come until ``last``. Returns share, stop and status."""
         now = self.context.get_time()
         people = () if x is None else (Person(1, np.array([[x, 0.0, 0.4]]), 0.0, np.zeros(3)),)
@@ -41,8 +53,8 @@ class Walk:
         share = float(self.port("speed_share")[0])
         for name, value in (
             ("person_sample", Value[object](PersonSample(exposed, trusted, people))),
-            ("joint_sample", Value(JointSample(now))),
-            ("velocity_command", share * SPEED),
+            ("joint_sample", Value(JointSample(now, q))),
+            ("velocity_command", share * speed),
             ("path_time", [now, share]),
             ("acknowledge", [float(acknowledge)]),
         ):
@@ -73,6 +85,20 @@ def test_somebody_who_walks_up_slows_the_robot_and_stops_it_before_it_is_too_nea
     assert shares[0] == 1.0
     assert shares[-1] == 0.0
     assert any(0.2 < share < 0.8 for share in shares)
+
+
+@pytest.mark.parametrize("turns", [1.0, -1.0])
+def test_joints_count_with_their_signs_whether_they_turn_with_each_other_or_against(turns):
+    """With axis 4 turned round, the hand is the faster for what axis 5 does if it turns against axis 3."""
+    walk, q, speed = Walk(), np.array([0.0, 0.0, 0.0, np.pi, 0.0, 0.0]), np.array([0, 0, 1.0, 0, turns, 0])
+    for _ in range(300):
+        share, _, status = walk.step(6.0, q=q, speed=speed)
+    assert share == 1.0
+    now, later = ARM.at(q), ARM.at(q + 1e-4 * speed)
+    ends = np.concatenate([later.start - now.start, later.end - now.end])
+    fastest = np.linalg.norm(ends, axis=1).max() / 1e-4
+    least = protective_distance(CONFIG, REACTION, fastest, 0.25, CONFIG.human_speed).total
+    assert status["protective_distance"] >= least - 1e-9
 
 
 def test_without_images_it_slows_and_then_stops():
