@@ -16,6 +16,8 @@ class JointMover(LeafSystem):
     Ports:
         out ``position_command``  vector 6 in rad
         out ``velocity_command``  vector 6 in rad/s
+
+    Until it is told where it is, it stands at zero.
     """
 
     def __init__(self, speed: np.ndarray, shortest: float = 0.2) -> None:
@@ -34,7 +36,7 @@ class JointMover(LeafSystem):
                 f"joint mover: speeds and duration must be positive, got {speed} rad/s and {shortest} s"
             )
         self._speed, self._shortest = speed, shortest
-        state = self.DeclareDiscreteState(_DURATION + 1)
+        state = self.DeclareDiscreteState(np.append(np.zeros(_DURATION), shortest))
         prerequisites = {self.time_ticket(), self.discrete_state_ticket(state)}
         for order, name in enumerate(("position_command", "velocity_command")):
             self.DeclareVectorOutputPort(name, NUM_JOINTS, self._calc(order), prerequisites)

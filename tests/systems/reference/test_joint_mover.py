@@ -43,3 +43,12 @@ def test_a_new_goal_starts_where_the_joints_are():
 def test_a_joint_without_speed_is_refused():
     with pytest.raises(ValueError, match="speeds and duration must be positive"):
         JointMover(np.zeros(6))
+
+
+def test_it_stands_still_until_it_is_told_to_go():
+    mover = JointMover(np.ones(6))
+    context = mover.CreateDefaultContext()
+    for time in (0.0, 0.1, 5.0):
+        context.SetTime(time)
+        for name in ("position_command", "velocity_command"):
+            assert not mover.GetOutputPort(name).Eval(context).any()
