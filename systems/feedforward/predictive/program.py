@@ -51,13 +51,14 @@ class CorrectionProgram:
         picks = [sparse.kron(sparse.eye(ticks), row[None]) for row in np.eye(_PER_TICK)]
         change = smoothness * self._unit / _ERROR_UNIT * differences @ picks[2]
         cost = sparse.block_diag([picks[0].T @ picks[0] + change.T @ change] * NUM_JOINTS)
+        cost = sparse.triu(cost, format="csc")
         inertia, slope = np.ones(NUM_JOINTS), np.zeros((ticks, NUM_JOINTS))
         matrix = sparse.csc_matrix(
             (self._values(inertia, slope), self._indices, self._starts), shape=self._shape
         )
         self._solver = osqp.OSQP()
         self._solver.setup(
-            sparse.triu(cost, format="csc"),
+            cost,
             np.zeros(size),
             matrix,
             np.zeros(self._shape[0]),
@@ -71,7 +72,7 @@ class CorrectionProgram:
             check_termination=5,
             max_iter=_MOST_STEPS,
         )
-        self._laid_out = matrix.data  # what the solver has
+        self._laid_out, self._cost = matrix.data, cost.data.copy()  # what the solver has
 
     def solve(self, forecast: Forecast) -> np.ndarray | None:
         """The corrections in rad/s^2 at all ticks, (n, 6); None if the solver finds none."""
@@ -88,7 +89,8 @@ class CorrectionProgram:
         values = self._values(inertia, slope)
         if not np.array_equal(values, self._laid_out):
             self._laid_out = values
-            self._solver.update(Ax=values)
+            # The cost does not change, but what is left in place is scaled to and fro, and rounded each time.
+            self._solver.update(Px=self._cost, Ax=values)
         self._solver.update(l=lower, u=upper)
         found = self._solver.solve(raise_error=False)
         if found.info.status != "solved":
