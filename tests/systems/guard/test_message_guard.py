@@ -203,3 +203,15 @@ def test_without_anything_known_nothing_is_judged():
     position, velocity = guard.judged(np.full(6, np.nan), np.zeros(6), PERIOD)
     assert np.isnan(position).all()
     assert not velocity.any()
+
+
+@pytest.mark.parametrize("share", [0.2, 0.5, 1.0])
+def test_a_joint_that_is_sent_out_of_its_range_comes_to_rest_at_its_end(share):
+    """Within the range it goes as it is told, until there is just room to brake."""
+    stream, position, rate = Stream(), MIDDLE, np.zeros(6)
+    for _ in range(3000):
+        rate = np.minimum(rate + 0.5 * PERIOD * ROBOT.acceleration, share * ROBOT.speed)
+        position = position + PERIOD * rate
+        sent, _ = stream.send(position, rate)
+    stream.check()
+    assert sent == pytest.approx(ROBOT.upper, abs=1e-6)
