@@ -40,7 +40,7 @@ class MotorFeedback:
             has_shares: whether there are motors of which something is fed back, ever.
             period: between commands, s.
         """
-        # A step of the lag in time is stable up to two periods.
+        # A lag of more than two over the period would grow from step to step.
         gain = min(config.feedback, 1.0 / period)
         self._gain = gain if kind == "cascade" and not has_play else 0.0
         self.acts = self._gain > 0.0 and has_shares  # else it changes no command
