@@ -31,9 +31,10 @@ TITLES = {
 }
 _NOTE = (
     "The largest over the poses or along the square P2, P3, P4, P5. The speed of a path rises and falls "
-    "between corners; velocity is compared at its peak. Drift is between the first and the last quarter of "
-    "the cycles, not over the eight hours of the standard. There is no stabilisation time where the tip has "
-    "not stayed within the band before the next motion began."
+    "between corners; velocity is compared over the middle of the edges. Stabilisation counts from the end "
+    "of the command. Drift is between the first and the last quarter of the cycles, not over the eight hours "
+    "of the standard. There is no stabilisation time where the tip has not stayed within the band before the "
+    "next motion began."
 )
 _NAMES = ("P1", "P2", "P3", "P4", "P5")
 _WIDTH = 0.5  # of a pose's place on the axis that its visits take

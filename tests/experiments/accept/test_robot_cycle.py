@@ -115,6 +115,65 @@ def test_a_tip_that_rings_out_needs_the_time_until_its_amplitude_is_that_of_the_
     assert 0.1 < overshoot < 1.0
 
 
+def test_a_tip_that_creeps_into_the_band_and_stays_there_does_not_overshoot():
+    """ISO 9283: overshoot is zero where the tip does not leave the band again."""
+    scenario = pose_scenario(BASE, CYCLE, CYCLES, 1.0)
+    path = make_path(scenario.reference)
+
+    def behind(t: np.ndarray) -> np.ndarray:
+        wanted = path.sample(t)[0][:, :3, 3]
+        tip, share = wanted.copy(), np.exp(-4e-3 / 0.05)
+        for k in range(1, len(t)):
+            tip[k] = share * tip[k - 1] + (1.0 - share) * wanted[k]
+        return tip - wanted
+
+    found = poses_of(scenario, behind)
+    assert found["stabilisation_s"] is not None
+    assert found["stabilisation_s"] > 0.0
+    assert found["overshoot_mm"] == 0.0
+
+
+def test_a_tip_that_is_late_at_a_corner_does_not_overshoot_it_and_is_as_fast():
+    """ISO 9283: there is no overshoot of a corner before the tip has come to it."""
+    scenario = path_scenario(BASE, CYCLE, CYCLES, 1.0)
+    path = make_path(scenario.reference)
+
+    def late(t: np.ndarray) -> np.ndarray:
+        return path.sample(np.maximum(t - 0.14, 0.0))[0][:, :3, 3] - path.sample(t)[0][:, :3, 3]
+
+    found = path_results(log_of(scenario, late), scenario, CYCLE).results
+    assert found["CO_mm"] < 0.001
+    assert abs(found["AV_percent"]) < 0.1
+
+
+def test_a_tip_that_goes_on_behind_a_corner_overshoots_it_by_that():
+    scenario = path_scenario(BASE, CYCLE, CYCLES, 1.0)
+    path = make_path(scenario.reference)
+    onwards = CYCLE.poses[2, :3, 3] - CYCLE.poses[1, :3, 3]  # to P3 and beyond
+    onwards = 5e-4 * onwards / np.linalg.norm(onwards)
+
+    def beyond(t: np.ndarray) -> np.ndarray:
+        lap = path.lap_starts[1] - path.lap_starts[0]
+        since = np.mod(t - path.lap_starts[0], lap) - 0.25 * lap
+        return np.outer(np.exp(-np.square((since - 0.1) / 0.03)), onwards)
+
+    found = path_results(log_of(scenario, beyond), scenario, CYCLE).results
+    assert found["CO_mm"] == pytest.approx(0.5, rel=0.02)
+
+
+@pytest.mark.parametrize("edge", [0.25, 0.02])
+def test_noise_and_an_offset_of_the_tip_are_no_velocity(edge):
+    cycle = Cycle(cube_poses(BASE, edge), dwell=0.5, band=1e-4)
+    scenario, rng = path_scenario(BASE, cycle, CYCLES, 1.0), np.random.default_rng(0)
+
+    def noisy(t: np.ndarray) -> np.ndarray:
+        return [0.02, -0.01, 0.03] + 5e-5 * rng.standard_normal((len(t), 3))
+
+    found = path_results(log_of(scenario, noisy), scenario, cycle).results
+    assert abs(found["AV_percent"]) < 0.5
+    assert found["RV_percent"] < 1.5
+
+
 def test_a_tip_that_never_stays_within_the_band_has_no_stabilisation_time():
     scenario = pose_scenario(BASE, CYCLE, CYCLES, 1.0)
     found = poses_of(scenario, lambda t: np.outer(2e-4 * np.sin(2e3 * t), [0.0, 0.0, 1.0]))
