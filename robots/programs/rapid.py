@@ -35,10 +35,14 @@ from robots.programs.rapid_text import (
     Token,
     Tree,
     aggregate,
+    assigned,
     has_shape,
+    is_argument,
     literals,
     split,
     statements,
+    without_heading,
+    without_short_condition,
 )
 
 _POSE_ROLES = ("x", "y", "z", "qw", "qx", "qy", "qz", "cf1", "cf4", "cf6", "cfx")
@@ -109,6 +113,7 @@ class _Reader:
         self._declared: dict[str, _Declared] = {}
         self._places: dict[str, list[_Place]] = {}  # by the small letters of the name
         self._inline: list[_Place] = []
+        self._changed: set[str] = set()  # names, in small letters
         self._gripped = 0.0
         self._course = Course()
         self._parsed = [(each, list(statements(each))) for each in (source, *context.others)]
@@ -123,6 +128,8 @@ class _Reader:
                 places = self._places_of(declared.name, declared.line, declared.tree)
                 if places:
                     self._places[declared.name.lower()] = places
+        names = (assigned(_done(statement)) for _, found in self._parsed for statement in found)
+        self._changed = {name.word for name in names if name}
         for source, found in self._parsed:
             self._gripped = 0.0
             for statement in found:
@@ -145,6 +152,7 @@ class _Reader:
     # Declarations
 
     def _declare(self, source: Source, statement: Sequence[Token]) -> None:
+        statement = without_heading(statement)
         for at, token in enumerate(statement):
             if token.word in ("const", "pers", "var") and len(statement) > at + 2:
                 kind, name = statement[at + 1].word, statement[at + 2]
@@ -176,6 +184,8 @@ class _Reader:
         declared = self._declared.get(name.lower())
         if declared is None:
             raise ProgramError(f"{where}: {name} is not declared; --with FILE reads further modules")
+        if name.lower() in self._changed:
+            raise ProgramError(f"{where}: {name} is given another value by the program, which is not read")
         tree, at = declared.tree, declared.source.where(declared.line)
         is_tool = declared.kind == "tooldata"
         frames = []
@@ -210,25 +220,17 @@ class _Reader:
 
     def _follow(self, source: Source, statement: Sequence[Token]) -> None:
         """Takes from a statement where it moves, and with what."""
-        if any(token.word in ("const", "pers", "var") for token in statement):
-            return
-        statement = _without_heading(statement)
+        statement = _done(statement)
+        if name := assigned(statement):
+            return self._assigned(name)
         for at, (token, after) in enumerate(pairwise(statement)):
-            if token.kind != "name" or token.word in KEYWORDS or (at and statement[at - 1].word == "if"):
-                continue
-            if after.text in (":=", ".", "{"):
-                parts = split(statement[at:], ":=")
-                if len(parts) == 2:
-                    self._assigned(source, token)
-                    return
-            is_argument = after.text in ("[", "\\") or after.kind in ("name", "string", "number")
-            if is_argument and after.word not in KEYWORDS:
+            if token.kind == "name" and token.word not in KEYWORDS and is_argument(after):
                 self._instruction(source, token, statement[at + 1 :])
                 return
         if source is self._source:
             note_call(self._course, source, statement)
 
-    def _assigned(self, source: Source, name: Token) -> None:
+    def _assigned(self, name: Token) -> None:
         self._course.assign(name.word)
         for place in self._places.pop(name.word, []):
             text = f"{place.name} is given another value by the program, left alone"
@@ -373,17 +375,12 @@ def _target_numbers(tree: Tree) -> dict[str, Literal] | None:
     return None
 
 
-def _without_heading(statement: Sequence[Token]) -> Sequence[Token]:
-    """What follows the name and the parameters of a routine, where the statement begins with one."""
-    for at, token in enumerate(statement):
-        if token.word in ("proc", "func", "trap", "module"):
-            depth = 0
-            for end in range(at + 1, len(statement)):
-                depth += (statement[end].text == "(") - (statement[end].text == ")")
-                following = statement[end + 1].text if end + 1 < len(statement) else ""
-                if depth == 0 and following != "(" and (statement[end].text == ")" or token.word != "func"):
-                    return _without_heading(statement[end + 1 :])
-    return statement
+def _done(statement: Sequence[Token]) -> Sequence[Token]:
+    """What a statement does, without a heading or short condition; nothing if it declares."""
+    statement = without_heading(statement)
+    if any(token.word in ("const", "pers", "var") for token in statement):
+        return ()
+    return without_short_condition(statement)
 
 
 def _length(tree: Tree) -> int:

@@ -3,6 +3,7 @@
 import re
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 
 from robots.programs.program import Literal, Source
 
@@ -61,6 +62,49 @@ def statements(source: Source) -> Iterator[list[Token]]:
         else:
             statement.append(Token(kind, match.group(), match.start(), match.end()))
     yield statement
+
+
+def without_heading(statement: Sequence[Token]) -> Sequence[Token]:
+    """What follows the name and the parameters of a routine, where the statement begins with one."""
+    for at, token in enumerate(statement):
+        if token.word in ("proc", "func", "trap", "module"):
+            depth = 0
+            for end in range(at + 1, len(statement)):
+                depth += (statement[end].text == "(") - (statement[end].text == ")")
+                following = statement[end + 1].text if end + 1 < len(statement) else ""
+                if depth == 0 and following != "(" and (statement[end].text == ")" or token.word != "func"):
+                    return without_heading(statement[end + 1 :])
+    return statement
+
+
+def without_short_condition(statement: Sequence[Token]) -> Sequence[Token]:
+    """What is done under an IF without THEN: it begins with the first name that follows upon an operand."""
+    words = [token.word if token.kind == "name" else "" for token in statement]
+    begin = len(words) - words[::-1].index("if") if "if" in words else len(words)
+    if "then" in words[begin:]:
+        return statement
+    for at in range(begin + 1, len(words)):
+        before = statement[at - 1]
+        is_operand = before.kind in ("number", "string") or before.text in (")", "]", "}")
+        is_operand = is_operand or (before.kind == "name" and before.word not in KEYWORDS - {"true", "false"})
+        if is_operand and words[at] and words[at] not in KEYWORDS:
+            return statement[at:]
+    return statement
+
+
+def assigned(statement: Sequence[Token]) -> Token | None:
+    """The name of what a statement without heading and condition gives a value, or to a part of it."""
+    for at, (token, after) in enumerate(pairwise(statement)):
+        if token.kind == "name" and token.word not in KEYWORDS:
+            is_one = after.text in (":=", ".", "{") and len(split(statement[at:], ":=")) == 2
+            if is_one or is_argument(after):
+                return token if is_one else None
+    return None
+
+
+def is_argument(token: Token) -> bool:
+    """Whether the name before a token is that of an instruction, of which the arguments begin with it."""
+    return token.word not in KEYWORDS and (token.text in ("[", "\\") or token.kind != "sign")
 
 
 def aggregate(tokens: Sequence[Token]) -> Tree:

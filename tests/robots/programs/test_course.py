@@ -62,6 +62,7 @@ UNSURE = {
     "routine with a target": (["approach p;"], 6, "approach is not followed"),
     "condition": (["IF di1=1 THEN", TO_R, "ENDIF"], 7, "stands within IF of line 6"),
     "short condition": ([f"IF di1=1 {TO_R}"], 6, "stands within IF of line 6"),
+    "short condition of two names": ([f"IF di1=high {TO_R}"], 6, "stands within IF of line 6"),
     "loop": (["FOR i FROM 1 TO 3 DO", TO_R, "ENDFOR"], 7, "stands within FOR of line 6"),
     "return": (["IF di1=1 RETURN;", TO_R], 7, "stands behind RETURN of line 6"),
     "jump": (["again:", "GOTO again;"], 5, "GOTO of line 7"),

@@ -100,6 +100,17 @@ def test_a_target_beside_another_is_named_and_the_other_corrected():
         ([GRIPPER.replace("150", "len"), robtarget("p"), "PROC main() MoveL p,v1,fine,grip;"], "in numbers"),
         (
             [
+                TABLE,
+                robtarget("p"),
+                "PROC main() measure;",
+                "MoveL p,v1,fine,tool0\\WObj:=table;",
+                "ENDPROC",
+                "PROC measure() table.oframe.trans.x:=seen;",
+            ],
+            "line 5: table is given another value by the program, which is not read",
+        ),
+        (
+            [
                 TABLE.replace("TRUE", "FALSE"),
                 robtarget("p"),
                 "PROC main() MoveL p,v1,fine,tool0\\WObj:=table;",
@@ -111,6 +122,39 @@ def test_a_target_beside_another_is_named_and_the_other_corrected():
 def test_a_frame_that_nobody_knows_is_refused_with_its_line(lines: list[str], refusal: str):
     with pytest.raises(ProgramError, match=refusal):
         rapid(*lines)
+
+
+@pytest.mark.parametrize(
+    "heading", ["PROC main()", "LOCAL PROC go(VAR num speed, PERS tooldata t\\switch on)", "TRAP stopped"]
+)
+def test_what_follows_the_heading_of_a_routine_is_read_whatever_its_parameters(heading: str):
+    move = "MoveL p,v1,fine,grip;"
+    (inside,) = rapid(GRIPPER, heading, robtarget("p"), move).targets
+    (before,) = rapid(GRIPPER, robtarget("p"), heading, move).targets
+    assert [each.tool and each.tool.name for each in (inside, before)] == ["grip", "grip"]
+
+
+@pytest.mark.parametrize(
+    "condition",
+    [
+        "flag",
+        "NOT flag",
+        "di1=high",
+        "a AND b",
+        "flag=TRUE",
+        "n=1",
+        "f(1,b)",
+        'name="x"',
+        "n{2}>m{k}",
+        "n>-1",
+    ],
+)
+def test_a_move_under_a_condition_of_one_line_has_the_tool_that_it_names(condition: str):
+    program = rapid(
+        GRIPPER, robtarget("p"), "PROC main()", f"IF {condition} MoveL p,v1,fine,grip;", "ENDPROC"
+    )
+    assert [each.tool and each.tool.name for each in program.targets] == ["grip"]
+    assert [move.line for move in program.moves] == [5]
 
 
 CONFIG = """TOOL_DATA[1]={X 0.0,Y 0.0,Z 150.0,A 0,B 0,C 0}
@@ -159,6 +203,29 @@ def test_krl_that_is_no_plain_target_is_left_alone_and_named(lines: list[str], n
 def test_krl_refuses_a_tool_that_is_not_declared():
     with pytest.raises(ProgramError, match=r"m\.src, line 1: TOOL_DATA\[3\] is not declared"):
         krl("$TOOL=TOOL_DATA[3]", f"LIN {{{POSE}}}")
+
+
+@pytest.mark.parametrize(
+    ("line", "refusal"),
+    [
+        ("$BASE.X=500", r"line 3: \$BASE.X = 500 changes a part of a frame"),
+        ("BASE_DATA[2].X=500", r"line 4: BASE_DATA\[2\] is given another value by the program"),
+        ("BASE_DATA[2]=SEEN:CUP", r"line 4: BASE_DATA\[2\] is given another value by the program"),
+        ("BASE_DATA[ n ]=SEEN", r"line 4: BASE_DATA\[2\] is given another value by the program"),
+    ],
+)
+def test_krl_refuses_a_frame_that_the_program_changes(line: str, refusal: str):
+    with pytest.raises(ProgramError, match=refusal):
+        krl("$TOOL=TOOL_DATA[1]", "$BASE=$NULLFRAME", line, "$BASE=BASE_DATA[2]", f"LIN {{{POSE}}}",
+            others=(CONFIG,))  # fmt: skip
+
+
+def test_krl_has_a_tool_for_each_of_an_array_and_leaves_alone_the_one_that_the_program_changes():
+    targets = (f"P[1]={{{POSE}}}", f"P[2]={{{POSE}}}", "$TOOL=$NULLFRAME")
+    loop = ("FOR i=1 TO 2", "PTP P[i]", "ENDFOR")
+    assert [each.name for each in krl(*targets, *loop).targets] == ["P[1]", "P[2]"]
+    assert [each.name for each in krl(*targets, *loop, "P[2].X=5").targets] == ["P[1]"]
+    assert [each.name for each in krl(*targets, *loop, "P[i].X=5").targets] == []
 
 
 @pytest.mark.parametrize(
