@@ -1,6 +1,7 @@
 """Tables in text files: lines of fields with their line numbers, for every reader of measurements.
 
-Fields are separated by ``;``, by ``,`` or by blanks, the same in the whole file; ``#`` begins a comment. What
+Fields are separated by ``;``, by ``,``, by tabulators or by blanks, the same in the whole file; ``#`` begins
+a comment. Where a tabulator stands between any two columns, there may be nothing between two of them. What
 the fields mean, their units and their ranges are checked by the reader of each kind of file, whose messages
 name file and line through `TextTable.where`.
 """
@@ -82,10 +83,15 @@ def parse_fields(text: str, name: str, has_head: bool) -> TextTable:
         kept = [(number, line) for number, line in numbered if not line.lstrip().startswith("#")]
     else:
         kept = [(number, line.split("#")[0]) for number, line in numbered]
-    kept = [(number, line.strip()) for number, line in kept if line.strip()]
+    kept = [(number, line.rstrip()) for number, line in kept if line.strip()]
     if not kept:
         raise TextTableError(f"{name}: the table is empty: there are only comments or blank lines")
-    separator = _separator([line for _, line in (kept[:1] if has_head else kept)])
+    lines = [line.strip() for _, line in kept]
+    separator = _separator(lines[:1] if has_head else lines)
+    if has_head and separator is None and _has_tabs([line for _, line in kept]):
+        separator = "\t"
+    else:
+        kept = [(number, line) for (number, _), line in zip(kept, lines, strict=True)]
     rows = []
     for number, line in kept:
         try:
@@ -103,13 +109,18 @@ def parse_fields(text: str, name: str, has_head: bool) -> TextTable:
 def finite_number(field: str, separator: str | None = None) -> float | None:
     """The number in a field; None if there is none or it is not finite.
 
-    Where ``;`` separates the fields, a decimal comma is read, too.
+    Where ``;`` or tabulators separate the fields, a decimal comma is read, too.
     """
     try:
-        value = float(field.replace(",", ".") if separator == ";" else field)
+        value = float(field.replace(",", ".") if separator in (";", "\t") else field)
     except ValueError:
         return None
     return value if math.isfinite(value) else None
+
+
+def _has_tabs(lines: Sequence[str]) -> bool:
+    """Whether a tabulator stands between any two columns of a head, and the rows below it have some, too."""
+    return all("\t" in line for line in lines) and all(name.strip() for name in lines[0].split("\t"))
 
 
 def _separator(lines: Sequence[str]) -> str | None:

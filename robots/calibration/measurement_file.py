@@ -1,7 +1,7 @@
 """Tables of measured poses as text files whose column names carry the units.
 
-One row a measurement, separated by commas or semicolons (then decimal commas are read, too), lines that begin
-with # are comments. Columns:
+One row a measurement, fields separated by commas, or by semicolons or tabulators (then decimal commas are
+read, too), lines that begin with # are comments. Columns:
 ``q1_rad`` ... ``q6_rad`` or ``q1_deg`` ...; ``x_m``, ``y_m``, ``z_m`` or ``x_mm`` ...; for the orientation
 ``qw``, ``qx``, ``qy``, ``qz``, or the ZYX Euler angles ``alpha_deg``, ``beta_deg``, ``gamma_deg`` (also in
 ``_rad``), or none of them; ``payload_kg`` if there is one; standard deviations of the row as
