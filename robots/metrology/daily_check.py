@@ -73,8 +73,8 @@ def find_drift(robot: RobotModel, q: np.ndarray, deviations: np.ndarray, noise: 
     Args:
         robot: whose kinematics are believed.
         q: the configurations in rad, (n, 6).
-        deviations: of every check's poses from those of the first check, (checks, n, 6), rotation vectors in
-            rad first, then positions in m, in world axes.
+        deviations: of every check's poses from those of the first check, itself first, (checks, n, 6),
+            rotation vectors in rad first, then positions in m, in world axes.
         noise: of a pose.
 
     Returns:
@@ -83,10 +83,11 @@ def find_drift(robot: RobotModel, q: np.ndarray, deviations: np.ndarray, noise: 
     scale = 1.0 / np.r_[np.full(3, noise.rotation), np.full(3, noise.position)]
     causes = _causes(robot, q, scale)
     scaled = (deviations * scale).reshape(len(deviations), -1)
-    means, variances = ewma(scaled, _WEIGHT)
-    for check, (mean, variance) in enumerate(zip(means, variances, strict=True)):
-        # The first check is subtracted from all, so that its noise does not average out.
-        sigma = np.sqrt(variance + 1.0)
+    means, variances = ewma(scaled[1:], _WEIGHT)
+    for check, (mean, variance) in enumerate(zip(means, variances, strict=True), 1):
+        # The first check is subtracted from all, so that its noise does not average out: it is in the mean
+        # with all weights together, which are one only after many checks.
+        sigma = np.sqrt(variance + (1.0 - (1.0 - _WEIGHT) ** check) ** 2)
         found = max((_explained(A, mean, sigma, name) for name, A in causes.items()), key=lambda x: x[1])
         if found[1] > _ALARM:
             name, significance = found

@@ -55,3 +55,24 @@ def test_a_tool_that_was_bent_by_a_fifth_of_a_millimetre_is_named():
 def test_a_month_without_change_is_silent():
     for seed in range(20):
         assert find_drift(ROBOT, Q, deviations(GeometricErrors(), 0, 30, seed), NOISE) is None
+
+
+@pytest.mark.parametrize("checks", [2, 3, 6])
+def test_a_drift_of_some_standard_deviations_has_that_significance_after_few_checks_too(checks):
+    """A zero that is off by six standard deviations of the mean of all checks is named in half of all cases.
+
+    Of its size the first check has a share, and each of the others one that grows with time.
+    """
+    weights = 0.4 * 0.6 ** np.arange(checks - 1)
+    sigma = np.sqrt(np.sum(weights**2) + np.sum(weights) ** 2)
+    column = KINEMATICS.jacobian(Q, np.zeros(48))[:, :, 2]
+    shown = np.sqrt(np.sum((column / np.r_[np.full(3, NOISE.rotation), np.full(3, NOISE.position)]) ** 2))
+    offset = np.zeros(6)
+    found = []
+    for size, seeds in ((4.0, 40), (6.0, 40)):
+        offset[2] = np.rad2deg(size * sigma / np.sum(weights) / shown)
+        errors = GeometricErrors(joint_offset_deg=offset)
+        drifts = [find_drift(ROBOT, Q, deviations(errors, 1, checks, seed), NOISE) for seed in range(seeds)]
+        found.append(np.mean([each is not None for each in drifts]))
+    assert found[0] < 0.5
+    assert found[1] > 0.5
