@@ -78,8 +78,10 @@ def error_spectrum(log: RunLog) -> tuple[np.ndarray, np.ndarray]:
     if known.sum() < 64:
         return np.empty(0), np.empty(0)
     time = log.time[on_path]
-    filled = np.stack([np.interp(time, time[known], error[known, axis]) for axis in range(3)], -1)
     period = float(np.median(np.diff(time)))
+    # Of the record of a station there is a row for each exposure alone: some are missing.
+    evenly = time[0] + period * np.arange(round((time[-1] - time[0]) / period) + 1)
+    filled = np.stack([np.interp(evenly, time[known], error[known, axis]) for axis in range(3)], -1)
     frequency, density = welch(filled, 1.0 / period, nperseg=int(_SHARE * len(filled)), axis=0)
     return frequency[1:], np.sqrt(density.sum(axis=1))[1:]
 

@@ -46,6 +46,18 @@ def test_a_vibration_is_a_peak_at_its_frequency_and_the_density_holds_its_power(
     assert np.trapezoid(density**2, frequency) == pytest.approx(0.5e-8, rel=0.02)
 
 
+def test_a_vibration_stays_at_its_frequency_where_exposures_are_missing():
+    """The record of a station has a row for each exposure; where one did not come the time went on."""
+    path = straight(TIME)
+    error = np.zeros((len(TIME), 6))
+    error[:, 4] = 1e-4 * np.sin(2.0 * np.pi * 12.0 * TIME)
+    came = np.random.default_rng(0).random(len(TIME)) > 0.1
+    tip = displaced(path, error)
+    frequency, density = error_spectrum(make_log(TIME[came], path[came], tip[came]))
+    assert frequency[np.argmax(density)] == pytest.approx(12.0, abs=0.5)
+    assert np.trapezoid(density**2, frequency) == pytest.approx(0.5e-8, rel=0.05)
+
+
 def test_samples_without_a_pose_are_left_out():
     path = straight(TIME)
     measured = displaced(path, np.array([0.0, 0.0, 0.01, 0.0, 1e-4, 0.0]))
