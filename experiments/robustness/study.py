@@ -17,6 +17,7 @@ from experiments.robustness.calibrated import calibrated_robots
 from experiments.robustness.contenders import Contender
 from experiments.robustness.mixed import Mixture
 from robots.description.model import RobotModel, load_robot
+from systems.reference.paths import make_path
 
 _NOTHING_BESIDE = Contender("open_loop", "open_loop")
 
@@ -63,13 +64,25 @@ class Trial:
         ]
 
     def load(self) -> Scenario:
-        """The scenario. Raises what `load_scenario` and `carried_over` raise."""
+        """The scenario.
+
+        Raises:
+            ValueError: if it ends before what happens in its case must be made up for, and what
+                `load_scenario` and `carried_over` raise.
+        """
         scenario = load_scenario(self.scenario, self.settings)
         robot = self.robot or self.drawn.robot
-        if robot is None:
-            return scenario
-        named = with_robot(scenario, robot)
-        return carried_over(named, load_robot(scenario.robot), load_robot(robot))[0]
+        if robot is not None:
+            named = with_robot(scenario, robot)
+            scenario = carried_over(named, load_robot(scenario.robot), load_robot(robot))[0]
+        if self.case.recovered_at is not None:
+            end = make_path(scenario.reference).duration
+            if end <= self.case.recovered_at:
+                raise ValueError(
+                    f"case {self.case.name}: the path ends at {end:.1f} s, what happens on it must be made "
+                    f"up for by {self.case.recovered_at:g} s: take a slower one, or more --laps"
+                )
+        return scenario
 
 
 def trials(

@@ -73,9 +73,11 @@ def main_effects(study: Study, rows: Rows, metric: str) -> list[Effect]:
         levels = np.unique(values)
         is_continuous = isinstance(factor, Distribution | Range) and len(levels) > _CLASSES
         if is_continuous:
-            edges = np.quantile(values, np.linspace(0.0, 1.0, _CLASSES + 1))
-            member = np.clip(np.searchsorted(edges, values, side="right") - 1, 0, _CLASSES - 1)
-            places: list[Any] = [float(np.median(values[member == i])) for i in range(_CLASSES)]
+            # Fewer classes where a value comes often, as of a distribution of whole numbers.
+            edges = np.unique(np.quantile(values, np.linspace(0.0, 1.0, _CLASSES + 1)))
+            member = np.clip(np.searchsorted(edges, values, side="right") - 1, 0, len(edges) - 2)
+            kept, member = np.unique(member, return_inverse=True)
+            places: list[Any] = [float(np.median(values[member == i])) for i in range(len(kept))]
         else:
             member = np.searchsorted(levels, values)
             places = levels.tolist()

@@ -171,6 +171,10 @@ def test_what_is_left_after_an_event_is_told(tmp_path: Path):
         (["--laws", "pbvs@calibrated,pbvs@calibrated"], "'pbvs@calibrated' is there twice"),
         (["--seeds", 0], "--seeds"),
         (["--paths", "spiral"], "spiral"),
+        (
+            ["--cases", "camera-moved", "--set", "reference.acceleration=6"],
+            "case camera-moved: the path ends at 10.6 s, what happens on it must be made up for by 11 s",
+        ),
         (["--robot", "kr17"], "kr17"),
         (["--scenario", "nowhere"], "scenario 'nowhere': no file"),
     ],

@@ -95,6 +95,18 @@ def test_the_main_effect_is_the_mean_over_all_other_factors(ishigami):
     np.testing.assert_allclose(effect.mean, expected, atol=0.5)
 
 
+@pytest.mark.filterwarnings("error")
+def test_a_factor_of_whole_numbers_has_a_class_for_each_that_comes_often():
+    study = Study(
+        laws=["pbvs"], design=LatinHypercube(64), factors={"a": Distribution("poisson", {"mu": 4.0})}
+    )
+    values = np.array([point["a"] for point in design_points(study.factors, study.design, 0)])
+    (effect,) = main_effects(study, {"a": values, "max_norm_mm": 2.0 * values}, "max_norm_mm")
+    assert len(np.unique(values)) > 8 >= len(effect.values) > 4
+    assert np.isfinite(effect.mean).all()
+    assert np.all(np.diff(effect.mean) > 0.0)
+
+
 def test_a_scheduler_keeps_workers_busy_until_their_jobs_ask_more_of_it_than_it_has():
     assert busy_share(workers=10, job_time=1.0, handling=1e-3) > 0.95
     # 1000 workers with jobs of 0.5 s want 2000 jobs/s of a scheduler that gives 1000.
