@@ -25,7 +25,7 @@ from robots.programs.program import (
     quaternion_problem,
 )
 
-_UNITS = {"mm": MILLIMETRE, "m": 1.0, "deg": DEGREE, "rad": 1.0, "": 1.0}
+_UNITS = {"mm": MILLIMETRE, "m": 1.0, "deg": DEGREE, "rad": 1.0}
 _POSITION, _QUATERNION, _EULER = ("x", "y", "z"), ("qw", "qx", "qy", "qz"), ("alpha", "beta", "gamma")
 _NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?")
 _LEFT = ", row left alone"
@@ -36,7 +36,8 @@ def read_pose_table(source: Source, context: ProgramContext) -> Program:
     """Reads a table.
 
     Raises:
-        ProgramError: if columns are missing, twice there, or of both kinds, or if no row is one of numbers.
+        ProgramError: if columns are missing, twice there (in two units, too), or of both kinds, or if no row
+            is one of numbers.
     """
     if context.others or context.tool or context.base:
         raise ProgramError(f"{source.name}: a table knows the tool of the robot file only, and the world")
@@ -71,11 +72,17 @@ def _header(source: Source, line: int, text: str, separator: str) -> dict[str, i
     if twice:
         raise ProgramError(f"{where}: column {min(twice)} is there twice")
     columns = {name: number for number, name in enumerate(names)}
-    has_pose, has_joints = (any(_column(columns, role) for role in roles) for roles in (_POSITION, JOINTS))
-    if has_pose and has_joints:
+    of_pose, joints = (
+        [name for role in roles for name in _names(role) if name in columns]
+        for roles in (_POSITION + _QUATERNION + _EULER, JOINTS)
+    )
+    if of_pose and joints:
         raise ProgramError(
             f"{where}: the table has poses and joint positions; which of them is to be corrected?"
         )
+    surplus = _second(columns)
+    if surplus:
+        raise ProgramError(f"{where}: {surplus} say the same; which of them is to be corrected?")
     roles = _needed(columns)
     missing = [role for role in roles if _column(columns, role) is None]
     if missing:
@@ -91,14 +98,28 @@ def _needed(columns: Mapping[str, int]) -> tuple[str, ...]:
     return _POSITION + (_QUATERNION if "qw" in columns else _EULER)
 
 
+def _second(columns: Mapping[str, int]) -> str:
+    """Two columns of which only one would be corrected: of two units, or both kinds of orientation."""
+    for role in _POSITION + _EULER + JOINTS:
+        there = [name for name in _names(role) if name in columns]
+        if len(there) > 1:
+            return " and ".join(there)
+    euler = [name for role in _EULER for name in _names(role) if name in columns]
+    quaternion = [name for name in _QUATERNION if name in columns]
+    return f"{quaternion[0]} and {euler[0]}" if quaternion and euler else ""
+
+
+def _names(role: str) -> dict[str, float]:
+    """Names that a column may have, with the unit of each."""
+    if role in _QUATERNION:
+        return {role: 1.0}
+    units = ("mm", "m") if role in _POSITION else ("deg", "rad")
+    return {f"{role}_{unit}": _UNITS[unit] for unit in units}
+
+
 def _column(columns: Mapping[str, int], role: str) -> tuple[int, float] | None:
     """Place and unit of a column; None if there is none."""
-    units = ("",) if role in _QUATERNION else ("mm", "m") if role in _POSITION else ("deg", "rad")
-    for unit in units:
-        name = f"{role}_{unit}" if unit else role
-        if name in columns:
-            return columns[name], _UNITS[unit]
-    return None
+    return next(((columns[name], unit) for name, unit in _names(role).items() if name in columns), None)
 
 
 def _row(

@@ -228,11 +228,19 @@ def test_krl_has_a_tool_for_each_of_an_array_and_leaves_alone_the_one_that_the_p
     assert [each.name for each in krl(*targets, *loop, "P[i].X=5").targets] == []
 
 
+JOINT_HEAD = "q1_deg,q2_deg,q3_deg,q4_deg,q5_deg,q6_deg"
+POSE_HEAD = "x_mm,y_mm,z_mm,qw,qx,qy,qz"
+
+
 @pytest.mark.parametrize(
     ("text", "refusal"),
     [
         ("x_mm,y_mm\n1,2\n", "line 1: column z is missing"),
         ("x_mm,y_mm,z_mm,qw,qx,qy,qz,q1_deg\n", "poses and joint positions"),
+        (f"{JOINT_HEAD},beta_deg\n1,2,3,4,5,6,7\n", "poses and joint positions"),
+        (f"{JOINT_HEAD},q2_rad\n1,2,3,4,5,6,7\n", "line 1: q2_deg and q2_rad say the same"),
+        (f"{POSE_HEAD},x_m\n1,2,3,1,0,0,0,0.001\n", "line 1: x_mm and x_m say the same"),
+        (f"{POSE_HEAD},alpha_deg\n1,2,3,1,0,0,0,0\n", "line 1: qw and alpha_deg say the same"),
         ("q1_deg,q2_deg,q3_deg,q4_deg,q5_deg,q6_deg\na,b,c,d,e,f\n", "no row of numbers"),
     ],
 )
