@@ -28,11 +28,18 @@ def body_zeros(path: Path, load: float) -> Example:
     for node, each in zeros.items():
         slowest = "-" if each.slowest_rhp is None else f"{each.slowest_rhp:.4g}"
         rows.append([f"{node + 1}", f"{away[node]:.4f}", slowest])
-    unstable = [node for node, each in zeros.items() if not each.is_minimum_phase]
-    end = f"node {unstable[0] + 1} on, {away[unstable[0]]:.3f} m from the joint" if unstable else "no node on"
+    # Finite-element programs number nodes in any order.
+    unstable = sorted(
+        (node for node, each in zeros.items() if not each.is_minimum_phase), key=away.__getitem__
+    )
+    outputs = f"{len(unstable)} of {len(zeros)} nodes as its output" if unstable else "no node as its output"
+    nearest = (
+        f", the nearest is node {unstable[0] + 1}, {away[unstable[0]]:.3f} m from it" if unstable else ""
+    )
     verdict = (
         f"{path.name}: {len(hertz)} modes from {hertz[0]:.4g} Hz, {body.mass:.4g} kg and {load:g} kg at the "
-        f"last of {len(away)} nodes; turned by a joint about z, the exact inverse is unstable from {end}."
+        f"last of {len(away)} nodes; turned by a joint about z, the exact inverse is unstable with {outputs}"
+        f"{nearest}."
     )
     last = zeros[max(zeros)]
     note = "Across the line from the joint to the node; - where the inverse is stable."

@@ -11,6 +11,8 @@ from scipy.linalg import eigh
 
 from robots.dynamics.transmission_zeros import Zeros, transmission_zeros
 
+_ROUNDING = 1e-9  # of the largest, up to which a place is on the axis and a mode moves nothing
+
 
 @dataclass(frozen=True)
 class FlexibleBody:
@@ -71,12 +73,29 @@ class FlexibleBody:
         across = np.cross([0.0, 0.0, 1.0], self.places[node]) / lever
         return np.append(lever, across @ self.shapes[node])
 
+    def input_column(self) -> np.ndarray:
+        """What the torque of a joint about z acts on: the frame, and modes that turn the node at the joint.
+
+        Shape (1 + n, 1). Without a node on the axis, or without `turns`, the joint turns the frame alone.
+
+        Raises:
+            ValueError: if modes move the node at the joint, which the joint would hold.
+        """
+        B = np.eye(1 + len(self.Me), 1)
+        away = np.hypot(self.places[:, 0], self.places[:, 1])
+        at_joint = int(np.argmin(away))
+        if away[at_joint] > _ROUNDING * away.max():
+            return B
+        if np.abs(self.shapes[at_joint, :2]).max() > _ROUNDING * np.abs(self.shapes).max():
+            raise ValueError(f"flexible body: modes move node {at_joint + 1}, which the joint holds")
+        if self.turns is not None:
+            B[1:, 0] = self.turns[at_joint, 2]
+        return B
+
     def zeros(self, node: int = -1, load: float = 0.0) -> Zeros:
         """From the torque of a joint about z to `output`; the load is at the last node."""
         M, D, K = self.turned(load)
-        B = np.zeros((len(M), 1))
-        B[0] = 1.0
-        return transmission_zeros(M, D, K, B, self.output(node)[None])
+        return transmission_zeros(M, D, K, self.input_column(), self.output(node)[None])
 
     def _lever(self, node: int) -> float:
         lever = float(np.hypot(*self.places[node, :2]))

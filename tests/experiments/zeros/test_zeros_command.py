@@ -1,6 +1,7 @@
 """truetip zeros: numbers as published, pages that open, wrong input in one line."""
 
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -122,6 +123,17 @@ def test_a_body_of_a_file_on_a_joint(tmp_path: Path):
     assert numbers["nodes"]["3"] is None  # a quarter of the way
     assert numbers["nodes"]["9"] == numbers["slowest_rhp"] > 0.0
     assert (tmp_path / "zeros.html").exists()
+
+
+def test_nodes_of_a_body_may_be_in_any_order(tmp_path: Path):
+    """The nearest node with an unstable inverse is named, not the first one of the file."""
+    beam = beam_body(2.0, 3.0, 500.0, 8, 3)
+    order = [0, 7, 6, 5, 4, 3, 2, 1, 8]
+    shuffled = replace(beam, places=beam.places[order], shapes=beam.shapes[order], turns=None)
+    (tmp_path / "beam.sid").write_text(sid_text(shuffled))
+    result = run(tmp_path, f"--body={tmp_path / 'beam.sid'}", "--payload=1.35")
+    words = " ".join(result.output.split())
+    assert "unstable with 6 of 8 nodes as its output, the nearest is node 6, 0.750 m from it" in words
 
 
 REFUSED = {

@@ -40,6 +40,34 @@ def test_on_a_joint_it_has_the_zeros_of_the_modal_beam():
     assert mesh.zeros(6, 1.35).is_minimum_phase  # a quarter of the way, below 0.309
 
 
+def supported_body(num_modes: int) -> FlexibleBody:
+    """A uniform beam of 1 m and 1 kg whose modes turn it at the joint, integrated over its nodes."""
+    beam = ModalBeam(load=0.0, num_modes=num_modes, boundary="supported")
+    M, K, x = beam.mass_matrix(), beam.stiffness_matrix(), np.linspace(0.0, 1.0, 11)
+    shapes, turns = np.zeros((2, len(x), 3, num_modes))
+    shapes[:, 1], turns[:, 2] = beam.displacement(x)[:, 1:], beam.slope(x)
+    Cr = np.zeros((num_modes, 3))
+    Cr[:, 2] = M[0, 1:]
+    none, inertia = np.zeros_like(K[1:, 1:]), np.diag([0.0, M[0, 0], M[0, 0]])
+    places, first = np.column_stack([x, 0.0 * x, 0.0 * x]), np.array([0.5, 0.0, 0.0])
+    return FlexibleBody(1.0, places, shapes, first, inertia, 0.0 * Cr, Cr, M[1:, 1:], K[1:, 1:], none, turns)
+
+
+@pytest.mark.parametrize(("node", "is_stable"), [(2, True), (-1, False)])
+def test_the_torque_of_the_joint_also_acts_on_modes_that_turn_the_body_there(node: int, is_stable: bool):
+    body, beam = supported_body(3), ModalBeam(num_modes=3, boundary="supported")
+    zeros, expected = body.zeros(node, load=0.45), beam.zeros(float(body.places[node, 0]))
+    np.testing.assert_allclose(np.sort(np.abs(zeros.values)), np.sort(np.abs(expected.values)), rtol=1e-6)
+    assert zeros.is_minimum_phase == expected.is_minimum_phase == is_stable
+
+
+def test_modes_that_move_the_node_at_the_joint_are_refused():
+    shapes = BEAM.shapes.copy()
+    shapes[0, 1, 2] = 0.1
+    with pytest.raises(ValueError, match="modes move node 1, which the joint holds"):
+        replace(BEAM, shapes=shapes).zeros()
+
+
 def test_kinetic_energy_of_a_rigid_turn_is_that_of_the_body_and_its_load():
     mass, _, stiffness = BEAM.turned(load=0.5)
     assert mass[0, 0] == pytest.approx(3.0 * 2.0**2 / 3.0 + 0.5 * 2.0**2)
