@@ -34,13 +34,15 @@ def kept_points(x: np.ndarray, y: np.ndarray, most: int = MOST_POINTS) -> np.nda
 
 
 def _extremes(y: np.ndarray, most: int) -> np.ndarray:
-    """First, last, smallest and largest index of each of ``most`` / 4 stretches; gaps stay."""
+    """First, last, smallest and largest index of each of ``most`` / 4 stretches, and of its first gap."""
     edges = np.linspace(0, len(y), most // 4 + 1).astype(int)
-    finite = np.where(np.isfinite(y), y, np.inf)
+    is_known = np.isfinite(y)
+    low, high = np.where(is_known, y, np.inf), np.where(is_known, y, -np.inf)
     found: list[int] = []
     for start, end in pairwise(edges.tolist()):
-        piece = finite[start:end]
-        found += [start, start + int(np.argmin(piece)), start + int(np.argmax(piece)), end - 1]
+        own = slice(start, end)
+        found += [start + int(np.argmin(part)) for part in (low[own], -high[own], is_known[own])]
+        found += [start, end - 1]
     return np.unique(found)
 
 

@@ -104,8 +104,8 @@ def verdict(summary: Mapping[str, Any]) -> str:
         )
     else:
         course = (
-            f"brings {tip}, up to {_text(numbers['max_norm_mm'])} mm off at the start, "
-            f"within 5 % of that in {_text(numbers['settling_s'])} s"
+            f"keeps {tip} within {_text(numbers['max_norm_mm'])} mm of the wanted path, within 5 % of the "
+            f"distance at the start after {_text(numbers['settling_s'])} s,"
         )
     text = (
         f"{law_title(best)} {course} and comes to rest "

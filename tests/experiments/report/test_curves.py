@@ -34,6 +34,19 @@ def test_a_peak_of_one_sample_is_not_lost():
     assert len(keep) <= MOST_POINTS
 
 
+@pytest.mark.parametrize("peak", [50.0, -50.0])
+def test_nor_is_one_beside_a_gap(peak: float):
+    x = np.arange(30000.0)
+    y = np.sin(1e-3 * x)
+    y[::40] = np.nan
+    for place in range(17001, 17039):
+        peaked = y.copy()
+        peaked[place] = peak
+        keep = kept_points(x, peaked)
+        assert place in keep
+        assert np.isnan(peaked[keep]).sum() >= MOST_POINTS // 4
+
+
 def test_a_loop_keeps_its_corners():
     there = np.linspace(0.0, 1.0, 100)
     x = np.concatenate([there, there[::-1]])
