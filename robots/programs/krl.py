@@ -55,6 +55,7 @@ class _State:
     tool: Frame | None = None
     base: Frame | None = None
     load: float | None = None  # kg
+    is_at_rest: bool = False  # whether the tool stands still and the robot carries the workpiece
 
 
 @dataclass
@@ -165,6 +166,8 @@ class _Reader:
             number = re.fullmatch(r"TOOL_DATA\[\s*(\d+)\s*\]", value, re.IGNORECASE)
             if number:
                 self._state = replace(self._state, load=self._load(int(number[1])))
+        elif name == "$IPO_MODE":
+            self._state = replace(self._state, is_at_rest=value.upper() == "#TCP")
         elif name == "$LOAD":
             found = aggregate(line, at) if value.startswith("{") else self._values.get(value.upper())
             mass = found.numbers.get("M") if found else None
@@ -172,7 +175,8 @@ class _Reader:
                 raise ProgramError(f"{line.where}: the mass of {value} is not known; --with FILE reads it")
             self._state = replace(self._state, load=mass.value)
         elif name == "FDAT_ACT" and value.upper() in self._values:
-            self._state = self._of_fdat(self._values[value.upper()]) or self._state
+            found = self._of_fdat(self._values[value.upper()])
+            self._state = found or replace(self._state, is_at_rest=True)
         elif name := _changed(line):
             self._course.assign(name)
             for each in [each for each in self._places if _is_of(each, name)]:
@@ -259,7 +263,8 @@ class _Reader:
             return
         fdat = self._fdat(place) if place else None
         state = self._of_fdat(fdat) if fdat else self._state
-        why = why or ("" if state else "belongs to a tool that stands still, which is not followed")
+        if state is None or state.is_at_rest:
+            why = why or "belongs to a tool that stands still, which is not followed"
         state = state or self._state
         has_tool = place is not None and ("q1" in place.numbers or state.tool is not None)
         why = why or not_followed(line.code, text, place is not None, has_tool)
@@ -278,12 +283,14 @@ class _Reader:
         fdat = self._fdat(place)
         if fdat:
             state = self._of_fdat(fdat)
-            if state is None:
-                self._note(place.line, f"{place.name} belongs to a tool that stands still, left alone")
-                return None
-            uses = [(fdat.line, state)]
+            uses = [(fdat.line, state or _State(is_at_rest=True))]
         else:
-            uses = [(line, state) for line, state in place.uses if state.tool is not None]
+            uses = place.uses
+        if any(state.is_at_rest for _, state in uses):
+            name = place.name or "the target"
+            self._note(place.line, f"{name} belongs to a tool that stands still, left alone")
+            return None
+        uses = [(line, state) for line, state in uses if state.tool is not None]
         if not uses and self._context.tool:
             uses = [(place.line, self._by_default(place.line))]
         if not uses:

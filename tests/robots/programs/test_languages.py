@@ -192,12 +192,21 @@ def test_an_inline_position_has_the_tool_that_the_text_has_set():
         (["$TOOL=$NULLFRAME", "LIN_REL {X 5}"], "by a distance"),
         ([f"LIN {{{POSE}}}"], "nothing says the tool"),
         (["$TOOL=$NULLFRAME", f"P1={{{POSE}}}", "P1.X=P1.X+1", "LIN P1"], "given another value"),
+        (["$TOOL=$NULLFRAME", "$IPO_MODE = #tcp", f"LIN {{{POSE}}}"], "a tool that stands still"),
+        (["FP1={TOOL_NO 1,BASE_NO 0,IPO_FRAME #TCP}", "FDAT_ACT=FP1", f"LIN {{{POSE}}}"], "stands still"),
     ],
 )
 def test_krl_that_is_no_plain_target_is_left_alone_and_named(lines: list[str], note: str):
     program = krl(*lines)
     assert not program.targets
     assert [note in each.text for each in program.notes] == [True]
+
+
+def test_krl_follows_a_tool_that_the_robot_carries_again():
+    lines = ("$TOOL=$NULLFRAME", "$IPO_MODE=#TCP", f"LIN {{{POSE}}}", "$IPO_MODE=#BASE", f"LIN {{{POSE}}}")
+    program = krl(*lines)
+    assert [target.line for target in program.targets] == [5]
+    assert ["stands still" in move.why_not for move in program.moves] == [True, False]
 
 
 def test_krl_refuses_a_tool_that_is_not_declared():
