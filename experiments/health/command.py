@@ -145,7 +145,9 @@ def _in_words(alarm: dict[str, Any]) -> str:
     if not alarm["sigma"]:  # whether, not by how much
         return f"{alarm['what']} since day {round(day, 3):g}: {alarm['suggestion']}"
     scatter = float(f"{sigma:.1g}")
-    said = f"{alarm['what']} changed by {abs(size):.3g} ± {scatter:g} {unit} on day {round(day, 3):g}"
+    others = alarm.get("perhaps", [])  # a history from before has none
+    like = f" (or {', '.join(others)}, which would look much the same)" if others else ""
+    said = f"{alarm['what']}{like} changed by {abs(size):.3g} ± {scatter:g} {unit} on day {round(day, 3):g}"
     return f"{said}: {alarm['suggestion']}"
 
 

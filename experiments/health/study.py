@@ -196,7 +196,8 @@ class HealthStudy:
         if drift is not None:
             kind = TOOL if drift.what == TOOL else "joint zero"
             onset = float(history.time[drift.onset] - history.time[0])
-            found[drift.what] = _alarm(kind, drift.what, onset, drift.size, drift.sigma)
+            alarm = _alarm(kind, drift.what, onset, drift.size, drift.sigma)
+            found[drift.what] = alarm | {"perhaps": list(drift.perhaps)}
         return list(found.values())
 
     def _changed(self, injected: Injected, is_new: bool) -> CameraTurn | BentArm | None:
@@ -256,4 +257,5 @@ def _alarm(kind: str, what: str, onset: float, size: float, sigma: float) -> dic
         "sigma": sigma,
         "unit": unit,
         "suggestion": _SUGGESTIONS[kind],
+        "perhaps": [],
     }

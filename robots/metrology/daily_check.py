@@ -1,11 +1,12 @@
 """A short check of a robot: a few poses, whose deviations from the first check tell what has changed.
 
 Deviations of the poses are tried against one cause at a time: each joint's zero, and a shift of the tool.
-The cause that explains most is named. Six poses cannot tell all causes apart at once, but tell a single one.
+The cause that explains most is named. Six poses cannot tell all causes apart at once, but tell a single one;
+of two that look much alike, such as the zeros of joints 2 and 3, only where it is large. Else both are named.
 """
 
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -18,6 +19,9 @@ TOOL = "tool"
 _CANDIDATES = 300
 _ALARM = 5.0  # standard deviations
 _WEIGHT = 0.4  # of the newest check
+# Squares of standard deviations by which another cause must explain less to be ruled out. The true cause
+# falls behind one that resembles it by so much with a chance below that of three of them, 0.13 %.
+_APART = 9.0
 
 
 @dataclass(frozen=True)
@@ -38,6 +42,7 @@ class Drift:
     significance: float  # how many standard deviations the size is from zero
     check: int  # the check at which it became significant
     onset: int  # the check since which the deviations of the cause are beyond their noise
+    perhaps: tuple[str, ...] = ()  # causes that explain the deviations about as well, the best first
 
 
 def check_poses(
@@ -88,10 +93,12 @@ def find_drift(robot: RobotModel, q: np.ndarray, deviations: np.ndarray, noise: 
         # The first check is subtracted from all, so that its noise does not average out: it is in the mean
         # with all weights together, which are one only after many checks.
         sigma = np.sqrt(variance + (1.0 - (1.0 - _WEIGHT) ** check) ** 2)
-        found = max((_explained(A, mean, sigma, name) for name, A in causes.items()), key=lambda x: x[1])
-        if found[1] > _ALARM:
-            name, significance = found
-            return _sized(name, causes[name], scaled, check, significance)
+        squares = {name: _explained(A, mean, sigma) for name, A in causes.items()}
+        significance = {name: _deviate(square, causes[name].shape[1]) for name, square in squares.items()}
+        name = max(significance, key=significance.__getitem__)
+        if significance[name] > _ALARM:
+            found = _sized(name, causes[name], scaled, check, significance[name])
+            return replace(found, perhaps=_like(name, squares, causes))
     return None
 
 
@@ -115,27 +122,38 @@ def _causes(robot: RobotModel, q: np.ndarray, scale: np.ndarray) -> dict[str, np
     return {name: (A * scale[:, None]).reshape(-1, A.shape[2]) for name, A in causes.items()}
 
 
-def _explained(A: np.ndarray, mean: np.ndarray, sigma: float, name: str) -> tuple[str, float]:
-    """The name of a cause, and how many standard deviations its size is from zero.
+def _explained(A: np.ndarray, mean: np.ndarray, sigma: float) -> float:
+    """By how much a cause lowers the sum of squares of a mean of deviations, in units of their variance."""
+    return float(np.square(A @ np.linalg.lstsq(A, mean, rcond=None)[0]).sum()) / sigma**2
 
-    Of a cause with k parameters it is the normal deviate with the same chance, by Wilson and Hilferty.
+
+def _deviate(square: float, k: int) -> float:
+    """How many standard deviations a cause with k parameters is from zero.
+
+    For more than one it is the normal deviate with the same chance, by Wilson and Hilferty.
     """
-    x = np.linalg.lstsq(A, mean, rcond=None)[0]
-    square, k = float(np.square(A @ x).sum()) / sigma**2, A.shape[1]
     if k == 1:
-        return name, np.sqrt(square)
-    return name, ((square / k) ** (1 / 3) - (1 - 2 / (9 * k))) / np.sqrt(2 / (9 * k))
+        return np.sqrt(square)
+    return ((square / k) ** (1 / 3) - (1 - 2 / (9 * k))) / np.sqrt(2 / (9 * k))
+
+
+def _like(name: str, squares: Mapping[str, float], causes: Mapping[str, np.ndarray]) -> tuple[str, ...]:
+    """The causes that are not ruled out beside one, the best first; each parameter explains one by chance."""
+    net = {each: square - causes[each].shape[1] for each, square in squares.items()}
+    others = [each for each in net if each != name and net[name] - net[each] < _APART]
+    return tuple(sorted(others, key=net.__getitem__, reverse=True))
 
 
 def _sized(name: str, A: np.ndarray, scaled: np.ndarray, check: int, significance: float) -> Drift:
     """Onset and size of a cause, from the checks one by one."""
     sizes = scaled[: check + 1] @ np.linalg.pinv(A).T  # (checks, parameters)
-    sigma = float(np.sqrt(2.0 * np.linalg.inv(A.T @ A).diagonal().max()))  # of a difference of two checks
+    of_one = float(np.sqrt(np.linalg.inv(A.T @ A).diagonal().max()))
     length = np.linalg.norm(sizes, axis=1)
-    beyond = length > 3.0 * sigma
+    beyond = length > 3.0 * np.sqrt(2.0) * of_one  # of a difference of two checks
     onset = check
     while onset > 0 and beyond[onset - 1]:
         onset -= 1
     mean = sizes[onset:].mean(axis=0)
     size = float(mean[0]) if A.shape[1] == 1 else float(np.linalg.norm(mean))
+    sigma = of_one * float(np.sqrt(1.0 + 1.0 / (check + 1 - onset)))  # of a mean less the first check
     return Drift(name, size, sigma, significance, check, onset)
