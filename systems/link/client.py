@@ -17,6 +17,8 @@ class LinkClient(Generic[Report]):
 
     def poll(self, timeout: float = 0.0) -> Report | None:
         """The newest report that has come since the last call, waiting for at most ``timeout`` in s."""
+        # Not by the message that ends it: that may have come together with those that were refused.
+        self.session.forget_trouble()
         if not self.channel.wait(timeout):
             self.session.check(steady_time())
             return None

@@ -109,6 +109,7 @@ class LinkSession(Generic[Report]):
         self.last: Report | None = None
         self.heard = -math.inf  # when anything last came from the controller, also what is refused
         self.trouble = ""  # why its newest messages are refused, or were until commands had to start anew
+        self._is_over = True  # whether a message has followed another since there was trouble
         self._speed, self._break_after, self._host = np.asarray(largest_speed).tolist(), break_after, host
         self._period = period
         self._heard = -math.inf
@@ -143,6 +144,11 @@ class LinkSession(Generic[Report]):
         self._accept(report, sender, now)
         self._last_data = data
         return report
+
+    def forget_trouble(self) -> None:
+        """Before more is read: trouble that was over by then is no longer told of."""
+        if self._is_over:
+            self.trouble = ""
 
     def check(self, now: float) -> None:
         """Notes a silence that has become too long."""
@@ -218,12 +224,13 @@ class LinkSession(Generic[Report]):
         )
         if 0 < ahead <= _LARGEST_GAP and 0.0 <= passed <= _LARGEST_WAIT and is_plausible:
             self.counters.missing += ahead - 1
-            self.trouble = ""
+            self._is_over = True
             return True
         is_late = -_LARGEST_GAP <= ahead < 0 and passed <= 0.0
         if self.link is not Link.BROKEN and not (is_late and self._candidates < _CONFIRMATIONS):
             since = self._period * ahead if 0 < ahead <= _LARGEST_GAP else 0.0
             self.trouble = _trouble(report, ahead, passed, since, max(moves, key=abs))
+            self._is_over = False
         if self.link is Link.BROKEN or self._is_confirmed(
             report, _MANY_CONFIRMATIONS if is_late else _CONFIRMATIONS
         ):
