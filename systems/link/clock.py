@@ -20,15 +20,22 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from robots.configuration.quantity import positive, quantity
+
+_FEWEST_FOR_DRIFT = 5  # bins: before, a slope says more of the jitter than of the clocks
+
 
 @dataclass
 class ClockConfig:
     """Parameters of the mapping; read from a scenario file."""
 
-    smallest_delay: float = 0.0  # s, from the exposure to its arrival over an idle line
-    bin_length: float = 1.0  # s of station time
-    horizon: int = 60  # bins that are remembered; older ones no longer speak for the present drift
-    step: float = 0.02  # s: a second of frames this much off shows that a clock was set anew
+    # From the exposure to its arrival over an idle line
+    smallest_delay: float = quantity(0.0, 0.0, unit="s")
+    bin_length: float = positive(1.0, "s")  # of station time
+    # Bins that are remembered; older ones no longer speak for the present drift
+    horizon: int = quantity(60, _FEWEST_FOR_DRIFT)
+    # A second of frames this much off shows that a clock was set anew
+    step: float = positive(0.02, "s")
 
 
 @dataclass(frozen=True)
@@ -46,7 +53,6 @@ class ClockQuality:
 
 _EARLY, _LOW, _JITTER = 2.0, 10.0, (50.0, 95.0, 99.0)  # percentiles
 _FEWEST = 20  # frames of a bin: fewer say nothing of an idle line
-_FEWEST_FOR_DRIFT = 5  # bins: before, a slope says more of the jitter than of the clocks
 _SAME_DRIFT = 1e-5  # bins are summed up along the drift known at the time; a change below this leaves them
 
 

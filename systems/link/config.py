@@ -11,6 +11,7 @@ from robots.configuration.quantity import quantity
 from robots.description.model import Placement, RobotModel
 from systems.link.protocols import RobotLink, VirtualController, Wire
 from systems.link.qualisys.maker import Qualisys
+from systems.link.udp_channel import ipv4_address
 from systems.reference.cartesian_path import CartesianPath
 
 
@@ -38,10 +39,15 @@ class LinkConfig:
     tool_frame: Placement = field(default_factory=Placement)  # of the tool in the body that the camera tracks
 
     def wire(self, period: float, any_port: bool = False) -> Wire:
-        """Where to wait for the controller, whose cycle is ``period`` in s; if wanted, on any free port."""
+        """Where to wait for the controller, whose cycle is ``period`` in s; if wanted, on any free port.
+
+        Raises:
+            ChannelError: if the controller is named and has no address.
+        """
+        controller = ipv4_address("station.link.controller", self.controller) if self.controller else ""
         signal_port = (0 if any_port else self.signal_port) if self.signal_port else None
         return Wire(
-            self.address, 0 if any_port else self.port, self.controller, self.break_after, period, signal_port
+            self.address, 0 if any_port else self.port, controller, self.break_after, period, signal_port
         )
 
     def check(self) -> None:

@@ -20,6 +20,22 @@ def is_loopback(address: str) -> bool:
         return address == "localhost"
 
 
+def ipv4_address(whose: str, address: str) -> str:
+    """The address of a machine by its name or address, as datagrams from it have it.
+
+    Args:
+        whose: for the message.
+        address: a name or an address.
+
+    Raises:
+        ChannelError: if it has none of IPv4, the one that controllers speak.
+    """
+    try:
+        return socket.gethostbyname(address)
+    except (OSError, UnicodeError) as error:
+        raise ChannelError(f"{whose}: no IPv4 address is known for '{address}'") from error
+
+
 class Buffering(Enum):
     """Which of several queued datagrams are used, Probst (2024), table A.5."""
 

@@ -13,6 +13,7 @@ import socket
 import time
 from dataclasses import dataclass
 
+from robots.configuration.quantity import choice, positive, quantity
 from systems.link.qualisys.conversation import Conversation, MocapError, State
 from systems.link.qualisys.datagrams import Arrival, Counters, DatagramReceiver
 from systems.link.qualisys.messages import (
@@ -28,6 +29,7 @@ from systems.link.qualisys.messages import (
 )
 from systems.link.qualisys.parameters import ParameterError
 from systems.link.qualisys.stream_request import StreamRequest
+from systems.link.udp_channel import ChannelError, ipv4_address
 
 _CHUNK = 1 << 16  # bytes read at once
 _MOST_PACKETS = 200  # taken in one poll, lest a flood of tiny ones holds the loop
@@ -41,13 +43,16 @@ class MocapConfig:
 
     body: str = "tool"  # name of the rigid body, as the server knows it
     address: str = "127.0.0.1"  # of the server
-    port: int = PORT  # of the server; 22223 is the one on which it speaks little-endian
-    transport: str = "udp"  # or "tcp"
-    udp_port: int = 0  # own port for the frames, for a firewall that wants a certain one; 0: any free one
-    component: str = "6DRes"  # or "6D": without the residual
-    frequency: int | None = None  # Hz; None: every frame
-    timeout: float = 2.0  # s for an answer, and of silence before the server is asked whether it lives
-    retry: float = 1.0  # s between attempts to connect
+    # Of the server; 22223 is the one on which it speaks little-endian. 0: any free one, of a virtual server
+    port: int = quantity(PORT, 0, 65535)
+    transport: str = choice("udp", ("udp", "tcp"))
+    # Own port for the frames, for a firewall that wants a certain one; 0: any free one
+    udp_port: int = quantity(0, 0, 65535)
+    component: str = choice("6DRes", COMPONENT_NAMES)  # 6D is without the residual
+    frequency: int | None = quantity(None, 1, unit="Hz")  # None: every frame
+    # For an answer, and of silence before the server is asked whether it lives
+    timeout: float = positive(2.0, "s")
+    retry: float = positive(1.0, "s")  # between attempts to connect
 
 
 class MocapClient:
@@ -57,14 +62,12 @@ class MocapClient:
         """Checks the configuration; the first `poll` connects.
 
         Raises:
-            ValueError: if an entry is not one of those allowed, or the address is not known.
+            ValueError: if an entry is not one of those allowed.
+            ChannelError: if the address is not known, or there is no port.
         """
         _check(config)
         self._config = config
-        try:
-            self._host = socket.gethostbyname(config.address)
-        except OSError as error:
-            raise ValueError(f"camera server: no address is known for '{config.address}'") from error
+        self._host = ipv4_address("camera server", config.address)
         self.counters = Counters()
         self.last_error = ""
         self._tcp: socket.socket | None = None
@@ -257,7 +260,7 @@ def _check(config: MocapConfig) -> None:
         allowed = " or ".join(COMPONENT_NAMES)
         raise ValueError(f"camera server: component must be {allowed}, got '{config.component}'")
     if not (0 < config.port < 65536 and 0 <= config.udp_port < 65536):
-        raise ValueError(
+        raise ChannelError(
             f"camera server: port must be 1 to 65535 and udp_port 0 to 65535, got {config.port} and "
             f"{config.udp_port}"
         )

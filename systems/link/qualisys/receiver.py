@@ -9,6 +9,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from pydrake.math import RigidTransform, RotationMatrix
 
+from robots.configuration.quantity import positive
 from systems.link.clock import ClockConfig, ClockQuality, StampClock
 from systems.link.qualisys.client import MocapClient, MocapConfig
 from systems.link.qualisys.conversation import State
@@ -26,7 +27,8 @@ class MocapReceiverConfig:
 
     server: MocapConfig = field(default_factory=MocapConfig)
     clock: ClockConfig = field(default_factory=ClockConfig)
-    oldest: float = 1.0  # s between exposure and arrival: a sample older than that is not valid
+    # Between exposure and arrival: a sample older than that is not valid
+    oldest: float = positive(1.0, "s")
 
 
 @dataclass

@@ -54,6 +54,13 @@ REFUSED = {
     "compare --set =3": "--set =3: must look like station.camera.delay=0.008",
     "compare --set station.payload=": "--set station.payload=: station.payload must be a number, got",
     'compare --set "station.payload=[1"': "--set station.payload=[1: no valid YAML: expected ',' or ']',",
+    "run --set station.link.camera.server.transport=pigeon": "server.transport must be one of udp, tcp",
+    "run --set station.link.camera.server.udp_port=70000": "udp_port must be between 0 and 65535, got 70000",
+    "run --set station.link.camera.clock.step=0": "station.link.camera.clock.step must be positive",
+    "run --station egm --set station.link.controller=::1": "station.link.controller: no IPv4 address",
+    "run --station egm --set station.link.port=0 --set station.link.camera.server.address=::1": (
+        "camera server: no IPv4 address is known for '::1'"
+    ),
     "compare --set station.payload=-1": "--set station.payload=-1: station.payload must be between 0 and",
     "compare --set station.payload=nan": "--set station.payload=nan: station.payload must be between 0 and",
     "compare --set station.camera.delay=soon": "--set station.camera.delay=soon: station.camera.delay must",

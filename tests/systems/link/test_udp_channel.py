@@ -3,11 +3,12 @@
 # pyright: reportAttributeAccessIssue=false
 """Sockets on loopback: what waits, what counts, and where one may listen."""
 
+import numpy as np
 import pytest
 
 from systems.link.abb.client import EgmClient
 from systems.link.abb.messages import Command, Mode
-from systems.link.udp_channel import Buffering, ChannelError, UdpChannel
+from systems.link.udp_channel import Buffering, ChannelError, UdpChannel, ipv4_address
 from tests.systems.link.abb.reports import PERIOD, SPEED, report
 
 
@@ -62,3 +63,26 @@ def test_a_reply_to_a_program_that_has_gone_does_not_disturb():
             client.poll(1.0)
         client.reply(Mode.JOINT, Command(client.session.last.position))
         assert client.poll(0.02) is None
+
+
+def test_why_commands_start_anew_is_told_though_the_next_message_was_there_already():
+    """Messages come in bursts: those that were refused, the one that is believed, and one that follows it."""
+    with EgmClient(SPEED, period=PERIOD) as client, UdpChannel() as controller:
+        controller.send(report(1), client.channel.address)
+        client.poll(1.0)
+        for number in range(2, 9):
+            controller.send(report(number, np.full(6, 0.7)), client.channel.address)
+        epoch = client.session.epoch
+        assert client.poll(1.0).seqno == 8
+        assert client.session.epoch > epoch
+        assert client.session.trouble.startswith("a joint jumped by 40.1 degrees")
+        controller.send(report(9, np.full(6, 0.7)), client.channel.address)
+        client.poll(1.0)
+        assert client.session.trouble == ""
+
+
+def test_a_machine_may_be_named_and_one_without_an_address_is_refused():
+    assert ipv4_address("the controller", "localhost") == "127.0.0.1"
+    for unknown in ("::1", "nobody.invalid"):
+        with pytest.raises(ChannelError, match=f"the controller: no IPv4 address is known for '{unknown}'"):
+            ipv4_address("the controller", unknown)

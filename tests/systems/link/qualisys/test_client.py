@@ -222,7 +222,7 @@ def is_frame(data: bytes, good: bytes) -> bool:
         ({"frequency": 0}, "frequency must be 1 Hz or more, got 0"),
         ({"timeout": 0.0}, "timeout and retry must be positive, got 0.0 s and 1.0 s"),
         ({"body": " "}, "the name of the body is missing"),
-        ({"address": "camera.invalid"}, "no address is known for 'camera.invalid'"),
+        ({"address": "camera.invalid"}, "no IPv4 address is known for 'camera.invalid'"),
     ],
 )
 def test_refuses_a_configuration_that_cannot_work(change: dict, message: str):
