@@ -32,6 +32,8 @@ _MARGIN = 3e-4  # s, to be ready before it is due
 _SOONER, _LATER = 0.1, 0.01  # of the distance, by which the beginning follows what preparations take
 _CLOSE = 3e-4  # s about the time at which it is due: a frame of the camera would delay the reply
 _CYCLE_TOLERANCE = 5e-3  # relative
+_HEARD = ("accepted", "implausible")  # messages of the controller, each once
+_FEWEST_HEARD, _MOST_HEARD = 0.5, 1.5  # of them for each number: fewer may be lost, more cannot come
 _CLOCK_STEP = 0.02  # s by which stamps may run ahead of arrivals: jitter, and a stall before
 _SAME_COUNT = 1000  # messages; four seconds: whose number is further ahead is of another count
 _RESTS = 25  # messages at rest that end a stop
@@ -177,13 +179,18 @@ class HardwareLink:
     def _check_cycle(self) -> None:
         """Measures the cycle on a hundred messages. Raises StationError if it is not the scenario's."""
         began = self._now()
-        first = self.next_report()
-        last, count = first, 0
+        first = last = self.next_report()
+        before, count = self._client.counters(), 0
         while count < 100 and (report := self.next_report()) is not None and last is not None:
             count, last = count + (report.seqno - last.seqno) % 2**32, report
         if first is None or last is None or count < 100:
             raise StationError("the controller fell silent" + self.host.reason(began))
         cycle = (last.time - first.time) / count
+        # Numbers that are made of stamps say nothing of the cycle; how many messages there were does.
+        now = self._client.counters()
+        heard = sum(now[name] - before[name] for name in _HEARD if name in now) or count
+        if not _FEWEST_HEARD < heard / count < _MOST_HEARD:
+            cycle *= count / heard
         if abs(cycle / self._period - 1.0) > _CYCLE_TOLERANCE:
             raise StationError(
                 f"the controller sends every {1e3 * cycle:.3f} ms, "
@@ -357,7 +364,7 @@ class HardwareLink:
             if report is None or not report.is_ready:
                 report = self.wait_until_ready(self._link.connect)
                 if report is None:
-                    raise StationError("the controller stopped while the robot was on its way")
+                    raise StationError(self.trouble or "the controller stopped on the way to the goal")
             elif self.epoch != epoch >= 0 and _is_elsewhere(
                 before, report, speed_share * self._speed * (self._heard - heard)
             ):

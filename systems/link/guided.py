@@ -49,6 +49,11 @@ class GuidedRobot(Generic[Report]):
         """Why the controller's newest messages are refused, or commands had to start anew; else empty."""
         return self._client.session.trouble
 
+    def _unheard(self, what: str) -> str:
+        """That nothing came, or why what came was of no use; ``what`` says the first."""
+        refused = self._client.session.refused
+        return f"{what} that can be used ({refused})" if refused else what
+
     def warm_up(self) -> None:
         """Reads the last report and writes the last command once more."""
         self._client.warm_up()

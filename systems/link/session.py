@@ -109,6 +109,7 @@ class LinkSession(Generic[Report]):
         self.last: Report | None = None
         self.heard = -math.inf  # when anything last came from the controller, also what is refused
         self.trouble = ""  # why its newest messages are refused, or were until commands had to start anew
+        self.refused = ""  # what was the matter with the last datagram that was none of the controller's
         self._is_over = True  # whether a message has followed another since there was trouble
         self._speed, self._break_after, self._host = np.asarray(largest_speed).tolist(), break_after, host
         self._period = period
@@ -132,11 +133,14 @@ class LinkSession(Generic[Report]):
         self.check(now)
         if not self._is_known(sender):
             self.counters.foreign += 1
+            known = self.sender[0] if self.sender else self._host
+            self.refused = f"it is of {sender[0]}, not of {known}"
             return None
         try:
             report = self.codec.decode(data)
-        except TelegramError:
+        except TelegramError as error:
             self.counters.undecodable += 1
+            self.refused = str(error)
             return None
         self.heard, self._may_stop, self._newest = now, report.is_ready, report
         if self.last is not None and not self._follows(report, now):

@@ -71,6 +71,7 @@ class Lockstep:
 
     def poll(self, timeout: float = 0.0) -> RobotReport | None:
         """As `systems.link.abb.client.EgmClient.poll`; time passes only here."""
+        self.session.forget_trouble()
         end = self.time + max(timeout, LOOK)
         while not self._on_the_way or self._on_the_way[0][0] > end:
             if self._wall_time > end:

@@ -46,7 +46,7 @@ class AbbRobotLink(GuidedRobot[RobotReport]):
     def why_not_ready(self) -> str:
         """What keeps the robot from following commands."""
         if self._client.session.link is Link.WAITING:
-            return "no message of a controller came in"
+            return self._unheard("no message of a controller came in")
         if self._client.session.egm.has_collided:
             return _COLLISION
         return "the controller does not run EGM"

@@ -25,7 +25,8 @@ class RsiSettings:
     """Of the controller; with `systems.link.config.LinkConfig` it is a link."""
 
     cycle_ms: int = quantity(4, 4, 12, "ms")  # 4 or 12; equal to the station's period
-    behind: int = quantity(1, 0, 10)  # replies before a telegram that its set-point ASPos does not contain
+    # Replies before a telegram that its set-point ASPos does not contain; found anew from the set-points
+    behind: int = quantity(1, 0, 10)
     sentype: str = "ImFree"  # the name of the sensor in the controller's configuration
     motion: RsiMotionConfig = field(default_factory=RsiMotionConfig)
     run: RsiRunConfig = field(default_factory=RsiRunConfig)

@@ -7,11 +7,17 @@ import numpy as np
 from robots.description.model import NUM_JOINTS
 from systems.link.client import LinkClient
 from systems.link.guided import GuidedRobot
+from systems.link.kuka.setpoint_age import SetpointAge
 from systems.link.kuka.telegrams import RobotTelegram, RsiError, SensorTelegram, read_robot, write_sensor
 from systems.link.session import Link
 
 _OLD = 0.1  # s, beyond which an earlier message says nothing of the present motion
 _WRAP = 2**32
+_KEPT = 12  # replies that a set-point may not contain yet
+_NOT_FOLLOWED = (
+    "the set-point ASPos does not follow the corrections: an ASPos without them, answers that come too "
+    "late, or limits of AXISCORR"
+)
 
 
 class RsiReport(NamedTuple):
@@ -50,11 +56,21 @@ class RsiCodec:
             cycle: in s.
             is_relative: whether corrections add up on the controller.
             name: its SENTYPE.
-            behind: how many replies before a telegram its set-point does not contain.
+            behind: how many replies before a telegram its set-point does not contain, until that shows.
         """
         self._largest_step, self._cycle = np.asarray(largest_speed) * cycle, cycle
-        self._is_relative, self._name, self._behind = is_relative, name, behind
+        self._is_relative, self._name, self._age = is_relative, name, SetpointAge(behind)
         self._sent: dict[int, np.ndarray] = {}  # (6,) rad, by the number of the telegram that was answered
+
+    @property
+    def behind(self) -> int:
+        """How many replies before a telegram its set-point does not contain, as far as that has shown."""
+        return self._age.behind
+
+    @property
+    def is_followed(self) -> bool:
+        """Whether set-points contain what was answered; if not, nothing is answered any more."""
+        return self._age.is_followed
 
     def decode(self, data: bytes) -> RsiReport:
         """The report in a datagram. Raises RsiError if there is none."""
@@ -62,13 +78,15 @@ class RsiCodec:
         if not self._is_relative and telegram.correction is None:
             raise RsiError("RSI: absolute corrections need AxisCorrMon in the telegram")
         number = round(1e-3 * telegram.ipoc / self._cycle) % _WRAP
-        return RsiReport(number, 1e-3 * telegram.ipoc, telegram.measured, telegram)
+        return RsiReport(number, 1e-3 * telegram.ipoc, telegram.measured, telegram, self.is_followed)
 
     def encode(self, command: RsiCommand, report: RsiReport, number: int, now: float) -> bytes:
         """The correction that leads to a command. Raises RsiError if it is not finite."""
         telegram, last = report.telegram, report.seqno
-        self._sent = {each: step for each, step in self._sent.items() if 0 < last - each <= self._behind}
-        setpoint = telegram.setpoint + sum(self._sent.values())
+        self._sent = {each: step for each, step in self._sent.items() if 0 < last - each <= _KEPT}
+        self._age.note(last, telegram.setpoint, self._sent, telegram.late)
+        unseen = [step for each, step in self._sent.items() if last - each <= self.behind]
+        setpoint = telegram.setpoint + sum(unseen)
         step = command.velocity * self._cycle if command.is_speed_only else command.position - setpoint
         step = np.minimum(np.maximum(step, -self._largest_step), self._largest_step)
         correction = step
@@ -101,10 +119,17 @@ class KukaRobotLink(GuidedRobot[RsiReport]):
         """Where reports come in; there are no test signals."""
         return self._client.channel.address[1], 0
 
+    @property
+    def trouble(self) -> str:
+        """Why the newest telegrams are refused, or that corrections are not followed; else empty."""
+        return super().trouble if self._is_followed else _NOT_FOLLOWED
+
     def why_not_ready(self) -> str:
         """What keeps the robot from following commands."""
         if self._client.session.link is Link.WAITING:
-            return "no telegram of a controller came in"
+            return self._unheard("no telegram of a controller came in")
+        if not self._is_followed:
+            return _NOT_FOLLOWED
         return "the controller does not run RSI"
 
     def poll(self, timeout: float = 0.0) -> RsiReport | None:
@@ -132,3 +157,8 @@ class KukaRobotLink(GuidedRobot[RsiReport]):
         """What has come and gone, by name; ``late_replies`` as the controller counts them."""
         late = 0 if self._last is None else self._last.telegram.late
         return super().counters() | {"late_replies": late}
+
+    @property
+    def _is_followed(self) -> bool:
+        codec = self._client.session.codec
+        return not isinstance(codec, RsiCodec) or codec.is_followed

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from diagrams.hardware_link import HardwareLink, StationError
 from diagrams.runs.real_time import RealTimeRun
 from diagrams.runs.simulation import run
 from diagrams.scenario.scenario import Scenario, ScenarioError, load_scenario
@@ -50,6 +51,29 @@ def test_the_tip_is_as_far_off_its_path_as_in_simulation():
     )
     # The wire is a cycle later than the simulated interface.
     assert found == pytest.approx(expected, rel=0.1)
+
+
+def of_cycle(milliseconds: int) -> Scenario:
+    """The cell with another cycle of RSI."""
+    period = 1e-3 * milliseconds
+    return load_scenario(
+        "cell-kuka",
+        [
+            f"station.link.cycle_ms={milliseconds}",
+            f"station.period={period}",
+            f"station.drive.command_delay={period}",
+        ],
+    )
+
+
+@pytest.mark.parametrize(("true", "told"), [(12, 4), (4, 12)])
+def test_a_controller_with_the_other_cycle_of_rsi_is_refused(true: int, told: int):
+    """The numbers of its telegrams are made of their stamps: these fit any cycle."""
+    wire, scenario = RsiLockstep(of_cycle(true)), of_cycle(told)
+    wire.session = wire.new_session(scenario)
+    link = HardwareLink(wire.link, None, scenario, load_robot(scenario.robot), False, wire.now)
+    with pytest.raises(StationError, match=rf"sends every {true}\.000 ms, station.period is {told} ms"):
+        link.connect(needs_camera=False)
 
 
 @pytest.mark.parametrize(

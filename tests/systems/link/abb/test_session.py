@@ -221,3 +221,11 @@ def test_reports_of_a_robot_that_needs_more_than_it_has_are_counted():
         assert heard is not None
         assert heard.utilization == pytest.approx(0.01 * rate)
     assert rig.session.egm.overloaded == 2
+
+
+def test_what_came_but_is_no_use_is_known_by_its_reason():
+    rig = Rig(host="192.168.125.1")
+    rig.hear(report(1))
+    assert rig.session.refused == "it is of 127.0.0.1, not of 192.168.125.1"
+    rig.hear(b"nothing", ("192.168.125.1", 6510))
+    assert rig.session.refused.startswith("not an EGM message")

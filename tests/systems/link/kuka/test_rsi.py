@@ -6,7 +6,15 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from robots.kinematics.forward import Kinematics
-from systems.link.kuka.telegrams import SensorTelegram, read_robot, write_sensor
+from systems.link.kuka.robot_link import RsiCodec, RsiCommand
+from systems.link.kuka.telegrams import (
+    RobotTelegram,
+    SensorTelegram,
+    read_robot,
+    read_sensor,
+    write_robot,
+    write_sensor,
+)
 from tests.systems.link.kuka.rsi_loop import CYCLE, ROBOT, START, RsiLoop
 
 MODES = ("relative", "absolute")
@@ -23,6 +31,47 @@ def test_without_losses_the_robot_is_where_it_was_commanded_one_cycle_ago(mode):
     wanted = np.array([sway(CYCLE * cycle) for cycle in range(500)])
     # Nine decimals of a degree are written; relative ones are summed, and repaired from the set-point.
     np.testing.assert_allclose(planned[1:], wanted[:-1], atol=2e-10)
+
+
+class OtherController:
+    """Set-points contain a correction ``behind`` replies later, or never for None; no time of its own."""
+
+    def __init__(self, behind: int | None) -> None:
+        self.behind, self.sums = behind, [np.zeros(6)]
+
+    def run(self, client: RsiCodec, cycles: int) -> np.ndarray:
+        """The steps that are asked for, (cycles, 6) in rad."""
+        for cycle in range(cycles):
+            seen = 0 if self.behind is None else max(0, cycle - self.behind)
+            telegram = RobotTelegram(4 * cycle, START, START + self.sums[seen], np.zeros(6), 0)
+            report = client.decode(write_robot(telegram))
+            if not report.is_ready:
+                break
+            command = RsiCommand(sway(CYCLE * cycle), np.zeros(6))
+            answer = read_sensor(client.encode(command, report, cycle, CYCLE * cycle))
+            assert answer.axes is not None
+            self.sums.append(self.sums[-1] + answer.axes)
+        return np.diff(self.sums, axis=0)
+
+
+@pytest.mark.parametrize("configured", [0, 1, 2])
+@pytest.mark.parametrize("true", [0, 1, 2, 3])
+def test_corrections_do_not_swing_whatever_set_points_contain(configured: int, true: int):
+    """With one reply too many or too few taken for seen they would reach the speed of the axes to and fro."""
+    client = RsiCodec(ROBOT.speed, CYCLE, True, "ImFree", configured)
+    steps = OtherController(true).run(client, 400)
+    assert client.behind == true
+    wanted = np.diff([sway(CYCLE * cycle) for cycle in range(-1, 400)], axis=0)
+    assert np.rad2deg(np.abs(steps - wanted).max()) < 0.02
+    np.testing.assert_allclose(steps[100:], wanted[100:], atol=1e-8)
+
+
+def test_set_points_without_the_corrections_end_a_run_before_they_add_up():
+    """Each answer would correct by the whole way from the start once more."""
+    client = RsiCodec(ROBOT.speed, CYCLE, True, "ImFree")
+    steps = OtherController(None).run(client, 400)
+    assert not client.is_followed
+    assert np.rad2deg(np.abs(steps.sum(axis=0)).max()) < 1.0
 
 
 @pytest.mark.slow
