@@ -1,11 +1,15 @@
 """A tool that is knocked out of its place while the robot moves: what the camera sees of it makes a step."""
 
 import importlib
+import math
 
 import numpy as np
 
 from robots.description.model import RobotModel
 from robots.metrology.step_detection import StepDetector
+from robots.pose import pose_error
+from systems.guard.config import GuardConfig
+from systems.link.protocols import RobotReport
 from systems.samples import PoseSample
 
 DISPLACED = "tool_displaced"  # the kind of the event
@@ -31,6 +35,30 @@ class ToolWatch:
         length = sum(float(np.linalg.norm(each.pose().translation())) for each in beyond)
         self._least = _FLANK * length
         self._count, self._last, self._steps = 0, -np.inf, StepDetector(self._least)
+
+    def contradiction(self, report: RobotReport | None, sample: PoseSample, guard: GuardConfig) -> str:
+        """What is wrong if a robot that stands is seen elsewhere than its joints say, before it is moved.
+
+        No sample so far off would be used on the path. The robot would be moved to its start all the same,
+        with joints in another unit or of another robot even faster than it may.
+
+        Returns:
+            That the tool is seen farther from where the joints put it than the guard allows; empty if not.
+        """
+        if not sample.valid or report is None:
+            return ""
+        X_WE = np.eye(4)
+        X_WE[:3] = self._kinematics.rows_and_jacobian(report.position)[0]
+        error = pose_error(X_WE, sample.X_WE.GetAsMatrix4())
+        angle, distance = math.degrees(np.linalg.norm(error[:3])), float(np.linalg.norm(error[3:]))
+        if distance <= guard.largest_deviation and angle <= guard.largest_deviation_deg:
+            return ""
+        return (
+            f"the camera sees the tool {distance:.3g} m and {angle:.3g} degrees from where the joints put "
+            f"it, servo.guard.largest_deviation is {guard.largest_deviation:g} m and "
+            f"{guard.largest_deviation_deg:g} degrees: check camera_frame, tool_frame and the body in "
+            "station.link, the robot, and the joints that its controller sends"
+        )
 
     def note(self, time: float, position: np.ndarray, sample: PoseSample) -> tuple[str, str] | None:
         """The joints (6,) in rad at a time in s, and the newest sample of the camera then.

@@ -164,6 +164,9 @@ class RealTimeRun:
             )
             try:
                 wire.connect(self.begins_with_camera)
+                seen, guard = wire.poses.newest, self.scenario.servo.guard
+                if why := self._tool.contradiction(wire.last, seen, guard):
+                    raise StationError(why)
                 if watch:
                     wire.wait_for(watch, "nobody looks for people")
                 wire.approach(self.start)

@@ -1,19 +1,23 @@
 """A tool that is knocked out of its place while a robot moves that is not known well."""
 
+import math
 import re
 
 import numpy as np
 import pytest
-from pydrake.math import RigidTransform
+from pydrake.math import RigidTransform, RotationMatrix
 
 from diagrams.runs.real_time import RealTimeRun
 from diagrams.scenario.scenario import load_scenario
 from diagrams.tool_watch import DISPLACED, ToolWatch
 from robots.description.model import load_robot
 from robots.kinematics.forward import Kinematics
+from systems.guard.config import GuardConfig
+from systems.link.abb.messages import decode_report
 from systems.samples import PoseSample
 from tests.diagrams.lockstep import Lockstep
 from tests.robots.programs.written import with_random_errors
+from tests.systems.link.abb.reports import report as reported
 
 ROBOT = load_robot("irb1200")
 PERIOD, DELAY, SIGMA = 0.004, 0.012, 50e-6  # s, s, m
@@ -75,3 +79,25 @@ def test_a_guided_run_says_so_while_it_goes_on():
     (event,) = [each for each in record.log.guard_events if each.kind == DISPLACED]
     since = float(event.detail.split()[1])
     assert 0.0 < event.time - since <= 1.0
+
+
+@pytest.mark.parametrize(
+    ("scale", "turn_deg", "shift", "is_refused"),
+    [
+        (1.0, 30.0, 0.15, False),  # a station that is not aligned well, as the guard allows it
+        (1.0, 0.0, 0.25, True),  # a camera's frame that is another one
+        (1.0, 50.0, 0.0, True),
+        (math.pi / 180.0, 0.0, 0.0, True),  # joints in rad, read as degrees
+    ],
+)
+def test_a_robot_is_not_moved_whose_joints_and_camera_contradict_each_other(
+    scale: float, turn_deg: float, shift: float, is_refused: bool
+):
+    joints = np.deg2rad([0.0, 20.0, 0.0, 0.0, 60.0, 0.0])
+    X_true = RigidTransform(Kinematics(ROBOT).forward(joints))
+    moved = RigidTransform(RotationMatrix.MakeZRotation(math.radians(turn_deg)), [shift, 0.0, 0.0])
+    report = decode_report(reported(1, scale * joints))
+    why = ToolWatch(ROBOT).contradiction(report, PoseSample(0.0, X_true @ moved, True), GuardConfig())
+    assert bool(why) == is_refused
+    if is_refused:
+        assert why.startswith("the camera sees the tool ")
