@@ -209,9 +209,9 @@ class RealTimeRun:
             report = wire.next_report(prepare=prepare)
             is_seeding = False
             if report is None or not report.is_ready or wire.epoch != epoch:
-                why = wire.trouble or (
-                    "the controller fell silent" if report is None else "the controller stopped"
-                )
+                # One that is ready came after a silence that nobody noticed while this process was held up.
+                has_stopped = report is not None and not report.is_ready
+                why = wire.trouble or f"the controller {'stopped' if has_stopped else 'fell silent'}"
                 if not self.scenario.servo.guard.resume:
                     return why
                 self._note(max(tick, 0), "interrupted", why)

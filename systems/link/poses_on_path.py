@@ -7,6 +7,13 @@ from systems.link.protocols import PoseSource
 from systems.samples import PoseSample
 
 _AHEAD = 0.1  # s by which a sample may seem to be exposed after the report before it
+_USELESS = {  # what the counters of a camera say of frames that give no pose
+    "lost_body": "it does not see the body",
+    "impossible": "its frames have no rotation of the body, or other bodies than it says",
+    "wrong_time": "the stamps of its frames do not fit to when they come",
+    "wrong_sender": "its frames come from another address than its own",
+    "garbage": "its frames cannot be read",
+}
 
 
 class PosesOnPath:
@@ -37,8 +44,15 @@ class PosesOnPath:
 
     def problem(self) -> str:
         """Why the camera shows nothing, in words."""
-        why = self._camera.report().last_error if self._camera is not None else "there is none"
-        return why or "it does not see the body"
+        if self._camera is None:
+            return "there is none"
+        report = self._camera.report()
+        if report.last_error:
+            return report.last_error
+        count = report.counters.get
+        why = max(_USELESS, key=lambda name: count(name, 0))
+        is_idle = count("frames") == 0 and count(why, 0) == 0
+        return "it sends no frames, as if it did not measure" if is_idle else _USELESS[why]
 
     def start_path(self, now: float) -> None:
         """What was seen before the steady time ``now`` in s belongs to another time."""

@@ -174,6 +174,24 @@ def test_the_guard_of_the_simulation_is_the_guard_of_the_wire():
 
 
 @pytest.mark.slow
+def test_a_client_that_was_held_up_too_long_says_that_it_heard_nothing():
+    """The first message after that is of a robot that follows: it did not stop."""
+    scenario = quick()
+    wire = Lockstep(scenario)
+    held_up: list[float] = []
+
+    def hold_up() -> bool:
+        if wire.cell.time > 6.0 and not held_up:
+            held_up.append(wire.time)
+            wire.time += 1.5 * scenario.station.link.break_after
+        return False
+
+    run = RealTimeRun(scenario, "open_loop")
+    record = run.run(wire.link, wire.camera(), now=wire.now, is_asked_to_end=hold_up)
+    assert record.ended == "the controller fell silent"
+
+
+@pytest.mark.slow
 @pytest.mark.parametrize("resume", ["false", "true"])
 def test_after_a_collision_a_run_ends_by_name_and_never_goes_on(resume: str):
     """Also where runs go on after a stop, and the controller runs its program again."""

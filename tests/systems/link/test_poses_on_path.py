@@ -63,3 +63,18 @@ def test_nothing_is_seen_without_a_camera():
     found.poll(1.0)
     assert not found.at(0.0, STAMPED_AHEAD).valid
     assert found.problem()
+
+
+@pytest.mark.parametrize(
+    ("counters", "why"),
+    [
+        ({"frames": 0}, "it sends no frames, as if it did not measure"),
+        ({"frames": 0, "wrong_sender": 500}, "its frames come from another address than its own"),
+        ({"frames": 500, "lost_body": 2, "impossible": 498}, "its frames have no rotation of the body"),
+        ({"frames": 500, "lost_body": 500}, "it does not see the body"),
+    ],
+)
+def test_a_camera_that_shows_nothing_says_what_is_the_matter_with_its_frames(counters: dict, why: str):
+    report = SimpleNamespace(last_error="", counters=counters)
+    camera: Any = SimpleNamespace(poll=lambda now: None, report=lambda: report)
+    assert poses(camera).problem().startswith(why)
