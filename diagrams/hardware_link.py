@@ -33,7 +33,7 @@ _SOONER, _LATER = 0.1, 0.01  # of the distance, by which the beginning follows w
 _CLOSE = 3e-4  # s about the time at which it is due: a frame of the camera would delay the reply
 _CYCLE_TOLERANCE = 5e-3  # relative
 _HEARD = ("accepted", "implausible")  # messages of the controller, each once
-_FEWEST_HEARD, _MOST_HEARD = 0.5, 1.5  # of them for each number: fewer may be lost, more cannot come
+_HEARD_SHARE = 0.5, 1.5  # of them for each number: fewer may be lost, more cannot come
 _CLOCK_STEP = 0.02  # s by which stamps may run ahead of arrivals: jitter, and a stall before
 _SAME_COUNT = 1000  # messages; four seconds: whose number is further ahead is of another count
 _RESTS = 25  # messages at rest that end a stop
@@ -141,14 +141,15 @@ class HardwareLink:
 
     def connect(self, needs_camera: bool) -> None:
         """Waits for the controller to follow commands, and for the camera. Raises StationError."""
-        link = self._link
-        deadline = self._now() + link.connect
+        link, deadline = self._link, self._now() + self._link.connect
         if self.wait_until_ready(link.connect) is None:
             if self._is_asked_to_end():
                 raise EndedOnRequest
-            what, place = self._client.why_not_ready(), self._client.place
-            raise StationError(f"{what}: waited {link.connect:g} s on {place}")
+            why = self._client.why_not_ready()
+            raise StationError(f"{why}: waited {link.connect:g} s on {self._client.place}")
         while needs_camera and self._has_camera and not self.poses.newest.valid:
+            if self._is_asked_to_end():
+                raise EndedOnRequest
             if self._now() > deadline:
                 why = self.poses.problem()
                 raise StationError(f"no pose from the camera within {link.connect:g} s: {why}")
@@ -189,7 +190,7 @@ class HardwareLink:
         # Numbers that are made of stamps say nothing of the cycle; how many messages there were does.
         now = self._client.counters()
         heard = sum(now[name] - before[name] for name in _HEARD if name in now) or count
-        if not _FEWEST_HEARD < heard / count < _MOST_HEARD:
+        if not _HEARD_SHARE[0] < heard / count < _HEARD_SHARE[1]:
             cycle *= count / heard
         if abs(cycle / self._period - 1.0) > _CYCLE_TOLERANCE:
             raise StationError(
@@ -362,8 +363,7 @@ class HardwareLink:
             before, heard, report = self.last, self._heard, self.next_report()
             passed += self.passed
             if report is None or not report.is_ready:
-                report = self.wait_until_ready(self._link.connect)
-                if report is None:
+                if (report := self.wait_until_ready(self._link.connect)) is None:
                     raise StationError(self.trouble or "the controller stopped on the way to the goal")
             elif self.epoch != epoch >= 0 and _is_elsewhere(
                 before, report, speed_share * self._speed * (self._heard - heard)

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from diagrams.hardware_link import HardwareLink
+from diagrams.hardware_link import EndedOnRequest, HardwareLink
 from diagrams.scenario.scenario import load_scenario
 from robots.description.model import load_robot
 from tests.diagrams.lockstep import Lockstep
@@ -22,6 +22,24 @@ def ages(seconds: float, catches_up: bool, messages: int = 480) -> np.ndarray:
             sample = link.pose_at(0.0)
             found.append(-sample.time if sample.valid else np.nan)
     return np.array(found)
+
+
+def test_waiting_for_the_camera_ends_on_request():
+    """It may take as long as `station.link.connect` says, and nobody has moved the robot."""
+    scenario = load_scenario("cell", ["station.camera.dropouts=[[0, 100]]", "station.link.connect=60"])
+    wire = Lockstep(scenario)
+    link = HardwareLink(
+        wire.link,
+        wire.camera(),
+        scenario,
+        load_robot(scenario.robot),
+        False,
+        wire.now,
+        lambda: wire.cell.time > 0.5,
+    )
+    with pytest.raises(EndedOnRequest):
+        link.connect(needs_camera=True)
+    assert wire.cell.time < 0.6
 
 
 @pytest.mark.slow
