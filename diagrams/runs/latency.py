@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from diagrams.hardware_link import HardwareLink, StationError
+from diagrams.hardware_link import EndedOnRequest, HardwareLink, StationError, never
 from diagrams.runs.undisturbed import undisturbed
 from diagrams.scenario.scenario import Scenario
 from robots.description.model import NUM_JOINTS, RobotModel
@@ -82,6 +82,7 @@ def measure_latency(
     camera: PoseSource | None,
     progress: Callable[[float], None] | None = None,
     now: Callable[[], float] = steady_time,
+    is_asked_to_end: Callable[[], bool] = never,
 ) -> LatencyRecord:
     """Moves a joint of a station where it stands, and measures its delays.
 
@@ -96,14 +97,18 @@ def measure_latency(
         camera: to the camera server; its clock must be set to no delay. None to do without.
         progress: is called now and then with the share that is done, 0 to 1.
         now: the clock of the client's arrivals, in s.
+        is_asked_to_end: whether somebody wants an end.
+
+    However it ends, the robot is sent a smooth stop as long as its controller speaks.
 
     Raises:
+        EndedOnRequest: if somebody wanted an end.
         StationError: if the station is not there or falls silent, or its clocks are set anew again and again.
         ValueError: if there is no such joint, or the motion would leave its range.
     """
     config.check()
     axis = config.joint - 1
-    wire = HardwareLink(client, camera, scenario, robot, False, now)
+    wire = HardwareLink(client, camera, scenario, robot, False, now, is_asked_to_end)
     wire.connect(camera is not None)
     report = wire.last
     assert report is not None
@@ -113,37 +118,41 @@ def measure_latency(
     before = client.counters()
     course, steps = config, 0
     sessions = _sessions(wire, camera)
-    while (time := report.time - began) < course.duration:
-        displacement, speed = motion(course, time)
-        position, velocity = start.copy(), np.zeros(NUM_JOINTS)
-        position[axis] += displacement
-        velocity[axis] = speed
-        wire.send_command(position, velocity)
-        rows.append((report.time, position[axis], report.position[axis]))
-        sample = wire.poses.newest
-        if sample.valid and (not frames or sample.time != frames[-1][0]):
-            frames.append((sample.time, *sample.X_WE.translation()))
-        if len(rows) % _LOOK == 0:
-            if progress:
-                progress(1.0 - (course.duration - time) / config.duration)
-            sessions, previous = _sessions(wire, camera), sessions
-            if sessions != previous:
-                steps += 1
-                course = replace(config, duration=time + config.duration)
-                if course.duration > _PATIENCE * config.duration:
-                    wire.stop_smoothly()
-                    raise StationError(
-                        f"the clocks of the station were set anew {steps} times in {time:.0f} s"
-                        + wire.host.reason(began_here)
-                    )
-                rows.clear()
-                frames.clear()
-        following = wire.next_report()
-        if following is None or not following.is_ready:
-            wire.stop_smoothly()
-            why = "the controller fell silent" if following is None else "the controller stopped"
-            raise StationError(why + wire.host.reason(began_here))
-        report = following
+    try:
+        while (time := report.time - began) < course.duration:
+            displacement, speed = motion(course, time)
+            position, velocity = start.copy(), np.zeros(NUM_JOINTS)
+            position[axis] += displacement
+            velocity[axis] = speed
+            wire.send_command(position, velocity)
+            rows.append((report.time, position[axis], report.position[axis]))
+            sample = wire.poses.newest
+            if sample.valid and (not frames or sample.time != frames[-1][0]):
+                frames.append((sample.time, *sample.X_WE.translation()))
+            if len(rows) % _LOOK == 0:
+                if progress:
+                    progress(1.0 - (course.duration - time) / config.duration)
+                sessions, previous = _sessions(wire, camera), sessions
+                if sessions != previous:
+                    steps += 1
+                    course = replace(config, duration=time + config.duration)
+                    if course.duration > _PATIENCE * config.duration:
+                        raise StationError(
+                            f"the clocks of the station were set anew {steps} times in {time:.0f} s"
+                            + wire.host.reason(began_here)
+                        )
+                    rows.clear()
+                    frames.clear()
+            if is_asked_to_end():
+                raise EndedOnRequest
+            following = wire.next_report()
+            if following is None or not following.is_ready:
+                why = "the controller fell silent" if following is None else "the controller stopped"
+                raise StationError(why + wire.host.reason(began_here))
+            report = following
+    except BaseException:
+        wire.stop_smoothly()
+        raise
     stamp, commanded, measured = np.array(rows).T
     reported = np.array([wire.robot_clock.station_time(round(1e6 * each)) for each in stamp])
     seen = np.array(frames).reshape(-1, 4)

@@ -10,9 +10,11 @@ import typer
 from rich import box
 from rich.table import Table
 
+from diagrams.hardware_link import EndedOnRequest
 from diagrams.runs.latency import LatencyConfig, LatencyRecord, measure_latency
 from diagrams.scenario.scenario import Scenario, load_scenario
 from experiments.cli.console import BROKEN_OFF, fail, print_files, print_table, progress_bar, refusing
+from experiments.cli.ending import asking
 from experiments.cli.json_output import human_console, json_output
 from experiments.cli.options import (
     JsonOption,
@@ -80,12 +82,23 @@ def latency_command(
 def _measured(prepared: Prepared, config: LatencyConfig, with_cell: bool) -> LatencyRecord:
     scenario: Scenario = prepared.scenario
     with (
+        asking() as end,
         station_clients(scenario, prepared.robot, with_cell, True, camera_delay=0.0) as station,
         progress_bar(f"moving joint {config.joint}") as progress,
     ):
-        return measure_latency(
-            scenario, prepared.robot, config, station.client, station.camera, progress=progress
-        )
+        try:
+            return measure_latency(
+                scenario,
+                prepared.robot,
+                config,
+                station.client,
+                station.camera,
+                progress=progress,
+                is_asked_to_end=end.is_asked,
+            )
+        except EndedOnRequest:
+            fail("ended on request, nothing was written", end.code)
+            raise
 
 
 def latency_table(found: Latency) -> Table:

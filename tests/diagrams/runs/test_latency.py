@@ -4,12 +4,13 @@ import numpy as np
 import pytest
 from scipy.signal import lfilter
 
-from diagrams.hardware_link import StationError
+from diagrams.hardware_link import EndedOnRequest, StationError
 from diagrams.runs.latency import LatencyConfig, LatencyRecord, measure_latency, motion
 from diagrams.scenario.scenario import load_scenario
 from experiments.station.found_delays import scenario_with
 from experiments.station.latency import ImpossibleDelayError, Latency, delay_between, evaluate
 from robots.description.model import load_robot
+from systems.link.abb.messages import decode_command
 from systems.link.clock import ClockQuality
 from tests.diagrams.lockstep import Lockstep
 
@@ -167,3 +168,23 @@ def test_the_delays_become_a_scenario(tmp_path):
     scenario = load_scenario(str(path))
     assert scenario.station.drive.dead_time == pytest.approx(found.dead_time, abs=1e-6)
     assert scenario.station.interface == "egm"
+
+
+def test_whoever_ends_it_gets_a_smooth_stop():
+    scenario = load_scenario("cell")
+    wire = Lockstep(scenario)
+    ended: list[float] = []
+
+    def is_asked_to_end() -> bool:
+        ended.extend([wire.time] * (wire.cell.time > 2.5 and not ended))
+        return bool(ended)
+
+    config = LatencyConfig(duration=6.0)
+    with pytest.raises(EndedOnRequest):
+        measure_latency(
+            scenario, ROBOT, config, wire.link, wire.camera(), now=wire.now, is_asked_to_end=is_asked_to_end
+        )
+    assert wire.time < ended[0] + 1.0
+    speeds = [decode_command(data)[1].velocity for _, data in wire.sent]
+    assert np.abs(speeds[-30]).max() > 0.0
+    assert np.abs(speeds[-1]).max() == 0.0
