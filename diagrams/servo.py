@@ -1,5 +1,6 @@
 """The controller as a diagram: the same one against a simulated and against a real station."""
 
+from inspect import signature
 from typing import Any
 
 import numpy as np
@@ -16,6 +17,7 @@ from pydrake.systems.primitives import Adder, ConstantVectorSource, Demultiplexe
 from diagrams.live_watch import LiveWatch
 from diagrams.record.coverage import Prediction
 from diagrams.scenario.controller_model import controller_model
+from diagrams.scenario.own_laws import own_gains
 from diagrams.scenario.scenario import Scenario, ScenarioError
 from diagrams.tick_clock import TickClock
 from diagrams.watching import Watch
@@ -175,13 +177,18 @@ class Servo(Diagram):
     def _feedforward(self, scenario: Scenario, standing: Standing | None) -> Feedforward:
         """The inverse model, prepared for the path. Raises ScenarioError if somebody may slow the path."""
         config = scenario.servo.feedforward
-        model = FEEDFORWARDS.find(config.kind)(self.model, config)
+        kind = FEEDFORWARDS.find(config.kind)
+        if not issubclass(kind, Feedforward):
+            raise ScenarioError(f"feedforward {config.kind}: class {kind.__name__} must extend Feedforward")
+        model = kind(self.model, config)
         if self.reference.is_slowed and model.is_computed_beforehand:
             raise ScenarioError(
                 f"servo.feedforward.kind={config.kind} is computed before the run and needs the planned "
                 "speed, but reference.override or the law slows the path"
             )
-        model.prepare(self.reference.path, np.deg2rad(scenario.home_deg), standing)
+        # One of somebody's own may do without the robot that a camera has looked at.
+        looked_at = (standing,) if len(signature(model.prepare).parameters) > 2 else ()
+        model.prepare(self.reference.path, np.deg2rad(scenario.home_deg), *looked_at)
         return model
 
     def _connect_reference(self, builder: DiagramBuilder) -> None:
@@ -324,9 +331,11 @@ def _refuse_slow_camera(scenario: Scenario) -> None:
 
 def law_config(scenario: Scenario, law: type[System] | System) -> LawConfig:
     """Gains and limits of a law: the scenario's, or those with which its class begins."""
-    kind = law if isinstance(law, type) else type(law)
+    kind, gains = law if isinstance(law, type) else type(law), scenario.servo.laws
     name = LAWS.name_of(kind)
-    return law_traits(kind).Config() if name is None else scenario.servo.laws[name]
+    if name is not None:
+        return gains[name]
+    return own_gains(kind, gains.own)
 
 
 def law_name(law: str | type[System] | System) -> str:

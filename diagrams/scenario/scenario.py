@@ -6,6 +6,7 @@ import numpy as np
 from pydrake.common.yaml import yaml_dump, yaml_dump_typed, yaml_load
 
 from diagrams.integration import IntegratorConfig
+from diagrams.scenario.own_laws import without_own_laws
 from diagrams.scenario.scenario_file import ScenarioError, read_scenario_nodes, shipped_scenarios
 from robots.configuration.nodes import ConfigurationError
 from robots.configuration.quantity import choice, numbers, quantity
@@ -116,7 +117,9 @@ def load_scenario(name: str, settings: list[str] | None = None) -> Scenario:
     """
     try:
         node = read_scenario_nodes(name, settings or [], Scenario)
-        scenario = typed(node, Scenario)
+        shipped, own = without_own_laws(node)
+        scenario = typed(shipped, Scenario)
+        scenario.servo.laws.own = own
         found = _contradiction(scenario)
         if found:
             keys, reason = found
@@ -131,11 +134,12 @@ def load_scenario(name: str, settings: list[str] | None = None) -> Scenario:
 def scenario_text(scenario: Scenario) -> str:
     """The whole scenario as YAML that `load_scenario` reads back."""
     text = str(yaml_dump_typed(scenario))
-    events = scenario.station.events
-    if not events:
+    events, own = scenario.station.events, scenario.servo.laws.own
+    if not events and not own:
         return text
-    # Drake leaves out the tag of the first kind; an event must always say what it is.
     tree = yaml_load(data=text)
+    tree["servo"]["laws"] |= {law: said.plain for law, said in own.items()}
+    # Drake leaves out the tag of the first kind; an event must always say what it is.
     for entry, event in zip(tree["station"]["events"], events, strict=True):
         entry["_tag"] = f"!{type(event).__name__}"
     return str(yaml_dump(tree))

@@ -4,6 +4,7 @@ from importlib.resources import files
 from pathlib import Path
 
 from diagrams.scenario.former_names import renamed
+from diagrams.scenario.own_laws import key_parts
 from robots.configuration.extended import FileKind, read_extended
 from robots.configuration.nodes import ConfigurationError, Node, parse
 from robots.configuration.suggestion import did_you_mean
@@ -89,6 +90,6 @@ def _setting(setting: str) -> Node:
     if not separator or not key.strip():
         raise ScenarioError(f"{label}: must look like station.camera.delay=0.008")
     node = parse(value, label, has_lines=False)
-    for part in reversed(key.strip().split(".")):
+    for part in reversed(key_parts(key.strip())):
         node = Node({part: node}, label)
     return node

@@ -223,7 +223,7 @@ def _differences(text: str, logs: Comparison) -> list[tuple[str, str, str]]:
         row
         for row in scenario_differences(text)
         if row[0] != "description"
-        and (not row[0].startswith(idle) or row[0].removeprefix(idle).partition(".")[0] in logs)
+        and (not row[0].startswith(idle) or any(row[0].startswith(f"{idle}{law}.") for law in logs))
     ]
 
 

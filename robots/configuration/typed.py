@@ -16,19 +16,24 @@ from robots.configuration.union import entries, selected, tags, union_members
 _Schema = TypeVar("_Schema")
 
 
-def typed(node: Node, schema: type[_Schema]) -> _Schema:
+def typed(node: Node, schema: type[_Schema], path: str = "") -> _Schema:
     """A dataclass with what a tree of nodes says; fields that it leaves out have their defaults.
+
+    Args:
+        node: the tree.
+        schema: the dataclass.
+        path: where the tree stands, for messages; empty for a whole file.
 
     Raises:
         ConfigurationError: if a key is unknown, a value of another kind, of another size or out of its range;
             one line that names place, path and what is allowed.
     """
-    tree = _checked(node, schema, Declaration(), "")
+    tree = _checked(node, schema, Declaration(), path)
     instance = yaml_load_typed(schema=schema, data=yaml_dump(tree))
     found = out_of_range(instance)
     if found:
         keys, reason = found
-        raise node.at(keys).refuse(f"{dotted(keys)} {reason}")
+        raise node.at(keys).refuse(f"{dotted([path, *keys] if path else keys)} {reason}")
     return instance
 
 
@@ -284,6 +289,8 @@ def _hints(schema: Any):
         return lambda key: hints.get(key, object)
     if get_origin(schema) is dict:
         return lambda key: get_args(schema)[1]
+    if schema is object:  # what a schema does not know, such as a law of one's own
+        return lambda key: object
     return None
 
 

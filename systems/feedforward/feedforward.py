@@ -158,6 +158,7 @@ class Feedforward(LeafSystem):
             if self._filter is not None:
                 smooth, filtered = self._filtered(self._filter, moment[0], filtered)
             drive = self.drive(smooth, memory)
+            self._require_sizes(drive, len(memory))
             memory = drive.memory
             drives.append((smooth, drive))
         (smooth, drive), (later, ahead) = drives[self._between.half - 1], drives[-1]
@@ -171,6 +172,16 @@ class Feedforward(LeafSystem):
             ahead.torque - self._gravity_compensation(later.position - ahead.deflection),
             np.concatenate([now.ravel(), filtered, memory]),
         )
+
+    def _require_sizes(self, drive: Drive, memory_size: int) -> None:
+        """Refuses what a model's own method has given. Raises RuntimeError, as what breaks off a run does."""
+        sizes = {"deflection": NUM_JOINTS, "deflection_rate": NUM_JOINTS, "torque": NUM_JOINTS}
+        for name, size in (sizes | {"memory": memory_size}).items():
+            given = np.shape(getattr(drive, name))
+            if given != (size,):
+                shape = "x".join(map(str, given)) or "one number"
+                wanted = f"drive_under must give {size} numbers as {name}"
+                raise RuntimeError(f"class {type(self).__name__}: {wanted}, got {shape}")
 
     def play(self, references: Sequence[JointReference]) -> np.ndarray:
         """Commands at successive ticks: positions in rad, velocities in rad/s, torques in N m; (n, 3, 6)."""

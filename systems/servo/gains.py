@@ -1,15 +1,23 @@
 """The gains of every shipped law, one group each, as a scenario has them."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import field, fields, make_dataclass
+from types import MappingProxyType
 from typing import TYPE_CHECKING
 
+from robots.configuration.nodes import Node
 from systems.servo import LAWS
 from systems.servo.law_config import LawConfig
 
 
 class _ByName:
-    """A dataclass whose fields are found by their names, as in a mapping."""
+    """A dataclass whose fields are found by their names, as in a mapping.
+
+    Attributes:
+        own: what a scenario says of laws of one's own, by ``FILE.py:CLASS``.
+    """
+
+    own: Mapping[str, Node] = MappingProxyType({})
 
     def __getitem__(self, law: str) -> LawConfig:
         if law not in self:

@@ -171,16 +171,30 @@ class ServoLaw(LeafSystem):
         memory = state.value(_MEMORY).copy()
         if self.memory_size and math.isnan(memory[0]):
             memory = self.initial_state(moment)
+            self._require_size("initial_state", "", memory, self.memory_size)
         try:
             step = self.step(moment, memory)
         except (UnreachableError, JointLimitError):
             # No command is an answer too: the guard holds the robot and counts it.
             step = LawOutput(_NO_COMMAND, _NO_COMMAND, state.value(_CORRECTION), memory)
-        discrete_state.set_value(_POSITION, step.position)
-        discrete_state.set_value(_VELOCITY, step.velocity)
-        discrete_state.set_value(_CORRECTION, step.correction)
         discrete_state.set_value(_MEASUREMENT, np.array((last_used, refused, newest)))
-        discrete_state.set_value(_MEMORY, step.memory)
+        try:
+            discrete_state.set_value(_POSITION, step.position)
+            discrete_state.set_value(_VELOCITY, step.velocity)
+            discrete_state.set_value(_CORRECTION, step.correction)
+            discrete_state.set_value(_MEMORY, step.memory)
+        except (IndexError, TypeError):
+            for name in ("position", "velocity", "correction"):
+                self._require_size("step", f" as {name}", getattr(step, name), 6)
+            self._require_size("step", " as memory", step.memory, self.memory_size)
+            raise
+
+    def _require_size(self, method: str, of: str, given: np.ndarray, size: int) -> None:
+        """Refuses what a law's own method has given. Raises RuntimeError, as what breaks off a run does."""
+        if np.shape(given) != (size,):
+            shape = "x".join(map(str, np.shape(given))) or "one number"
+            wanted = f"{method} must give {size} numbers{of}"
+            raise RuntimeError(f"class {type(self).__name__}: {wanted}, got {shape}")
 
     def joints_at(self, X_WE: np.ndarray, V_WE: np.ndarray, last: np.ndarray) -> np.ndarray:
         """The joints for a pose and a twist, next to those of the last tick.

@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from diagrams.runs.simulation import run
+from diagrams.runs.simulation import Experiment, run
 from diagrams.scenario.scenario import ScenarioError, load_scenario
 from systems.feedforward import FEEDFORWARDS
 from tests.experiments.commands import SHORT
@@ -50,6 +50,29 @@ def test_one_that_computes_nothing_is_refused_before_anything_runs(tmp_path: Pat
     kind = f"servo.feedforward.kind={tmp_path / 'own.py'}:Mine"
     with pytest.raises(ValueError, match="class Mine needs a method 'drive_under'"):
         run(load_scenario("misaligned", [*SETTINGS, kind]), "open_loop")
+
+
+def test_one_that_gives_too_few_numbers_is_told_which(tmp_path: Path):
+    (tmp_path / "own.py").write_text(OWN.replace("Drive(np.zeros(6)", "Drive(np.zeros(5)"))
+    kind = f"servo.feedforward.kind={tmp_path / 'own.py'}:Mine"
+    with pytest.raises(RuntimeError, match="Mine: drive_under must give 6 numbers as deflection, got 5"):
+        run(load_scenario("misaligned", [*SETTINGS, kind]), "open_loop")
+
+
+@pytest.mark.parametrize("arguments", ["path, home", "path, home, standing=None", "*any"])
+def test_one_may_prepare_itself_with_or_without_the_robot_that_was_looked_at(tmp_path: Path, arguments: str):
+    prepare = f"    def prepare(self, {arguments}):\n        self.was_asked = True\n"
+    (tmp_path / "own.py").write_text(OWN + prepare)
+    kind = f"servo.feedforward.kind={tmp_path / 'own.py'}:Mine"
+    experiment = Experiment(load_scenario("misaligned", [*SETTINGS, kind]), "open_loop")
+    assert experiment.servo.GetSubsystemByName("feedforward").was_asked
+
+
+def test_a_class_that_is_none_is_refused_in_one_line(tmp_path: Path):
+    (tmp_path / "own.py").write_text("class Mine:\n    pass\n")
+    kind = f"servo.feedforward.kind={tmp_path / 'own.py'}:Mine"
+    with pytest.raises(ScenarioError, match="class Mine must extend Feedforward"):
+        Experiment(load_scenario("misaligned", [*SETTINGS, kind]), "open_loop")
 
 
 def test_every_shipped_model_says_what_it_is():

@@ -1,5 +1,6 @@
 """A law of one's own: the tutorial as printed, any system with the ports, and what is refused."""
 
+import importlib
 import json
 import re
 from pathlib import Path
@@ -10,7 +11,7 @@ from pydrake.common.value import Value
 from pydrake.systems.framework import Context, DiagramBuilder, DiscreteValues, LeafSystem
 
 from diagrams.runs.simulation import Experiment
-from diagrams.scenario.scenario import load_scenario
+from diagrams.scenario.scenario import ScenarioError, load_scenario, scenario_text
 from experiments.metrics.run_metrics import error_metrics
 from robots.dynamics.newton_inverse import inverse_kinematics
 from robots.kinematics.forward import Kinematics
@@ -125,6 +126,59 @@ class BlindEye(LeafSystem):
     def __init__(self) -> None:
         super().__init__()
         self.DeclareAbstractInputPort("pose_sample", Value(PoseSample()))
+
+
+def test_its_gains_are_those_that_the_scenario_says(my_law: str, tmp_path: Path):
+    settings = [f"servo.laws.{my_law}.translation=7", f"servo.laws.{my_law}.drive=velocity"]
+    scenario = load_scenario("misaligned", settings)
+    (tmp_path / "again.yaml").write_text(scenario_text(scenario))
+    for each in (scenario, load_scenario(str(tmp_path / "again.yaml"))):
+        config = Experiment(each, my_law).servo.law.config
+        assert (config.translation, config.drive) == (7.0, "velocity")
+        assert config.rotation == LawConfig().rotation
+    assert Experiment(load_scenario("misaligned"), my_law).servo.law.config.translation == 4.0
+
+
+def test_its_gains_count_for_its_class_too_however_it_was_imported(my_law: str, monkeypatch):
+    monkeypatch.syspath_prepend(str(Path(my_law).parent))
+    law = importlib.import_module("my_law").MyLaw
+    scenario = load_scenario("misaligned", [f"servo.laws.{my_law}.translation=7"])
+    assert Experiment(scenario, law).servo.law.config.translation == 7.0
+
+
+@pytest.mark.parametrize(
+    ("change", "why"),
+    [
+        ("{law}.trnslation=7", "did you mean translation?"),
+        ("{law}.translation=-7", "MyLaw.translation must be"),
+        ("{law}x.translation=7", "has no class 'MyLawx'; did you mean MyLaw?"),
+        ("MyLaw.translation=7", "or FILE.py:CLASS of a law of one's own"),
+    ],
+)
+def test_gains_that_it_has_not_are_refused_where_they_are_said(my_law: str, change: str, why: str):
+    (path := Path(my_law.rpartition(":")[0])).write_text(
+        path.read_text().replace("translation: float = 4.0", "translation: float = positive(4.0)")
+        .replace("import numpy", "from robots.configuration.quantity import positive\nimport numpy")
+    )  # fmt: skip
+    setting = f"servo.laws.{change.format(law=my_law)}"
+    with pytest.raises(ScenarioError, match=re.escape(f"--set {setting}: ")) as refused:
+        load_scenario("misaligned", [setting])
+    assert why in str(refused.value)
+
+
+@pytest.mark.parametrize(
+    ("right", "wrong", "why"),
+    [
+        ("LawOutput(joints[:6]", "LawOutput(joints[:5]", "step must give 6 numbers as position, got 5"),
+        ("memory_size = 21", "memory_size = 20", "initial_state must give 20 numbers, got 21"),
+        ("0, *shift])\n", "0])\n", "step must give 6 numbers as correction, got 3"),
+    ],
+)
+def test_a_result_of_the_wrong_size_is_named(my_law: str, right: str, wrong: str, why: str):
+    assert right in printed()
+    Path(my_law.rpartition(":")[0]).write_text(printed().replace(right, wrong))
+    with pytest.raises(RuntimeError, match=f"class MyLaw: {why}"):
+        Experiment(load_scenario("misaligned"), my_law).advance(until=0.1)
 
 
 def test_what_is_no_law_is_refused_in_one_line(tmp_path: Path):
