@@ -24,7 +24,7 @@ Problems = Sequence[tuple[str, RowProblem]]
 AXES = ("Δx mm", "Δy mm", "Δz mm", "ρx °", "ρy °", "ρz °")
 _WEAK = 0.5  # share of the data in what is known of a parameter, below which it is said
 _MISFIT = 1.3  # of residuals, in units of the known noise, from which it is said
-_NO_NOISE_MM = 1e-6
+_NO_NOISE = 1e-6  # mm or degrees
 _ENCODERS_DEG = 0.03  # noise of joints, estimated, that is ten times that of encoders
 
 
@@ -204,7 +204,7 @@ def calibration_verdict(study: CalibrationStudy, path: Mapping[str, Any] | None)
 def noise_sentence(found: Identified) -> str:
     """How noisy the rows are, and how one knows."""
     noise = noise_dict(found)
-    if noise["estimated"] and noise["position_mm"] < _NO_NOISE_MM:
+    if noise["estimated"] and noise["position_mm"] < _NO_NOISE:
         return " The rows are free of noise."
     if found.noise_belief is not None:
         return (
@@ -224,11 +224,16 @@ def noise_sentence(found: Identified) -> str:
 
 def _sizes(found: Identified, noise: MeasurementNoise) -> str:
     """Of joints, if any, positions and, where they were measured, orientations."""
-    sizes = [f"{np.rad2deg(noise.joint_sigma):.2g} degrees of the joints"] if noise.joint_sigma else []
-    sizes += [f"{1e3 * noise.position_sigma:.2g} mm"]
+    sizes = [f"{_size(np.rad2deg(noise.joint_sigma))} degrees of the joints"] if noise.joint_sigma else []
+    sizes += [f"{_size(1e3 * noise.position_sigma)} mm"]
     if found.residuals.shape[1] == 6:
-        sizes += [f"{np.rad2deg(noise.rotation_sigma):.2g} degrees"]
+        sizes += [f"{_size(np.rad2deg(noise.rotation_sigma))} degrees"]
     return ", ".join(sizes)
+
+
+def _size(noise: float) -> str:
+    """In mm or degrees; what an estimate leaves of a noise that the rows do not have is none."""
+    return f"{noise:.2g}" if noise >= _NO_NOISE else "0"
 
 
 def unexplained_sentence(found: Identified) -> str:

@@ -4,12 +4,14 @@ import json
 import shutil
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from experiments.calibration.report import problem_lines, unexplained_sentence
+from experiments.calibration.report import noise_sentence, problem_lines, unexplained_sentence
 from robots.calibration.identification import identify
 from robots.calibration.instruments.observations import Observations
 from robots.calibration.measurement_file import RowProblem, measurement_text
@@ -293,3 +295,12 @@ def test_springs_that_are_taken_for_noise_of_the_joints_are_asked_for():
         found = identify(robot, table.noisy(MeasurementNoise(joint, 2e-5), rng))
         is_asked = "far more than encoders have" in unexplained_sentence(found)
         assert is_asked == (yields is soft)
+
+
+def test_noise_that_the_rows_do_not_have_is_printed_as_none():
+    noise = MeasurementNoise(3e-24, 19e-6, np.deg2rad(0.002))
+    found: Any = SimpleNamespace(
+        noise=noise, noise_belief=None, is_noise_known=False, residuals=np.zeros((1, 6))
+    )
+    said = " Estimated noise: 0 degrees of the joints, 0.019 mm, 0.002 degrees."
+    assert noise_sentence(found) == said
