@@ -82,6 +82,8 @@ def calibration_json(found: CamerasFound) -> dict[str, Any]:
         "wand_length_mm": found.kit.wand_length_mm,
         "wand_length_mean_mm": float(1e3 * calibration.wand_lengths.mean()),
         "wand_length_standard_deviation_mm": 1e3 * calibration.wand_deviation,
+        "wand_length_by_frame_mm": 1e3 * calibration.wand_by_frame,
+        "wand_length_by_frame_standard_deviation_mm": 1e3 * calibration.wand_by_frame_sigma,
         "largest_error_over_standard_deviation": None
         if found.ratios is None
         else float(np.abs(found.ratios).max()),
@@ -109,6 +111,14 @@ def verdict(found: CamerasFound) -> str:
         f"Measured at {len(calibration.wand_lengths)} places, the wand's length has a standard deviation of "
         f"{1e3 * calibration.wand_deviation:.4f} mm; pixels scatter by {calibration.sigma:.3f} px."
     )
+    if calibration.contradicts_frame:
+        given, by_frame = found.kit.wand_length_mm, 1e3 * calibration.wand_by_frame
+        sigma = 1e3 * calibration.wand_by_frame_sigma
+        text += (
+            f" By the L-frame the wand is {by_frame:.2f} mm long ({sigma:.2f} mm standard deviation) "
+            f"and not {given:g}: one of the two is wrong, and if it is the wand, all "
+            f"lengths are wrong by {1e3 * abs(given / by_frame - 1.0):.2f} mm in a metre."
+        )
     if found.ratios is not None:
         largest = np.abs(found.ratios).max()
         text += (

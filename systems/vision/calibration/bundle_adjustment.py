@@ -54,6 +54,9 @@ class Adjusted:
     sigma: float  # px, standard deviation of a pixel as the residuals show it
     steps: int
     converged: bool  # or the largest number of steps was not enough
+    # m, of the wand as the known points have it, whatever it was given as; and its standard deviation
+    known_wand_length: float
+    known_wand_length_sigma: float
 
 
 def adjust(cameras: Cameras, scene: Scene, wand_p_W: np.ndarray, with_lens: bool = True) -> Adjusted:
@@ -90,6 +93,7 @@ def adjust(cameras: Cameras, scene: Scene, wand_p_W: np.ndarray, with_lens: bool
         converged = gained < _CONVERGED * now.cost or now.cost <= _EXACT * now.count
     freedom = now.count - free.sum() - 6 * len(wand_p_W)
     factor = np.sqrt(now.cost / freedom) if freedom > 0 else 1.0
+    longer, longer_sigma = now.longer_wand(free)
     return Adjusted(
         now.cameras,
         now.wand_p_W,
@@ -99,6 +103,8 @@ def adjust(cameras: Cameras, scene: Scene, wand_p_W: np.ndarray, with_lens: bool
         float(factor * scene.pixel_sigma),
         steps,
         converged,
+        scene.wand_length + longer,
+        float(factor * longer_sigma),
     )
 
 
@@ -131,6 +137,8 @@ class _Linearized:
         length = np.linalg.norm(span, axis=1, keepdims=True)
         pull = np.hstack([-span, span]) / length / scene.wand_sigma
         r_length = (scene.wand_length - length[:, 0]) / scene.wand_sigma
+        self._pull, self._length_weight = pull, 1.0 / scene.wand_sigma
+        self._r_length = r_length
         self._D += pull[:, :, None] * pull[:, None]
         self._d += pull * r_length[:, None]
         cost = np.sum(r_known**2) + np.sum(r_wand**2) + np.sum(r_length**2)
@@ -150,6 +158,23 @@ class _Linearized:
             raise UndeterminedError("what was seen leaves parameters of the cameras free") from error
         shift = np.einsum("fij,fj->fi", D_inverse, self._d - np.einsum("afi,a->fi", self._B, change))
         return change.reshape(n, NUM), shift.reshape(f, 2, 3)
+
+    def longer_wand(self, free: np.ndarray) -> tuple[float, float]:
+        """By how much the wand is longer than given if that is unknown too, and its standard deviation, m.
+
+        At a minimum for the given length: there one more unknown follows from its gradient alone.
+        """
+        D_inverse = np.linalg.inv(self._D)
+        left = self._reduced(self._A, D_inverse)[np.ix_(free, free)]
+        through = np.einsum("fij,fj->fi", D_inverse, self._length_weight * self._pull)
+        cameras = np.einsum("afi,fi->a", self._B, through, optimize=True)[free]
+        of_places = self._length_weight * np.einsum("fi,fi->", self._pull, through)
+        information = len(self._D) * self._length_weight**2 - of_places
+        information -= cameras @ np.linalg.solve(left, cameras)
+        if not information > 0.0:  # no wand, or nothing but its length says how large everything is
+            return 0.0, np.inf
+        longer = -self._length_weight * self._r_length.sum() / information
+        return float(longer), float(1.0 / np.sqrt(information))
 
     def covariance(self, free: np.ndarray) -> np.ndarray:
         """Of the parameters of each camera, (n, 15, 15); zero for those that are not free."""

@@ -14,7 +14,7 @@ class CalibrationKit:
 
     wand_length_mm: float = 601.7  # between the centres of the two spheres at its ends; assumed
     # Standard deviation of that length from place to place, for a wand bends; assumed. What it is wrong by
-    # everywhere scales the whole cell, and no calibration can know it.
+    # everywhere scales the whole cell; that shows only against the L-frame.
     wand_sigma_mm: float = 0.01
     # The spheres of the L-frame in Q, L1 at the origin, L2 and L3 on the x axis, L4 on the y axis; assumed.
     frame_mm: np.ndarray = field(
@@ -23,10 +23,18 @@ class CalibrationKit:
         )
     )
 
+    frame_sigma_mm: float = 0.05  # of the spheres' places along an axis, as they are made; assumed
+
     @property
     def p_Q(self) -> np.ndarray:
         """The spheres of the frame in m, (k, 3)."""
         return 1e-3 * np.asarray(self.frame_mm, dtype=float)
+
+    @property
+    def frame_scale_sigma(self) -> float:
+        """Standard deviation of the scale of the frame, over its longest distance."""
+        between = np.linalg.norm(self.frame_mm[:, None] - self.frame_mm, axis=-1)
+        return float(np.sqrt(2.0) * self.frame_sigma_mm / between.max())
 
 
 @dataclass(frozen=True)

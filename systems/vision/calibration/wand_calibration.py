@@ -26,6 +26,10 @@ _ROUNDS = 8  # of leaving out
 # The frame tells the wand's length as well as data sheets tell the lenses: to a percent, at worst to a third.
 _WRONG_SCALE = 1.6
 _FRAME_OFF = 5.0  # times what is expected of the frame's pixels: its lengths contradict that of the wand
+_DOUBT = 4.0  # sigma, beyond which the frame's length of the wand is another one: once in 16 000
+# A lens is as its data sheet says within less, and the middle of its image within less of the size.
+_OTHER_RESOLUTION = 0.15
+_SAME_FACTOR = 0.05  # by which the factors of focal length and middle may differ then
 _LARGEST_SIGMA = 3.0  # px; no camera is that bad, so points have wrong names or a lens is another one
 
 
@@ -42,6 +46,11 @@ class WandCalibration:
     mean_distance: np.ndarray  # m, from the point to the ray on average, Probst (2024) figure A.10, (n,)
     wand_lengths: np.ndarray  # m, of each place, by triangulation alone, (f,)
     wand: np.ndarray  # m, its ends, (f, 2, 3)
+    # m, of the wand in the scale of the L-frame, whatever length it was given; and the standard deviation
+    # that follows from the pixels and from how well the frame is made
+    wand_by_frame: float
+    wand_by_frame_sigma: float
+    contradicts_frame: bool  # whether that is another length than the given one, beyond doubt
 
     @property
     def position_sigma(self) -> np.ndarray:
@@ -103,7 +112,8 @@ def calibrate_with_wand(
     if not found.converged:
         raise UndeterminedError(f"wand: the adjustment did not converge in {found.steps} steps")
     _refuse_contradicting_frame(found, scene)
-    return _report(found, used, run)
+    _refuse_other_resolution(found.cameras, guess)
+    return _report(found, used, run, kit)
 
 
 def _refuse_too_little(run: WandRun, seen: np.ndarray, names: list[str]) -> None:
@@ -158,6 +168,17 @@ def _refuse_contradicting_frame(found: Adjusted, scene: Scene) -> None:
         )
 
 
+def _refuse_other_resolution(cameras: Cameras, guess: Cameras) -> None:
+    """Refuses images of another resolution, in which all of a camera is larger or smaller by one factor."""
+    focal = float(np.median(cameras.focal / guess.focal))
+    middle = float(np.median(cameras.center / guess.center))
+    if abs(focal - 1.0) > _OTHER_RESOLUTION and abs(middle / focal - 1.0) < _SAME_FACTOR:
+        raise UndeterminedError(
+            f"cameras: focal lengths and principal points in px come out {focal:.2g} times those of the "
+            f"cell: are the images of {focal:.2g} times the resolution of its sensor_px?"
+        )
+
+
 def _refuse_contradiction(seen: np.ndarray, used: np.ndarray, names: list[str]) -> None:
     """Refuses a camera of whose points, (n, f, 2), hardly any belong to the rest."""
     for name, there, left in zip(names, seen.sum((1, 2)), used.sum((1, 2)), strict=True):
@@ -205,7 +226,7 @@ def _once(
     return adjust(cameras, some, wand[whole], with_lens), some, np.flatnonzero(whole)
 
 
-def _report(found: Adjusted, scene: Scene, run: WandRun) -> WandCalibration:
+def _report(found: Adjusted, scene: Scene, run: WandRun, kit: CalibrationKit) -> WandCalibration:
     cameras, (n, f) = found.cameras, found.wand_residual.shape[:2]
     off = np.linalg.norm(found.wand_residual, axis=-1).reshape(n, 2 * f)
     used = ~np.isnan(scene.wand_pixels[..., 0])
@@ -215,6 +236,8 @@ def _report(found: Adjusted, scene: Scene, run: WandRun) -> WandCalibration:
     distance = np.linalg.norm(found.wand_residual.reshape(n, 2 * f, 2) / cameras.focal[:, None], axis=-1)
     ends = triangulated_wand(cameras, scene.wand_pixels, scene.pixel_sigma)
     lengths = np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1)
+    of_frame = scene.wand_length * kit.frame_scale_sigma
+    by_frame_sigma = float(np.hypot(found.known_wand_length_sigma, of_frame))
     return WandCalibration(
         cameras,
         found.covariance,
@@ -225,4 +248,7 @@ def _report(found: Adjusted, scene: Scene, run: WandRun) -> WandCalibration:
         np.nanmean(distance * cameras.depth(p_Q), axis=1),
         lengths[~np.isnan(lengths)],
         found.wand,
+        found.known_wand_length,
+        by_frame_sigma,
+        abs(found.known_wand_length - scene.wand_length) > _DOUBT * by_frame_sigma,
     )

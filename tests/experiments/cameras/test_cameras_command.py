@@ -52,6 +52,17 @@ def test_a_calibration_from_a_file_is_the_one_that_wrote_it(tmp_path: Path):
 
 
 @pytest.mark.slow
+def test_a_wand_that_is_millimetres_wrong_is_told_by_the_frame(tmp_path: Path):
+    seen = tmp_path / "seen.csv"
+    right = run("calibrate", "--places=200", f"--write-recording={seen}", f"--out={tmp_path / 'a.html'}")
+    assert "By the L-frame" not in right.stdout
+    wrong = run("calibrate", f"--recording={seen}", "--wand-length=600", f"--out={tmp_path / 'b.html'}")
+    said = " ".join(wrong.stdout.split())
+    assert "By the L-frame the wand is 601.7" in said
+    assert "and not 600: one of the two is wrong" in said
+    assert "wrong by 2.8" in said
+
+
 def test_the_table_is_that_of_motion_capture(tmp_path: Path):
     result = run("calibrate", "--places=200", f"--report={tmp_path / 'c.html'}")
     assert result.exit_code == 0, result.output

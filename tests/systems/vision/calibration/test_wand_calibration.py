@@ -184,6 +184,31 @@ def seen_by(run: WandRun, cameras: list[int]) -> WandRun:
     return WandRun(run.frame_pixels[cameras], run.frame_exposures[cameras], run.wand_pixels[cameras])
 
 
+@pytest.mark.parametrize(("exposures", "given"), [(100, 601.7), (100, 601.0), (1, 600.0)])
+def test_the_scale_of_the_frame_tells_the_length_of_the_wand(exposures: int, given: float):
+    """Whatever length is given; it is called wrong beyond four standard deviations only."""
+    exact = CalibrationKit(given, frame_sigma_mm=0.0)
+    off = []
+    for seed in range(8):
+        run = waved(seed, places=150, frame_exposures=exposures)
+        found = calibrate_with_wand(run, exact, GUESS, NAMES)
+        off.append((1e3 * found.wand_by_frame - 601.7) / (1e3 * found.wand_by_frame_sigma))
+        assert found.contradicts_frame == (given != 601.7)
+    assert np.abs(off).max() < 4.0
+    assert given != 601.7 or 0.4 < np.sqrt(np.mean(np.square(off))) < 1.7
+    # Spheres of the frame that are off by half a tenth of a millimetre leave a wand that is wrong by as much.
+    found = calibrate_with_wand(waved(0, places=150), CalibrationKit(601.6), GUESS, NAMES)
+    assert not found.contradicts_frame
+
+
+@pytest.mark.parametrize("factor", [0.5, 0.75])
+def test_images_of_another_resolution_are_refused(factor: float):
+    full = waved(places=150)
+    run = replace(full, frame_pixels=factor * full.frame_pixels, wand_pixels=factor * full.wand_pixels)
+    with pytest.raises(UndeterminedError, match=rf"images of {factor / 1.01:.2g} times the res"):
+        calibrate_with_wand(run, KIT, GUESS, NAMES)
+
+
 def test_refuses_too_little():
     run = waved(1)
     no_frame = replace(run, frame_pixels=np.full_like(run.frame_pixels, np.nan))
