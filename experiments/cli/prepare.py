@@ -13,6 +13,7 @@ from diagrams.scenario.scenario_file import OptionSetting, read_scenario_nodes, 
 from experiments.cli.console import print_note
 from robots.description.foreign_sources import foreign_sources_note
 from robots.description.model import RobotFileError, RobotModel, load_robot
+from robots.description.placement import long_tool_note
 from robots.dynamics.compliant_kinematics import controller_kinematics
 from robots.kinematics.error_kinematics import ErrorKinematics
 from systems.cell.events.station_events import check_events
@@ -53,7 +54,7 @@ class Prepared:
                 f"the feedforward compensates an elastic structure that the robot does not have with "
                 f"station.elasticity={true}"
             )
-        return "; ".join(filter(None, (self.carried, foreign_sources_note(self.robot))))
+        return "; ".join(filter(None, (self.carried, _file_note(self.robot))))
 
     @property
     def text(self) -> str:
@@ -68,8 +69,13 @@ def noted_robot(console: Console, name: str) -> RobotModel:
         ValueError: if there is no such robot, or its file cannot be read.
     """
     robot = load_robot(name)
-    print_note(console, foreign_sources_note(robot))
+    print_note(console, _file_note(robot))
     return robot
+
+
+def _file_note(robot: RobotModel) -> str:
+    """What in the file of a robot may be wrong, in a line; empty if nothing."""
+    return "; ".join(filter(None, (foreign_sources_note(robot), long_tool_note(robot.tool))))
 
 
 def prepare(

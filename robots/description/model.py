@@ -28,7 +28,7 @@ from robots.description.counterbalance_spring import CounterbalanceSpring
 from robots.description.drive_train import DriveLimits, DriveTrain, Tilting, drive_trains
 from robots.description.measuring import MeasuringRange
 from robots.description.pictures.picture import Picture, with_paths_from
-from robots.description.placement import Placement
+from robots.description.placement import Placement, tool_problem
 from robots.description.urdf_in.reader import is_urdf, read_urdf
 from robots.drivetrain.counterbalance import Counterbalance
 from robots.drivetrain.stiffness import SpringRow
@@ -315,6 +315,7 @@ def _problem(robot: RobotModel) -> tuple[_Keys, str]:
         ]
     if not any(problem for _, problem in problems):
         problems.append((("counterbalance",), _refusal(lambda: robot.counterbalance_at_axis_2)))
+    problems.append((("tool", "translation"), tool_problem(robot.tool)))
     problems.append((("calibration",), robot.calibration.problem()))
     problems.append((("measuring",), robot.measuring.problem()))
     if robot.payload.largest_mass > 0.0:

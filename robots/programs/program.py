@@ -72,6 +72,18 @@ def quaternion_problem(numbers: Mapping[str, Literal]) -> str:
     return "" if abs(length - 1.0) <= _UNIT else f"the quaternion has the length {length:.4g}, not 1"
 
 
+def declared_pose(position: Sequence[Literal], quaternion: Sequence[Literal], what: str) -> np.ndarray:
+    """The pose (4, 4) of a tool or a work object, given in mm and as a quaternion.
+
+    Raises:
+        ProgramError: if the quaternion is no rotation; it begins with ``what`` and where it stands.
+    """
+    if problem := quaternion_problem(dict(zip(_QUATERNION, quaternion, strict=True))):
+        raise ProgramError(f"{what}: {problem}")
+    R = Rotation.from_quat([each.value for each in quaternion], scalar_first=True).as_matrix()
+    return homogeneous([MILLIMETRE * each.value for each in position], R)
+
+
 @dataclass(frozen=True)
 class Note:
     """Something in a program that a person should know of."""

@@ -9,7 +9,6 @@ from dataclasses import dataclass, field, replace
 from itertools import pairwise
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
 from robots.programs.course import Course
 from robots.programs.program import (
@@ -25,7 +24,7 @@ from robots.programs.program import (
     ProgramError,
     Source,
     Target,
-    homogeneous,
+    declared_pose,
     quaternion_problem,
 )
 from robots.programs.rapid_course import is_motion, is_straight, not_followed, note_call, steer
@@ -199,7 +198,7 @@ class _Reader:
             raise ProgramError(f"{at}: {name} is moved by a mechanical unit, which cannot be compensated")
         X = np.eye(4)
         for rows in filter(None, frames):
-            X = X @ _pose(rows)
+            X = X @ declared_pose(rows[0], rows[1], f"{at}: {name}")
         return Frame(name, X)
 
     def _mass(self, name: str, where: str) -> float:
@@ -389,9 +388,3 @@ def _length(tree: Tree) -> int:
 
 def _flag(tree: Tree) -> bool:
     return isinstance(tree, Other) and tree.text.lower() == "true"
-
-
-def _pose(rows: list[list[Literal]]) -> np.ndarray:
-    position, quaternion = ([each.value for each in row] for row in rows)
-    R = Rotation.from_quat(quaternion, scalar_first=True).as_matrix()
-    return homogeneous([MILLIMETRE * each for each in position], R)

@@ -1,11 +1,15 @@
 """Reads a program in whichever language its name says."""
 
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
+
+from robots.description.placement import LONGEST_TOOL
 from robots.programs.krl import read_krl
 from robots.programs.pose_table import read_pose_table
-from robots.programs.program import Program, ProgramContext, ProgramError, Source, read_source
+from robots.programs.program import Note, Program, ProgramContext, ProgramError, Source, read_source
 from robots.programs.rapid import read_rapid
 
 _RAPID, _KRL, _TABLE = (".mod", ".prg", ".sys", ".modx", ".sysx"), (".src", ".dat"), (".csv", ".txt")
@@ -15,6 +19,7 @@ _READERS = {
     **dict.fromkeys(_TABLE, read_pose_table),
 }
 SUFFIXES = tuple(_READERS)
+_SHORTEST_TOOL = 2e-3  # m; one of up to 2 m whose numbers are in m and not in mm is shorter
 
 
 def read_program(path: str | Path, others: Sequence[str] = (), tool: str = "", base: str = "") -> Program:
@@ -38,4 +43,23 @@ def parse_program(source: Source, context: ProgramContext | None = None) -> Prog
     suffix = Path(source.name).suffix.lower()
     if suffix not in _READERS:
         raise ProgramError(f"{source.name}: the name of a program must end in one of {', '.join(_READERS)}")
-    return _READERS[suffix](source, context or ProgramContext())
+    program = _READERS[suffix](source, context or ProgramContext())
+    return replace(program, notes=(*program.notes, *_doubtful_tools(source, program)))
+
+
+def _doubtful_tools(source: Source, program: Program) -> list[Note]:
+    """Tools that are too short to be in mm. Raises ProgramError for one that is too long."""
+    short = {}
+    for target in program.targets:
+        if target.tool is None:
+            continue
+        length = float(np.linalg.norm(target.tool.X[:3, 3]))
+        if length > LONGEST_TOOL:
+            raise ProgramError(
+                f"{source.where(target.line)}: the tool {target.tool.name} is {length:g} m long, more than "
+                f"{LONGEST_TOOL:g} m; is it in mm?"
+            )
+        if 0.0 < length < _SHORTEST_TOOL:
+            text = f"the tool {target.tool.name} is only {1e3 * length:.3g} mm long; is it in mm?"
+            short.setdefault(target.tool.name, Note(target.line, text))
+    return list(short.values())

@@ -122,6 +122,10 @@ REFUSED = {
         put("tool", "translation", [0, 0, 158]),
         "tool.translation[2] must be between -100 and 100 m, got 158",
     ),
+    "a tool of some mm in mm": (
+        put("tool", "translation", [0, 0, 8.5]),
+        "tool.translation is 8.5 m long, more than 5 m; is it in m?",
+    ),
     "axis without direction": (
         put("joints", 3, "axis", [0, 0, 0]),
         "joint 4: axis must have a direction, got [0.0, 0.0, 0.0]",

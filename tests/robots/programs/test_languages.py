@@ -79,6 +79,13 @@ def test_what_is_no_plain_target_is_left_alone_and_named(lines: list[str], note:
     assert [note in each.text for each in program.notes] == [True]
 
 
+def test_a_tool_whose_millimetres_seem_to_be_metres_is_named():
+    program = rapid(GRIPPER.replace("150]", "0.15]"), robtarget("p"), "PROC main() MoveL p,v1,fine,grip;")
+    assert [target.name for target in program.targets] == ["p"]
+    (note,) = program.notes
+    assert note.text == "the tool grip is only 0.15 mm long; is it in mm?"
+
+
 def test_a_target_beside_another_is_named_and_the_other_corrected():
     program = rapid(robtarget("p"), "PROC main()", "MoveL Offs(p,0,0,50),v1,fine,tool0;", "ENDPROC")
     assert [target.name for target in program.targets] == ["p"]
@@ -89,6 +96,18 @@ def test_a_target_beside_another_is_named_and_the_other_corrected():
     ("lines", "refusal"),
     [
         ([robtarget("p"), "PROC main()", "MoveL p,v1,fine,gone;"], "m.mod, line 4: gone is not declared"),
+        (
+            [GRIPPER.replace("150],[1", "150],[2"), robtarget("p"), "PROC main()", "MoveL p,v1,fine,grip;"],
+            "m.mod, line 2: grip: the quaternion has the length 2, not 1",
+        ),
+        (
+            [GRIPPER.replace("150],[1", "150],[0"), robtarget("p"), "PROC main()", "MoveL p,v1,fine,grip;"],
+            "m.mod, line 2: grip: the quaternion is zero",
+        ),
+        (
+            [GRIPPER.replace("150]", "150000]"), robtarget("p"), "PROC main()", "MoveL p,v1,fine,grip;"],
+            "m.mod, line 3: the tool grip is 150 m long, more than 5 m; is it in mm?",
+        ),
         (
             [GRIPPER, robtarget("p"), "PROC main()", "MoveL p,v1,fine,grip;", "MoveL p,v1,fine,tool0;"],
             "line 6: p is moved to with tool0, and with grip in m.mod, line 5",
