@@ -34,6 +34,12 @@ def zeros_command(
         str, typer.Option(metavar="NAME", help="structure, or joints for elastic gears alone.")
     ] = "structure",
     grid: GridOption = 15,
+    wrist: Annotated[
+        str | None,
+        typer.Option(
+            metavar="Q4,Q5,Q6", help="Axes 4, 5 and 6 in degrees.", show_default="0,40.1,0: 0.7 rad"
+        ),
+    ] = None,
     example: Annotated[
         str | None, typer.Option(metavar="NAME", help=f"In place of a robot: {', '.join(EXAMPLES)}.")
     ] = None,
@@ -57,9 +63,9 @@ def zeros_command(
         if body is not None and example is not None:
             raise ValueError("--body and --example are two different things: give one of them")
         if body is not None:
-            refuse_given(context, ("robot", "elasticity", "grid"), "with --body")
+            refuse_given(context, ("robot", "elasticity", "grid", "wrist"), "with --body")
         if example is not None:
-            refuse_given(context, ("robot", "payload", "elasticity", "grid"), "with --example")
+            refuse_given(context, ("robot", "payload", "elasticity", "grid", "wrist"), "with --example")
         if body is not None or example is not None:
             found = body_zeros(body, payload or 0.0) if body else example_named(str(example))
             numbers, verdict = found.numbers, found.verdict
@@ -69,13 +75,26 @@ def zeros_command(
             model = noted_robot(human, robot)
             mass = model.payload.largest_mass if payload is None else payload
             with progress_bar(f"{grid * grid} positions") as progress:
-                study = study_zeros(model, elasticity, mass, grid, progress)
+                study = study_zeros(model, elasticity, mass, grid, progress, _wrist(wrist))
             numbers = zeros_json(study)
             verdict = zeros_verdict(study)
             _write_study(page, study, verdict)
         output.write(numbers)
     human.print(escape(verdict))
     print_files(human, out)
+
+
+def _wrist(angles: str | None) -> np.ndarray | None:
+    """Axes 4 to 6 in rad as an option says them, None for the usual ones. Raises ValueError."""
+    if angles is None:
+        return None
+    try:
+        wrist = np.deg2rad([float(part) for part in angles.split(",")])
+    except ValueError:
+        wrist = np.zeros(0)
+    if wrist.shape != (3,) or not np.isfinite(wrist).all():
+        raise ValueError(f"--wrist must be three angles in degrees such as 0,40,0, got '{angles}'")
+    return wrist
 
 
 def zeros_verdict(study: ZeroStudy) -> str:
@@ -97,8 +116,9 @@ def zeros_verdict(study: ZeroStudy) -> str:
 def _write_study(page: Path, study: ZeroStudy, verdict: str) -> None:
     sections = []
     if np.isfinite(study.slowest_rhp).any():
+        wrist = ", ".join(f"{angle:.0f}" for angle in np.rad2deg(study.wrist) + 0.0)
         note = (
-            "From the motors to the pose of the tool; axis 5 at 40 degrees, axes 1, 4 and 6 at zero. A "
+            f"From the motors to the pose of the tool; axis 1 at zero, axes 4, 5 and 6 at {wrist} degrees. A "
             "pair that has just crossed the imaginary axis has a small real part at a high frequency."
         )
         sections.append(Section("Slowest zero in the right half-plane", note, workspace_figure(study), 560))

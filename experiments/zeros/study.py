@@ -16,22 +16,23 @@ from experiments.feedforward.two_joint_arm import (
     STIFFNESS,
     TwoJointArm,
 )
-from robots.description.model import NUM_JOINTS, RobotModel
+from robots.description.model import RobotModel
 from robots.dynamics.transmission_zeros import ZeroAnalysis, Zeros, transmission_zeros
 
-_BENT_WRIST = 0.7  # rad of axis 5: at zero the wrist is singular
+_BENT_WRIST = (0.0, 0.7, 0.0)  # rad of axes 4 to 6: with axis 5 at zero the wrist is singular
 BEAM_MODES = (1, 2, 3, 4, 5)
 
 
 @dataclass(frozen=True)
 class ZeroStudy:
-    """The zeros over a grid of axes 2 and 3, axis 5 bent, the other axes at zero."""
+    """The zeros over a grid of axes 2 and 3, axis 1 at zero."""
 
     robot: RobotModel
     elasticity: str
     payload: float  # kg
     axis_2: np.ndarray  # (n,) rad
     axis_3: np.ndarray  # (m,) rad
+    wrist: np.ndarray  # (3,) rad, axes 4 to 6
     workspace: list[list[Zeros | None]]  # n lists of m; None at singular poses
 
     @property
@@ -56,12 +57,28 @@ def study_zeros(
     payload: float,
     grid: int,
     progress: Callable[[float], None] | None = None,
+    wrist: np.ndarray | None = None,
 ) -> ZeroStudy:
     """Finds the zeros at grid x grid positions of axes 2 and 3 within their limits.
 
+    Args:
+        robot: whose zeros.
+        elasticity: what of it is elastic.
+        payload: kg.
+        grid: positions of each of the two axes.
+        progress: is called with the share that is done.
+        wrist: where axes 4 to 6 are, rad, (3,); None for axis 5 bent by 0.7 rad.
+
     Raises:
-        ValueError: if the grid is too small or all of it singular, or `ZeroAnalysis` refuses the robot.
+        ValueError: if the grid is too small or all of it singular, the wrist is beyond its limits, or
+            `ZeroAnalysis` refuses the robot.
     """
+    wrist = np.array(_BENT_WRIST) if wrist is None else wrist
+    if ((wrist < robot.lower[3:]) | (wrist > robot.upper[3:])).any():
+        limits = zip(np.rad2deg(robot.lower[3:]), np.rad2deg(robot.upper[3:]), strict=True)
+        ranges = ", ".join(f"{low:g} to {high:g}" for low, high in limits)
+        angles = ",".join(f"{angle:g}" for angle in np.rad2deg(wrist))
+        raise ValueError(f"--wrist {angles}: axes 4 to 6 of {robot.name} have {ranges} degrees")
     if grid < 2:
         raise ValueError(f"--grid must be at least 2, got {grid}")
     analysis = ZeroAnalysis(robot, elasticity, payload)
@@ -70,10 +87,10 @@ def study_zeros(
     axis_2, axis_3 = np.linspace(lower[1:3], upper[1:3], grid).T
     workspace = []
     for q2 in axis_2:
-        workspace.append([_zeros_at(analysis, q2, q3) for q3 in axis_3])
+        workspace.append([_zeros_at(analysis, np.array([0.0, q2, q3, *wrist])) for q3 in axis_3])
         if progress:
             progress(len(workspace) / grid)
-    study = ZeroStudy(robot, elasticity, payload, axis_2, axis_3, workspace)
+    study = ZeroStudy(robot, elasticity, payload, axis_2, axis_3, wrist, workspace)
     if not study.regular:
         raise ValueError(
             f"zeros of {robot.name}: the arm is singular at all {grid} x {grid} positions of axes 2 and 3; "
@@ -82,9 +99,7 @@ def study_zeros(
     return study
 
 
-def _zeros_at(analysis: ZeroAnalysis, q2: float, q3: float) -> Zeros | None:
-    theta = np.zeros(NUM_JOINTS)
-    theta[[1, 2, 4]] = q2, q3, _BENT_WRIST
+def _zeros_at(analysis: ZeroAnalysis, theta: np.ndarray) -> Zeros | None:
     try:
         return analysis.at(theta)
     except ValueError:
@@ -111,6 +126,7 @@ def zeros_json(study: ZeroStudy) -> dict[str, Any]:
         "poses_with_unstable_inverse": sum(not z.is_minimum_phase for z in study.regular),
         "axis_2_deg": np.rad2deg(study.axis_2).tolist(),
         "axis_3_deg": np.rad2deg(study.axis_3).tolist(),
+        "wrist_deg": np.rad2deg(study.wrist).tolist(),
         "slowest_rhp_map": [[None if np.isnan(value) else float(value) for value in row] for row in slowest],
     }
 

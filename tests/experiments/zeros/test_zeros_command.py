@@ -33,6 +33,30 @@ def test_a_robot_with_an_elastic_structure_has_no_stable_inverse_anywhere(
         assert numbers["slowest_rhp"] == min(min(row) for row in numbers["slowest_rhp_map"])
 
 
+def test_axes_4_to_6_may_be_elsewhere(tmp_path: Path):
+    def slowest(*wrist: str) -> np.ndarray:
+        result = run(tmp_path, "--robot=kr210", "--grid=2", "--json", "-", *wrist)
+        assert result.exit_code == 0, result.output
+        return np.array(json.loads(result.stdout)["slowest_rhp_map"])
+
+    usual, bent, turned = slowest(), slowest("--wrist=0,80,0"), slowest("--wrist=90,40.107,0")
+    np.testing.assert_allclose(slowest(f"--wrist=0,{float(np.rad2deg(0.7))},0"), usual, rtol=1e-6)
+    assert np.abs(bent / usual - 1.0).max() > 1e-3
+    assert np.abs(turned / usual - 1.0).max() > 1e-3
+    assert "axes 4, 5 and 6 at 90, 40, 0 degrees" in (tmp_path / "zeros.html").read_text()
+
+
+@pytest.mark.parametrize(
+    ("wrist", "why"),
+    [
+        ("0,40", "--wrist must be three angles in degrees such as 0,40,0, got '0,40'"),
+        ("0,200,0", "--wrist 0,200,0: axes 4 to 6 of KUKA"),
+    ],
+)
+def test_a_wrist_that_cannot_be_is_refused(tmp_path: Path, wrist: str, why: str):
+    assert why in refusal(run(tmp_path, f"--wrist={wrist}"))
+
+
 def test_positions_of_an_arm_that_turns_further_are_counted_once_and_singular_ones_named(tmp_path: Path):
     result = run(tmp_path, "--robot=ur10", "--grid=4", f"--json={tmp_path / 'zeros.json'}")
     numbers = json.loads((tmp_path / "zeros.json").read_text())
