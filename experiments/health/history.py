@@ -9,7 +9,7 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 
-_ROBOT, _CAMERAS, _POSES = b"robot", b"cameras", b"poses_rad"
+_ROBOT, _CAMERAS, _POSES, _CALIBRATION = b"robot", b"cameras", b"poses_rad", b"calibration_of_cameras"
 
 
 @dataclass(frozen=True)
@@ -23,6 +23,9 @@ class History:
     X_WE: np.ndarray  # of the poses, (n, 6, 4, 4)
     rotations: np.ndarray  # of the cameras, mean of a check in rad, (n, cameras, 3)
     alarms: list[list[dict[str, Any]]]  # of the cameras in each check
+    # Of the cameras as they were calibrated: places in m, orientations and lenses, (cameras, k); None in a
+    # history of before these were kept
+    calibration: np.ndarray | None = None
 
     def appended(
         self, time: float, X_WE: np.ndarray, rotations: np.ndarray, alarms: list[dict[str, Any]]
@@ -36,14 +39,14 @@ class History:
             np.concatenate([self.X_WE, X_WE[None]]),
             np.concatenate([self.rotations, rotations[None]]),
             [*self.alarms, alarms],
+            self.calibration,
         )
 
 
-def new_history(robot: str, cameras: tuple[str, ...], q: np.ndarray) -> History:
+def new_history(robot: str, cameras: tuple[str, ...], q: np.ndarray, calibration: np.ndarray) -> History:
     """A history without a check."""
-    return History(
-        robot, cameras, q, np.zeros(0), np.zeros((0, len(q), 4, 4)), np.zeros((0, len(cameras), 3)), []
-    )
+    nothing = np.zeros((0, len(q), 4, 4)), np.zeros((0, len(cameras), 3))
+    return History(robot, cameras, q, np.zeros(0), *nothing, [], calibration)
 
 
 def write_history(path: Path, history: History) -> None:
@@ -62,6 +65,7 @@ def write_history(path: Path, history: History) -> None:
             _CAMERAS: json.dumps(history.cameras),
             _POSES: json.dumps(history.q.tolist()),
         }
+        | ({} if history.calibration is None else {_CALIBRATION: json.dumps(history.calibration.tolist())})
     )
     pq.write_table(table, path)
 
@@ -85,8 +89,9 @@ def read_history(path: Path) -> History:
             X[:, pose, :3] = rows.reshape(n, 3, 4)
         turns = [[data[f"camera_{name}_{axis}_rad"] for axis in "xyz"] for name in cameras]
         alarms = [json.loads(each) for each in table["camera_alarms"].to_pylist()]
-        return History(
-            head[_ROBOT].decode(), cameras, q, data["time_s"], X, np.moveaxis(np.array(turns), 2, 0), alarms
-        )
+        rotations, calibrated = np.moveaxis(np.array(turns), 2, 0), head.get(_CALIBRATION)
+        calibration = None if calibrated is None else np.array(json.loads(calibrated))
+        robot, time = head[_ROBOT].decode(), data["time_s"]
+        return History(robot, cameras, q, time, X, rotations, alarms, calibration)
     except (pa.ArrowInvalid, KeyError) as error:
         raise ValueError(f"history {path}: not a history of truetip health") from error

@@ -106,7 +106,7 @@ class HealthStudy:
 
     def begun(self) -> History:
         """A history without a check."""
-        return new_history(self._robot.name, self.names, self._q)
+        return new_history(self._robot.name, self.names, self._q, self._calibration)
 
     def continued(
         self,
@@ -145,6 +145,13 @@ class HealthStudy:
         return history
 
     @property
+    def _calibration(self) -> np.ndarray:
+        """Where the cameras stand in the frame of the robot's base, and their lenses, (n, 21)."""
+        cameras = self._rig.camera_model()
+        lens = (cameras.focal, cameras.center, cameras.radial, cameras.tangential)
+        return np.hstack([cameras.p_WC, cameras.R_WC.reshape(-1, 9), *lens])
+
+    @property
     def q(self) -> np.ndarray:
         """The configurations of a check in rad, (6, 6)."""
         return self._q
@@ -164,6 +171,15 @@ class HealthStudy:
                 f"the history is of {history.robot} with {len(history.cameras)} cameras, not of "
                 f"{self._robot.name} with {len(self.names)}"
             )
+        known = history.calibration
+        if known is not None:
+            others = np.flatnonzero(~np.isclose(known, self._calibration, rtol=1e-9, atol=1e-9).all(axis=1))
+            if len(others):
+                names = ", ".join(self.names[i] for i in others)
+                raise ValueError(
+                    "the history is of cameras of these names that stand elsewhere or have other lenses: "
+                    f"{names}; begin another with --history once cameras have been calibrated anew"
+                )
         if not np.allclose(history.q, self._q, atol=1e-6):
             raise ValueError("the history has other poses than this robot would be checked in")
         if len(history.time) and (history.time[0] < _CLOCK) != is_simulated:

@@ -1,6 +1,7 @@
 """``truetip health``: checks are appended, changes are named, and what cannot be continued is refused."""
 
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -8,6 +9,11 @@ import pyarrow.parquet as pq
 import pytest
 
 from diagrams.scenario.scenario import load_scenario
+from experiments.health.history import read_history, write_history
+from experiments.health.study import HealthStudy
+from robots.description.model import load_robot
+from systems.vision.camera_rig import load_cell
+from systems.vision.camera_rig_file import cell_text
 from tests.experiments.commands import files, refusal, truetip
 
 STILL = ["--set=station.elasticity=rigid", "--set=initial_error_mm=[0,0,0]",
@@ -100,6 +106,23 @@ def test_a_joint_of_a_guided_robot_that_drifts_is_named_and_its_history_is_not_o
     assert 0.0 < alarm["onset_s"] < 86400.0
     told = refusal(truetip("health", *STILL, "--history", tmp_path / "h.parquet"))
     assert "simulated checks cannot be continued on a station, nor the other way round" in told
+
+
+def test_a_history_is_that_of_the_cameras_and_not_of_their_names(tmp_path: Path):
+    scenario, robot = load_scenario("nominal"), load_robot("irb1200")
+    path = tmp_path / "h.parquet"
+    study = HealthStudy(scenario, robot)
+    cameras = np.zeros((len(study.names), 3))
+    write_history(path, study.begun().appended(0.0, np.tile(np.eye(4), (6, 1, 1)), cameras, []))
+    study.refuse(read_history(path), is_simulated=True)
+    rig = load_cell("probst")
+    rig.cameras[3].position_mm = rig.cameras[3].position_mm + np.array([5.0, 0.0, 0.0])
+    (tmp_path / "moved.yaml").write_text(cell_text(rig))
+    moved = HealthStudy(scenario, robot, str(tmp_path / "moved.yaml"))
+    with pytest.raises(ValueError, match=r"cameras of these names that stand elsewhere .*: 04; begin"):
+        moved.refuse(read_history(path), is_simulated=True)
+    # One from before cameras were kept goes on.
+    moved.refuse(replace(read_history(path), calibration=None), is_simulated=True)
 
 
 @pytest.mark.slow
