@@ -175,6 +175,8 @@ class Feedforward(LeafSystem):
 
     def _require_sizes(self, drive: Drive, memory_size: int) -> None:
         """Refuses what a model's own method has given. Raises RuntimeError, as what breaks off a run does."""
+        if not isinstance(drive, Drive):
+            raise RuntimeError(f"class {type(self).__name__}: drive_under must return a Drive, got {drive!r}")
         sizes = {"deflection": NUM_JOINTS, "deflection_rate": NUM_JOINTS, "torque": NUM_JOINTS}
         for name, size in (sizes | {"memory": memory_size}).items():
             given = np.shape(getattr(drive, name))

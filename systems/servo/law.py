@@ -178,6 +178,8 @@ class ServoLaw(LeafSystem):
             # No command is an answer too: the guard holds the robot and counts it.
             step = LawOutput(_NO_COMMAND, _NO_COMMAND, state.value(_CORRECTION), memory)
         discrete_state.set_value(_MEASUREMENT, np.array((last_used, refused, newest)))
+        if not isinstance(step, LawOutput):
+            raise RuntimeError(f"class {type(self).__name__}: step must return a LawOutput, got {step!r}")
         try:
             discrete_state.set_value(_POSITION, step.position)
             discrete_state.set_value(_VELOCITY, step.velocity)

@@ -52,10 +52,17 @@ def test_one_that_computes_nothing_is_refused_before_anything_runs(tmp_path: Pat
         run(load_scenario("misaligned", [*SETTINGS, kind]), "open_loop")
 
 
-def test_one_that_gives_too_few_numbers_is_told_which(tmp_path: Path):
-    (tmp_path / "own.py").write_text(OWN.replace("Drive(np.zeros(6)", "Drive(np.zeros(5)"))
+@pytest.mark.parametrize(
+    ("right", "wrong", "why"),
+    [
+        ("Drive(np.zeros(6)", "Drive(np.zeros(5)", "must give 6 numbers as deflection, got 5"),
+        ("return Drive", "Drive", "must return a Drive, got None"),
+    ],
+)
+def test_a_wrong_result_is_named(tmp_path: Path, right: str, wrong: str, why: str):
+    (tmp_path / "own.py").write_text(OWN.replace(right, wrong))
     kind = f"servo.feedforward.kind={tmp_path / 'own.py'}:Mine"
-    with pytest.raises(RuntimeError, match="Mine: drive_under must give 6 numbers as deflection, got 5"):
+    with pytest.raises(RuntimeError, match=f"Mine: drive_under {why}"):
         run(load_scenario("misaligned", [*SETTINGS, kind]), "open_loop")
 
 

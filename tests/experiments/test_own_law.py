@@ -172,6 +172,7 @@ def test_gains_that_it_has_not_are_refused_where_they_are_said(my_law: str, chan
         ("LawOutput(joints[:6]", "LawOutput(joints[:5]", "step must give 6 numbers as position, got 5"),
         ("memory_size = 21", "memory_size = 20", "initial_state must give 20 numbers, got 21"),
         ("0, *shift])\n", "0])\n", "step must give 6 numbers as correction, got 3"),
+        ("return LawOutput(", "LawOutput(", "step must return a LawOutput, got None"),
     ],
 )
 def test_a_result_of_the_wrong_size_is_named(my_law: str, right: str, wrong: str, why: str):
