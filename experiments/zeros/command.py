@@ -115,18 +115,19 @@ def zeros_verdict(study: ZeroStudy) -> str:
 
 def _write_study(page: Path, study: ZeroStudy, verdict: str) -> None:
     sections = []
+    wrist = ", ".join(f"{angle:.0f}" for angle in np.rad2deg(study.wrist) + 0.0)
+    pose = f"axis 1 at zero, axes 4, 5 and 6 at {wrist} degrees"
     if np.isfinite(study.slowest_rhp).any():
-        wrist = ", ".join(f"{angle:.0f}" for angle in np.rad2deg(study.wrist) + 0.0)
         note = (
-            f"From the motors to the pose of the tool; axis 1 at zero, axes 4, 5 and 6 at {wrist} degrees. A "
-            "pair that has just crossed the imaginary axis has a small real part at a high frequency."
+            f"From the motors to the pose of the tool; {pose}. A pair that has just crossed the imaginary "
+            "axis has a small real part at a high frequency."
         )
         sections.append(Section("Slowest zero in the right half-plane", note, workspace_figure(study), 560))
     middle = study.regular[len(study.regular) // 2]
     sections.append(
         Section(
             "Zeros of the middle position",
-            zeros_note(middle),
+            f"With {pose}. {zeros_note(middle)}",
             plane_figure(middle),
         )
     )

@@ -41,13 +41,15 @@ function drawPanel(panel) {
     margin: {l: 62, r: 14, t: onPaper || narrow() ? 26 : 44, b: 46}};
   panel.axes.forEach((axes, i) => {
     const n = i ? i + 1 : "";
+    const ofLaws = name => data.laws.filter(shown).map(law => (panel.curves[law.id] || [])[i])
+      .filter(Boolean).map(code => curve(code)[name]);
     extra["xaxis" + n] = axis({type: axes.x_log ? "log" : "linear", domain: cells[i].x, anchor: "y" + n,
       title: cells[i].isLowest || axes.x !== panel.axes[panel.axes.length - 1].x ? titled(axes.x) : undefined,
       range: axes.over_time ? [data.laws[0].line.t[0], data.marks.path_end] : undefined, exponentformat: "none",
-      dtick: axes.x_log ? 1 : undefined, nticks: axes.x_log ? undefined : 7});
+      ...(axes.x_log ? logTicks(ofLaws("x")) : {nticks: 7})});
     extra["yaxis" + n] = axis({type: axes.y_log ? "log" : "linear", domain: cells[i].y, anchor: "x" + n,
-      title: titled(axes.y), exponentformat: "none", range: axes.fits_path ? rangeOnPath(panel, i) : undefined, dtick: axes.y_log ? 1 : undefined,
-      nticks: axes.y_log ? undefined : panel.axes.length > 3 && narrow() ? 4 : 6});
+      title: titled(axes.y), exponentformat: "none", range: axes.fits_path ? rangeOnPath(panel, i) : undefined,
+      ...(axes.y_log ? logTicks(ofLaws("y")) : {nticks: panel.axes.length > 3 && narrow() ? 4 : 6})});
     for (const limit of axes.limits) shapes.push({type: "line", xref: "x" + n + " domain", yref: "y" + n,
       x0: 0, x1: 1, y0: limit, y1: limit, line: {color: css("--soft"), width: 1.2, dash: "dot"}});
     if (axes.over_time) for (const x of [data.marks.path_start, data.marks.dwell_start]) shapes.push({

@@ -48,6 +48,18 @@ function markLabels() {
   return [label(data.marks.path_start, "path starts", "left"), label(data.marks.path_end, "dwell", "right")];
 }
 
+/* A number at each decade, and between them where the curves span so few that none or one might be there. */
+function logTicks(curves) {
+  let low = Infinity, high = 0;
+  for (const values of curves) for (const value of values) if (value > 0) {
+    low = Math.min(low, value);
+    high = Math.max(high, value);
+  }
+  const decades = Math.log10(high / low);
+  if (!(decades < 1.5)) return {dtick: 1};
+  return {dtick: decades < 0.6 ? "D1" : "D2", tickformat: "~g"};
+}
+
 function stacked(id, rows, log) {
   const traces = [];
   const gap = 0.055, height = (1 - gap * (rows.length - 1)) / rows.length;
@@ -60,7 +72,7 @@ function stacked(id, rows, log) {
     extra["yaxis" + (i ? i + 1 : "")] = axis({title: titled(row.title), domain: [Math.max(0, top - height),
       top],
       type: log ? "log" : "linear", range: row.range && row.range.slice(), exponentformat: "none",
-      dtick: log ? 1 : undefined, nticks: 6});
+      nticks: 6, ...(log ? logTicks(data.laws.filter(shown).map(law => row.of(law.line))) : {})});
     for (const law of data.laws) {
       const noise = row.of(law.measured), line = row.of(law.line);
       if (showMeasured && !log) traces.push({x: law.measured.t, y: noise, yaxis: name, type: "scatter",

@@ -10,6 +10,7 @@ import cv2
 import numpy as np
 import pytest
 from rich.console import Console
+from scipy.spatial.transform import Rotation
 
 from experiments.cli.tables import print_summary
 from experiments.metrics.run_metrics import summary, timing
@@ -154,6 +155,20 @@ def test_one_law_alone_makes_a_report(logs, tmp_path):
     html = (tmp_path / "report.html").read_text()
     assert "my law keeps the true tip" in html
     assert "No intervention" in html
+
+
+def test_an_error_that_stays_within_a_decade_has_numbers_at_its_axis(logs, tmp_path):
+    """From 5 to 8 degrees, where no power of ten lies between."""
+    log = logs["pbvs"][0]
+    angle = np.deg2rad(6.5 + 1.5 * np.sin(log.time))
+    X_WE = log.X_WE_desired.copy()
+    turned = Rotation.from_rotvec(angle[:, None] * np.array([0.0, 0.0, 1.0])).as_matrix()
+    X_WE[:, :3, :3] = turned @ X_WE[:, :3, :3]
+    alone = {"pbvs": [dataclasses.replace(log, X_WE_true=X_WE)]}
+    write_report(tmp_path / "report.html", "", summary("s", alone), timing(alone), alone)
+    dom = open_page(tmp_path / "report.html").dom
+    labels = re.findall(r'class="y2tick"><text[^>]*>(?:<[^>]*>)*([^<]*)<', dom)
+    assert {"6", "7"} <= set(labels), labels
 
 
 def test_a_report_that_cannot_be_written_leaves_nothing(logs, tmp_path):
