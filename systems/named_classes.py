@@ -11,6 +11,10 @@ from types import ModuleType
 from robots.configuration.suggestion import did_you_mean
 
 
+class OwnClassError(RuntimeError):
+    """A class of one's own gives what it must not; the message says which class and what."""
+
+
 class NamedClasses(Mapping[str, type]):
     """The classes of one kind that come with truetip, each imported when it is first asked for.
 

@@ -17,6 +17,7 @@ from diagrams.scenario.scenario import Scenario, scenario_text
 from experiments.cli.workers import SimulationError
 from robots.description.model import RobotModel
 from systems.link.protocols import PoseSource, RobotLink
+from systems.named_classes import OwnClassError
 
 _PATIENCE = 30.0  # s in which a cell must have ended
 
@@ -48,7 +49,8 @@ def station_clients(
         camera_delay: s, from exposure to arrival; None for the scenario's.
 
     Raises:
-        SimulationError: if the cell does not start or the station is not there.
+        SimulationError: if the cell does not start, the station is not there, or a law or an inverse model of
+            one's own gives what it must not.
         ValueError: if a part refuses its configuration.
     """
     link, period = scenario.station.link, scenario.station.period
@@ -65,7 +67,7 @@ def station_clients(
                 frames = link.camera_frame.pose(), link.tool_frame.pose()
                 camera = stack.enter_context(link.camera.connect(*frames, delay, camera_port))
             yield StationClients(client, camera, cell)
-    except StationError as error:
+    except (StationError, OwnClassError) as error:
         raise SimulationError(str(error)) from error
 
 

@@ -28,6 +28,7 @@ from experiments.station.acknowledging import acknowledging, how
 from experiments.station.guided import compare_on_station
 from systems.link.makers import LINK_NAMES
 from systems.link.udp_channel import ChannelError, is_loopback
+from systems.named_classes import OwnClassError
 from systems.reference.paths import make_path
 
 _CELLS = {"egm": "cell", "rsi": "cell-kuka"}  # the shipped scenario of each link
@@ -157,7 +158,7 @@ def guide(
     if scenario.station.overview.enabled and scenario.servo.separation.acknowledge:
         console.print(how())
     with (
-        refusing(ChannelError),
+        refusing(ChannelError, OwnClassError),
         asking() as end,
         acknowledging() as given,
         progress_bar(label) as progress,

@@ -20,6 +20,7 @@ from systems.feedforward.between_ticks import BetweenTicks
 from systems.feedforward.config import FeedforwardConfig
 from systems.feedforward.joint_motion import Answer, Drive, JointReference, Standing
 from systems.feedforward.prefilter import Prefilter
+from systems.named_classes import OwnClassError
 from systems.reference.paths import CartesianPath
 from systems.samples import JointSample
 
@@ -174,16 +175,18 @@ class Feedforward(LeafSystem):
         )
 
     def _require_sizes(self, drive: Drive, memory_size: int) -> None:
-        """Refuses what a model's own method has given. Raises RuntimeError, as what breaks off a run does."""
+        """Refuses what a model's own method has given. Raises OwnClassError."""
         if not isinstance(drive, Drive):
-            raise RuntimeError(f"class {type(self).__name__}: drive_under must return a Drive, got {drive!r}")
+            raise OwnClassError(
+                f"class {type(self).__name__}: drive_under must return a Drive, got {drive!r}"
+            )
         sizes = {"deflection": NUM_JOINTS, "deflection_rate": NUM_JOINTS, "torque": NUM_JOINTS}
         for name, size in (sizes | {"memory": memory_size}).items():
             given = np.shape(getattr(drive, name))
             if given != (size,):
                 shape = "x".join(map(str, given)) or "one number"
                 wanted = f"drive_under must give {size} numbers as {name}"
-                raise RuntimeError(f"class {type(self).__name__}: {wanted}, got {shape}")
+                raise OwnClassError(f"class {type(self).__name__}: {wanted}, got {shape}")
 
     def play(self, references: Sequence[JointReference]) -> np.ndarray:
         """Commands at successive ticks: positions in rad, velocities in rad/s, torques in N m; (n, 3, 6)."""

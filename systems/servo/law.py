@@ -15,6 +15,7 @@ from robots.kinematics.analytic_inverse import JointLimitError, UnreachableError
 from robots.kinematics.forward import robust_solve, rotation_about
 from systems.controller_model import ControllerModel
 from systems.guard.guard import GuardConfig
+from systems.named_classes import OwnClassError
 from systems.reference.paths import CartesianPath
 from systems.reference.reference import PathAhead
 from systems.samples import JointSample, PoseSample
@@ -179,7 +180,7 @@ class ServoLaw(LeafSystem):
             step = LawOutput(_NO_COMMAND, _NO_COMMAND, state.value(_CORRECTION), memory)
         discrete_state.set_value(_MEASUREMENT, np.array((last_used, refused, newest)))
         if not isinstance(step, LawOutput):
-            raise RuntimeError(f"class {type(self).__name__}: step must return a LawOutput, got {step!r}")
+            raise OwnClassError(f"class {type(self).__name__}: step must return a LawOutput, got {step!r}")
         try:
             discrete_state.set_value(_POSITION, step.position)
             discrete_state.set_value(_VELOCITY, step.velocity)
@@ -192,11 +193,11 @@ class ServoLaw(LeafSystem):
             raise
 
     def _require_size(self, method: str, of: str, given: np.ndarray, size: int) -> None:
-        """Refuses what a law's own method has given. Raises RuntimeError, as what breaks off a run does."""
+        """Refuses what a law's own method has given. Raises OwnClassError."""
         if np.shape(given) != (size,):
             shape = "x".join(map(str, np.shape(given))) or "one number"
             wanted = f"{method} must give {size} numbers{of}"
-            raise RuntimeError(f"class {type(self).__name__}: {wanted}, got {shape}")
+            raise OwnClassError(f"class {type(self).__name__}: {wanted}, got {shape}")
 
     def joints_at(self, X_WE: np.ndarray, V_WE: np.ndarray, last: np.ndarray) -> np.ndarray:
         """The joints for a pose and a twist, next to those of the last tick.

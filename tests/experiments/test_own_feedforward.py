@@ -8,6 +8,7 @@ import pytest
 from diagrams.runs.simulation import Experiment, run
 from diagrams.scenario.scenario import ScenarioError, load_scenario
 from systems.feedforward import FEEDFORWARDS
+from systems.named_classes import OwnClassError
 from tests.experiments.commands import SHORT
 
 SETTINGS = [setting.removeprefix("--set=") for setting in SHORT]
@@ -62,7 +63,7 @@ def test_one_that_computes_nothing_is_refused_before_anything_runs(tmp_path: Pat
 def test_a_wrong_result_is_named(tmp_path: Path, right: str, wrong: str, why: str):
     (tmp_path / "own.py").write_text(OWN.replace(right, wrong))
     kind = f"servo.feedforward.kind={tmp_path / 'own.py'}:Mine"
-    with pytest.raises(RuntimeError, match=f"Mine: drive_under {why}"):
+    with pytest.raises(OwnClassError, match=f"Mine: drive_under {why}"):
         run(load_scenario("misaligned", [*SETTINGS, kind]), "open_loop")
 
 

@@ -17,6 +17,7 @@ from robots.dynamics.newton_inverse import inverse_kinematics
 from robots.kinematics.forward import Kinematics
 from systems.controller_model import ControllerModel
 from systems.guard.guard import GuardConfig
+from systems.named_classes import OwnClassError
 from systems.reference.reference import PathAhead
 from systems.samples import JointSample, PoseSample
 from systems.servo import LAWS, LawConfig
@@ -178,8 +179,20 @@ def test_gains_that_it_has_not_are_refused_where_they_are_said(my_law: str, chan
 def test_a_result_of_the_wrong_size_is_named(my_law: str, right: str, wrong: str, why: str):
     assert right in printed()
     Path(my_law.rpartition(":")[0]).write_text(printed().replace(right, wrong))
-    with pytest.raises(RuntimeError, match=f"class MyLaw: {why}"):
+    with pytest.raises(OwnClassError, match=f"class MyLaw: {why}"):
         Experiment(load_scenario("misaligned"), my_law).advance(until=0.1)
+
+
+@pytest.mark.real_time
+@pytest.mark.slow
+def test_a_wrong_result_is_refused_before_a_station_is_asked_for(my_law: str, tmp_path: Path):
+    path = Path(my_law.rpartition(":")[0])
+    path.write_text(printed().replace("return LawOutput(", "LawOutput("))
+    out = tmp_path / "out"
+    told = truetip("run", f"--law={my_law}", "--with-cell", f"--out={out}")
+    assert told.exit_code == 2, told.output
+    assert "class MyLaw: step must return a LawOutput, got None" in told.stderr
+    assert not out.exists()
 
 
 def test_what_is_no_law_is_refused_in_one_line(tmp_path: Path):
