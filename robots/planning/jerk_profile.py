@@ -12,11 +12,12 @@ from scipy.optimize import minimize_scalar
 
 from robots.planning.limit_use import use_of
 from robots.planning.limits import MotionLimits
-from robots.planning.path_dynamics import PathDynamics
+from robots.planning.path_dynamics import ORDERS, PathDynamics
 
 _SAMPLES = 160
 _RATIOS = np.geomspace(8.0, 200.0, 6)  # jerk over acceleration, in 1/s
 _ACCURATE = 5e-4  # of the acceleration
+_SLOWEST = 1e-4  # acceleration over the largest speed in 1/s, below which no slower one is tried
 _TOP = 0.99  # of the largest speed: where gears unwind, motors turn a little quicker than links
 
 
@@ -52,8 +53,9 @@ class JerkProfile:
 
     @property
     def times(self) -> np.ndarray:
-        """Times in s that resolve the motion."""
-        return np.linspace(0.0, self.duration, _SAMPLES)
+        """Times in s that resolve the motion, among them those at which the jerk jumps."""
+        ends = np.cumsum(self.trajectory.profiles[0][0].t)
+        return np.unique(np.append(np.linspace(0.0, self.duration, _SAMPLES), ends.clip(0.0, self.duration)))
 
     def rates(self, t: np.ndarray) -> np.ndarray:
         """s and four derivatives at t in s, shape (5, n); the jerk jumps, its rate counts as zero."""
@@ -75,15 +77,21 @@ def best_jerk_profile(dynamics: PathDynamics, limits: MotionLimits) -> JerkProfi
     """
     s = np.linspace(0.0, 1.0, _SAMPLES)
     slope = np.abs(dynamics.path.at(s, 1))
-    top = _TOP / float((slope / limits.speed).max())
+    evenly = np.vstack([s, np.ones_like(s), np.zeros((ORDERS - 2, len(s)))])
+    of_tool = dynamics.demand(evenly).tool_speed / limits.tool_speed
+    top = _TOP / float(max((slope / limits.speed).max(), of_tool.max()))
+
+    def keeps(profile: JerkProfile) -> bool:
+        demand = dynamics.demand(profile.rates(profile.times))
+        return use_of(demand, limits, profile.times).largest <= 1.0
 
     def fastest(ratio: float) -> JerkProfile:
         low, high = 0.3 * top, 100.0 * top
+        while not keeps(JerkProfile(top, low, ratio * low)) and low > _SLOWEST * top:
+            low, high = 0.1 * low, low
         while high / low > 1.0 + _ACCURATE:
             middle = float(np.sqrt(low * high))
-            profile = JerkProfile(top, middle, ratio * middle)
-            demand = dynamics.demand(profile.rates(profile.times))
-            if use_of(demand, limits, profile.times).largest <= 1.0:
+            if keeps(JerkProfile(top, middle, ratio * middle)):
                 low = middle
             else:
                 high = middle

@@ -18,6 +18,7 @@ OBJECTIVES = ("time", "energy")
 ITERATIONS = 60  # of IPOPT, at most
 # Weight of the fourth derivative: without it limits are used in ways that a drive of 4 ms cannot follow.
 _SMOOTH = {"time": 5e-8, "energy": 1e-8, "calm": 1e-9}
+_LONG = 0.8  # s, from which on a motion is long: its ends are a smaller share of it
 _ROUNDED = 0.03  # of the mean power at the start, below which the magnitude of a power is rounded
 _SLOWEST = 2.5  # times the duration of the start: beyond that the optimiser is lost
 _NEAR = 0.45  # use of a limit at the start, from which on the optimiser looks at it
@@ -225,7 +226,8 @@ def _program(
     speed, torque = values[:NUM_JOINTS], values[3 * NUM_JOINTS : 4 * NUM_JOINTS]
     lasting = [int(joint) for joint in np.flatnonzero(np.isfinite(limits.continuous_torque))]
     means = [(torque[joint] / float(limits.continuous_torque[joint])) ** 2 for joint in lasting]
-    smooth = smoother * _SMOOTH[objective] * w * y[ORDERS - 1] ** 2
+    # Ends as sharp as those of a short motion: what the share of a duration weighs goes with its sixth power.
+    smooth = smoother * _SMOOTH[objective] * min(1.0, (_LONG / unit) ** 6) * w * y[ORDERS - 1] ** 2
     cost = w * T + smooth if objective == "time" else smooth
     if objective == "energy":
         times = points(len(start.coefficients)) * unit

@@ -13,13 +13,14 @@ from robots.planning.time_spline import TimeSpline, fitted
 
 _GRID = 101
 _SAMPLES = 200
+_UNLIMITED = 1e9
 _ROOM = 1.15  # a motion whose torques do not jump takes longer
 
 
 def quickest_rigid(
     robot: RobotModel, payload: float, path: Curve, limits: MotionLimits
 ) -> tuple[np.ndarray, np.ndarray]:
-    """s(t) by reachability analysis: speeds, accelerations and motor torques are kept, rates of torques not.
+    """s(t) by reachability analysis: speeds, accelerations and motor torques are kept, rates not.
 
     Args:
         robot: the robot as the controller knows it.
@@ -34,7 +35,7 @@ def quickest_rigid(
         PathError: if the limits admit no motion.
     """
     plant = MultibodyPlant(0.0)
-    add_robot(plant, robot, "rigid", payload)
+    tool = add_robot(plant, robot, "rigid", payload).tool
     plant.Finalize()
     grid = np.linspace(0.0, 1.0, _GRID)
     curve = PiecewisePolynomial.CubicWithContinuousSecondDerivatives(grid, path.at(grid).T)
@@ -42,8 +43,14 @@ def quickest_rigid(
     toppra.AddJointVelocityLimit(-limits.speed, limits.speed)
     toppra.AddJointAccelerationLimit(-limits.acceleration, limits.acceleration)
     if np.isfinite(limits.motor_torque).any():
-        most = np.where(np.isfinite(limits.motor_torque), limits.motor_torque, 1e9)
+        most = np.where(np.isfinite(limits.motor_torque), limits.motor_torque, _UNLIMITED)
         toppra.AddJointTorqueLimit(-most, most)
+    if np.isfinite(limits.tool_speed):
+        toppra.AddFrameTranslationalSpeedLimit(tool, limits.tool_speed)
+    if np.isfinite(limits.tool_acceleration):
+        # Along each axis of the world, which its magnitude may not exceed either.
+        most = np.repeat([_UNLIMITED, limits.tool_acceleration], 3)
+        toppra.AddFrameAccelerationLimit(tool, -most, most)
     found = toppra.SolvePathParameterization()
     if found is None:
         raise PathError("the limits admit no motion along the path, not even of a rigid robot")

@@ -143,3 +143,46 @@ def test_a_limit_that_is_lower_for_a_while_is_kept_then_and_used_otherwise(robot
     is_first = motion.times < motion.duration / 3.0
     assert used[is_first].max() == pytest.approx(0.5, abs=0.02)
     assert used[~is_first].max() == pytest.approx(1.0, abs=0.02)
+
+
+def test_a_slow_tool_takes_little_more_than_the_length_over_its_speed(robot):
+    dynamics, speed = axis_1(robot), 0.05
+    evenly = np.array([[0.5], [1.0], [0.0], [0.0], [0.0]])
+    least = float(dynamics.demand(evenly).tool_speed[0]) / speed
+    kept = motion_limits(robot, tool_speed=speed)
+    times, _ = quickest_rigid(robot, 16.0, dynamics.path, kept)
+    # Of 100 intervals the first and the last take twice as long.
+    assert times[-1] == pytest.approx(1.02 * least, rel=2e-3)
+    usual = best_jerk_profile(dynamics, kept)
+    found = optimum(dynamics, kept, rigid_start(robot, 16.0, dynamics.path, kept, 36))
+    assert found.is_solved
+    for motion in (usual, found.motion):
+        assert least < motion.duration < 1.1 * least
+        assert dynamics.demand(motion.rates(motion.times)).tool_speed.max() < 1.005 * speed
+
+
+def test_the_acceleration_of_a_tool_may_be_small(robot):
+    """Bang-bang, 2 sqrt(S / a), is the least, but on an arc some of it points to the centre."""
+    dynamics, acceleration = axis_1(robot), 0.02
+    evenly = np.array([[0.5], [1.0], [0.0], [0.0], [0.0]])
+    least = 2.0 * np.sqrt(float(dynamics.demand(evenly).tool_speed[0]) / acceleration)
+    kept = motion_limits(robot, tool_acceleration=acceleration)
+    usual = best_jerk_profile(dynamics, kept)
+    assert least < usual.duration < 1.15 * least
+    assert dynamics.demand(usual.rates(usual.times)).tool_acceleration.max() < 1.005 * acceleration
+
+
+@pytest.mark.parametrize("smoother", [1.0, 10.0])
+def test_the_ends_of_a_long_motion_take_no_larger_share_of_it(robot, smoother: float):
+    """At a tenth of the speed a motion takes some ten times as long, not fourteen times."""
+    dynamics = axis_1(robot)
+    kept = replace(motion_limits(robot), speed=0.1 * robot.speed)
+    start = rigid_start(robot, 16.0, dynamics.path, kept, 36)
+    found = optimum(dynamics, kept, start, smoother=smoother)
+    assert found.is_solved
+    assert found.motion.duration < 1.15 * ANGLE / kept.speed[0]
+
+
+def test_a_jerk_limited_profile_is_looked_at_where_its_acceleration_is_largest(robot):
+    profile = JerkProfile(0.27, 23.0, 1900.0)
+    assert profile.rates(profile.times)[2].max() == pytest.approx(np.sqrt(0.27 * 1900.0), rel=1e-6)
