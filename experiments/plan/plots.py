@@ -47,6 +47,8 @@ def verdict(plan: Plan, results: list[LegResult]) -> str:
     kept = "all limits are kept" if numbers["limits_kept"] else "not all limits are kept"
     binding = ", ".join(numbers["binding"]) or "none"
     rings, usually = numbers["criterion"], max(numbers["baseline_criterion"], STILL)
+    if not numbers["baseline_limits_kept"]:
+        kept += ", but not by the usual timing" if numbers["limits_kept"] else ""
     more = f" It rings more than the usual timing: C {rings:.4f} m/s, usually {usually:.4f} m/s."
     return (
         f"{numbers['time_s']:.3f} s and {numbers['energy_j']:.0f} J, with {usual} in the same limits "
@@ -118,9 +120,9 @@ def write_plan_page(path: Path, plan: Plan, results: list[LegResult]) -> None:
     """All of it as a page that opens offline."""
     text = (
         "Durations in s, energies in J. Usual is, for a straight line, the sin² law with its largest "
-        "acceleration; for a motion of joints the quickest jerk-limited profile. Both keep all limits in the "
-        "plant. C adds up how much the wrist still accelerates in the 0.9 s after the motion, Reiner (2010), "
-        "eq. (6.1), in m/s."
+        "acceleration; for a motion of joints the quickest jerk-limited profile. Both are made to keep all "
+        "limits in the plant. C adds up how much the wrist still accelerates in the 0.9 s after the motion, "
+        "Reiner (2010), eq. (6.1), in m/s."
     )
     sections: list[Section] = []
     if plan.objective == "front":

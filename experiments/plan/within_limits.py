@@ -5,6 +5,7 @@ from dataclasses import dataclass, replace
 from typing import Generic, TypeVar
 
 import numpy as np
+from scipy.integrate import cumulative_trapezoid
 
 from experiments.plan.plant_run import PlantDriver, PlantRun
 from experiments.plan.timings import Timing
@@ -23,6 +24,8 @@ _ALL_BUT = 0.998  # of a limit: what the plant shall use of it
 _BINDS = 0.97  # of what it may use, from which on a planner is held back by a limit
 _HIGHER = 1.06  # times a limit at most, and in one step times
 _HIGHER_AT_ONCE = 1.02
+_OF_JERK = 3  # power of what a motor was too quick by
+_SLOWER = 0.9  # of its motor's speed: a link is clearly slower
 ROUNDING = 1e-6
 
 T = TypeVar("T", bound=Timing, covariant=True)
@@ -52,25 +55,43 @@ def kept_in_plant(
     margins, kept = limits.scaled(_MARGIN), None
     for number in range(_ROUNDS):
         timing = make(margins)
+        is_in_vain = kept is not None and abs(timing.duration / kept.timing.duration - 1.0) < ROUNDING
         run = driver.run(timing)
         keeps = largest_share(run, limits) <= 1.0 + ROUNDING
         kept = Kept(timing, run, keeps, margins)
         if keeps:
             break
-        lower = lowered_there if varies and number < _THERE else lowered
-        margins = lower(margins, run, limits)
+        if varies and number < _THERE:
+            margins = lowered_there(margins, run, limits)
+        else:
+            margins = lowered(margins, run, limits, is_in_vain)
     assert kept is not None
     return kept
 
 
-def lowered(margins: MotionLimits, run: PlantRun, limits: MotionLimits) -> MotionLimits:
+def lowered(
+    margins: MotionLimits, run: PlantRun, limits: MotionLimits, of_all_joints: bool = False
+) -> MotionLimits:
     """What a planner may use next, where the plant has exceeded limits with the present margins.
 
-    A rate that is too high makes gears ring, and that is what exceeds other limits mostly: it comes first.
+    A rate that is too high makes gears ring, and that is what exceeds other limits mostly: it comes first. If
+    a motor is too quick while its link is not, it is the jerk.
+
+    Args:
+        margins: with which the motion was planned.
+        run: of it.
+        limits: that it has to keep.
+        of_all_joints: also for joints that keep a limit; where a lower one of a joint had no effect.
     """
     shares = exceeded(run, limits)
     if shares["gear_torque_rate"].max() > 1.0 + ROUNDING:
         shares = {"gear_torque_rate": shares["gear_torque_rate"]}
+    elif (ahead := _ahead_of_links(run, limits)).any():
+        jerk = np.abs(run.demand.jerk).max(axis=0)
+        less = jerk * (_STEP / shares["speed"][ahead].max()) ** _OF_JERK
+        return replace(margins, jerk=np.where(jerk > 0.0, np.minimum(margins.jerk, less), margins.jerk))
+    if of_all_joints:
+        shares = {name: np.full_like(share, share.max()) for name, share in shares.items()}
     return replace(
         margins,
         **{
@@ -78,6 +99,14 @@ def lowered(margins: MotionLimits, run: PlantRun, limits: MotionLimits) -> Motio
             for name, share in shares.items()
         },
     )
+
+
+def _ahead_of_links(run: PlantRun, limits: MotionLimits) -> np.ndarray:
+    """Whose motors exceed their speed when their links are clearly slower, (6,)."""
+    motors = np.abs(run.demand.speed)
+    links = np.abs(cumulative_trapezoid(run.demand.acceleration, run.times, axis=0, initial=0.0))
+    worst = motors.argmax(axis=0), np.arange(NUM_JOINTS)
+    return (motors[worst] > (1.0 + ROUNDING) * limits.speed) & (links[worst] < _SLOWER * motors[worst])
 
 
 def lowered_there(margins: MotionLimits, run: PlantRun, limits: MotionLimits) -> MotionLimits:
