@@ -6,7 +6,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from experiments.feedforward.rectangle import rectangle, working_position
+from experiments.feedforward.rectangle import reached_size, rectangle, working_position
 from robots.configuration.suggestion import did_you_mean
 from robots.description.model import NUM_JOINTS, RobotModel
 from robots.dynamics.compliant_kinematics import CompliantKinematics, controller_kinematics
@@ -78,7 +78,7 @@ def legs_of(robot: RobotModel, path: str, others: Sequence[str] = ()) -> list[Le
         legs = [Leg("axes 1-3", straight_joint_path(np.zeros(NUM_JOINTS), _MOTION), False)]
     elif path == RECTANGLE:
         home = working_position(robot)
-        poses = [corner.pose() for corner in rectangle(robot, home)]
+        poses = [corner.pose() for corner in rectangle(robot, home, reached_size(robot, home))]
         legs = legs_between(robot, [Stop(f"corner {i}", pose, True) for i, pose in enumerate(poses, 1)], home)
     elif path.lower().endswith(SUFFIXES):
         legs = _program_legs(robot, path, others)

@@ -1,10 +1,12 @@
 """The legs of a file: every place that it moves to, in the order in which it does, or a refusal."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
+from experiments.feedforward.rectangle import working_position
 from experiments.plan.legs import Leg, legs_of
 from robots.description.model import load_robot
 from robots.kinematics.forward import Kinematics
@@ -93,3 +95,23 @@ def test_a_program_whose_moves_are_not_all_known_is_refused(tmp_path: Path, move
     text = f"MODULE m\n{DECLARED}\n{moves}\nENDMODULE\n"
     with pytest.raises(ValueError, match=why):
         legs_of(KR16, written(tmp_path, "m.mod", text))
+
+
+def test_an_arm_with_less_room_plans_a_smaller_rectangle():
+    """With joint 3 within half a radian of where it is in the middle, the usual one is out of its reach."""
+    third = float(np.rad2deg(working_position(KR16)[2]))
+    joints = list(KR16.joints)
+    limits = replace(joints[2].limits, lower_deg=third - 15.0, upper_deg=third + 15.0)
+    joints[2] = replace(joints[2], limits=limits)
+    narrow = replace(KR16, joints=joints)
+    sizes = [
+        float(
+            np.linalg.norm(
+                np.diff(Kinematics(robot).forward(leg.path.at(np.array([0.0, 1.0])))[:, :3, 3], axis=0)
+            )
+        )
+        for robot in (KR16, narrow)
+        for leg in legs_of(robot, "rectangle")
+    ]
+    assert np.array(sizes[4:]) / np.array(sizes[:4]) == pytest.approx(np.full(4, sizes[4] / sizes[0]))
+    assert 0.2 < sizes[4] / sizes[0] < 0.9
