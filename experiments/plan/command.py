@@ -150,7 +150,8 @@ def plan_command(
                 write_text(code / name, text)
             written += [report.parent / name for name in files]
         output.write(plan_json(plan, results))
-    title = f"{model.name}, {mass:g} kg: {path}, least {objective}"
+    aim = "least time, then energies" if objective == "front" else f"least {objective}"
+    title = f"{model.name}, {mass:g} kg: {path}, {aim}"
     print_table(human, result_table(title, table_rows(plan, results)))
     human.print(escape(verdict(plan, results)))
     print_files(human, report, write, *written)
