@@ -139,14 +139,14 @@ def study_legs(
     plan: Plan, legs: list[Leg], progress: Callable[[float], None] | None = None
 ) -> list[LegResult]:
     """The same for legs that are known, whatever ``plan.path`` says; arguments and errors likewise."""
-    ready: list[_ReadyLeg] = []
+    ready: list[list[_Ready]] = []
     results: list[LegResult] = []
     for number, leg in enumerate([*legs, *legs]):
         try:
             if number < len(legs):
                 ready.append(_made_ready(plan, leg))
             else:
-                allowed = np.inf if plan.may_ring else max(each.usual.run.criterion for each in ready)
+                allowed = np.inf if plan.may_ring else max(ways[0].usual.run.criterion for ways in ready)
                 results.append(_planned(plan, ready[number - len(legs)], max(allowed, STILL)))
         except PathError as error:
             raise PathError(f"{leg.name}: {error}") from error
@@ -166,22 +166,8 @@ class _Ready:
     usual: Kept[Timing]
 
 
-@dataclass(frozen=True)
-class _ReadyLeg:
-    """What is known of a leg before its motion is planned.
-
-    Attributes:
-        usual: the motion that is replaced.
-        timed: the motion of joints that are timed one by one, None where it is not wanted, or not found.
-        ways: one, or more if it is free; none where it is timed.
-    """
-
-    usual: Kept[Timing]
-    timed: TimedLeg | None
-    ways: list[_Ready]
-
-
-def _made_ready(plan: Plan, leg: Leg) -> _ReadyLeg:
+def _made_ready(plan: Plan, leg: Leg) -> list[_Ready]:
+    """The ways of a leg; one, if it is not free."""
     dynamics, elastic, driver = _of_way(plan, leg)
     require_standing(dynamics, plan.limits)
 
@@ -192,22 +178,9 @@ def _made_ready(plan: Plan, leg: Leg) -> _ReadyLeg:
 
     usual = kept_in_plant(baseline, driver, plan.limits)
     if not plan.is_free:
-        return _ReadyLeg(usual, None, [_Ready(leg, dynamics, elastic, driver, usual)])
-    timed = _timed(plan, leg) if plan.times_joints else None
-    if timed is not None and timed.kept.timing.duration < usual.timing.duration:
-        return _ReadyLeg(usual, timed, [])
+        return [_Ready(leg, dynamics, elastic, driver, usual)]
     known = plan.robot, plan.payload, leg, plan.limits, plan.dynamics, plan.obstacles
-    ways = free_legs(*known, plan.sharpness(leg))
-    return _ReadyLeg(usual, None, [_Ready(way, *_of_way(plan, way), usual) for way in ways])
-
-
-def _timed(plan: Plan, leg: Leg) -> TimedLeg | None:
-    """The leg with joints that are timed one by one; None where there is none, or it is not clear."""
-    try:
-        timed = timed_leg(plan.robot, plan.payload, leg, plan.limits, plan.plant)
-    except PathError:
-        return None
-    return timed if is_clear(plan.robot, timed.way, plan.obstacles) else None
+    return [_Ready(way, *_of_way(plan, way), usual) for way in free_legs(*known, plan.sharpness(leg))]
 
 
 def _of_way(plan: Plan, leg: Leg) -> tuple[PathDynamics, PathDynamics, PlantDriver]:
@@ -216,13 +189,8 @@ def _of_way(plan: Plan, leg: Leg) -> tuple[PathDynamics, PathDynamics, PlantDriv
     return dynamics, elastic, PlantDriver(plan.robot, plan.payload, elastic, plan.plant, plan.is_for_law)
 
 
-def _planned(plan: Plan, leg: _ReadyLeg, allowed: float) -> LegResult:
-    """The leg on the way on which it is quickest in the plant."""
-    if leg.timed is not None:
-        timed = leg.timed
-        found = timed.found.iterations, timed.seconds
-        return LegResult(timed.leg, timed.way, timed.dynamics, timed.kept, leg.usual, *found, [])
-    ways = leg.ways
+def _planned(plan: Plan, ways: list[_Ready], allowed: float) -> LegResult:
+    """The leg on the way on which it is quickest in the plant, or with joints that are timed one by one."""
     ready = ways[0]
     kept, best, seconds = _within_limits(plan, ready)
     for other in ways[1:]:
@@ -234,9 +202,24 @@ def _planned(plan: Plan, leg: _ReadyLeg, allowed: float) -> LegResult:
             ready, (kept, best, _) = other, found
     if kept.run.criterion > allowed:
         kept, best = calm_enough(plan, ready, kept, best, allowed)
+    timed = _timed(plan, ready.leg, kept.timing.duration if kept.keeps else np.inf)
+    if timed is not None:
+        found = timed.found.iterations, max(seconds, timed.seconds)
+        return LegResult(timed.leg, timed.way, timed.dynamics, timed.kept, ready.usual, *found, [])
     front = _front(plan, ready.dynamics, kept) if plan.objective == "front" else []
     path = ready.leg.path
     return LegResult(ready.leg, path, ready.elastic, kept, ready.usual, best.iterations, seconds, front)
+
+
+def _timed(plan: Plan, leg: Leg, at_most: float) -> TimedLeg | None:
+    """The leg with joints that are timed one by one; None where that is not wanted, not quicker or not clear."""
+    if not plan.times_joints:
+        return None
+    try:
+        timed = timed_leg(plan.robot, plan.payload, leg, plan.limits, plan.plant, at_most)
+    except PathError:
+        return None
+    return timed if is_clear(plan.robot, timed.way, plan.obstacles) else None
 
 
 class _SlowerError(Exception):

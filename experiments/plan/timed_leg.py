@@ -49,6 +49,7 @@ def timed_leg(
     leg: Leg,
     limits: MotionLimits,
     plant: RobotModel | None = None,
+    at_most: float = np.inf,
 ) -> TimedLeg:
     """The quickest motion between the ends of a leg that keeps the limits in the plant.
 
@@ -61,9 +62,10 @@ def timed_leg(
         leg: whose ends count.
         limits: of the motion; those of the tool must be infinite.
         plant: what stands in the station, None for the same robot.
+        at_most: s, that it may take.
 
     Raises:
-        PathError: if there is none, or the plant keeps no motion within the limits.
+        PathError: if there is none, or the plant keeps the limits in none that was tried.
     """
     start, goal = leg.path.at(np.array([0.0, 1.0]))
     margins, found, longest = limits, None, 0.0
@@ -73,6 +75,8 @@ def timed_leg(
         longest = max(longest, time.perf_counter() - began)
         if not found.is_solved:
             raise PathError("the optimiser has not converged")
+        if found.duration >= at_most:
+            raise PathError("another motion is quicker")
         path, timing = found.over_time, EvenTiming(found.duration)
         dynamics = PathDynamics(robot, payload, path, "elastic_structure", _DEGREE)
         run = PlantDriver(robot, payload, dynamics, plant).run(timing)
