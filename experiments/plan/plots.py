@@ -49,6 +49,8 @@ def verdict(plan: Plan, results: list[LegResult]) -> str:
     rings, usually = numbers["criterion"], max(numbers["baseline_criterion"], STILL)
     if not numbers["baseline_limits_kept"]:
         kept += ", but not by the usual timing" if numbers["limits_kept"] else ""
+    unlimited = plan.limits.unlimited_torques
+    without = f" The robot file has no limits of {', '.join(unlimited)}." if unlimited else ""
     more = f" It rings more than the usual timing: C {rings:.4f} m/s, usually {usually:.4f} m/s."
     return (
         f"{numbers['time_s']:.3f} s and {numbers['energy_j']:.0f} J, with {usual} in the same limits "
@@ -56,7 +58,7 @@ def verdict(plan: Plan, results: list[LegResult]) -> str:
         f"time {_change(numbers['time_s'], numbers['baseline_s'])}, "
         f"energy {_change(numbers['energy_j'], numbers['baseline_energy_j'])}. In the plant {kept}; "
         f"what binds: {binding}. Planning a leg took {numbers['seconds']:.1f} s and at most "
-        f"{numbers['iterations']} iterations.{more if rings > usually else ''}"
+        f"{numbers['iterations']} iterations.{more if rings > usually else ''}{without}"
     )
 
 

@@ -212,7 +212,7 @@ def _planned(plan: Plan, ways: list[_Ready], allowed: float) -> LegResult:
 
 
 def _timed(plan: Plan, leg: Leg, at_most: float) -> TimedLeg | None:
-    """The leg with joints that are timed one by one; None where that is not wanted, not quicker or not clear."""
+    """The leg with joints that are timed one by one; None if that is not wanted, not quicker or not clear."""
     if not plan.times_joints:
         return None
     try:

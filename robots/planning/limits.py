@@ -40,6 +40,12 @@ class MotionLimits:
     # What a planner may use of `OVER_TIME` at times of a motion: shares at k even times of its duration
     shares: np.ndarray = field(default_factory=lambda: np.ones((2, len(OVER_TIME), NUM_JOINTS)))
 
+    @property
+    def unlimited_torques(self) -> list[str]:
+        """What people call the torques of which no joint has a limit: a motion may take what no motor has."""
+        torques = "motor_torque", "gear_torque", "gear_torque_rate"
+        return [JOINT_LIMITS[name][1] for name in torques if np.isinf(getattr(self, name)).all()]
+
     def scaled(self, share: float) -> "MotionLimits":
         """All of them times a share."""
         names = [each.name for each in fields(self) if each.name != "shares"]
