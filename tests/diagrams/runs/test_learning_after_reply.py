@@ -52,7 +52,8 @@ def test_each_reply_is_out_before_anything_is_learnt(prompt):
 @pytest.mark.slow
 def test_a_run_begins_when_the_camera_sees_the_tool():
     scenario = load_scenario("cell", ["station.link.connect=1"])
-    blind: Any = SimpleNamespace(poll=lambda now: PoseSample(), report=lambda: SimpleNamespace(last_error=""))
+    of_frames = SimpleNamespace(last_error="", counters={"frames": 100, "lost_body": 100})
+    blind: Any = SimpleNamespace(poll=lambda now: PoseSample(), report=lambda: of_frames)
     wire, run = Lockstep(scenario), RealTimeRun(scenario, SelfCalibrating)
     with pytest.raises(StationError, match="it does not see the body"):
         run.run(wire.link, blind, now=wire.now)
