@@ -18,6 +18,7 @@ from experiments.cli.workers import SimulationError
 from robots.description.model import RobotModel
 from systems.link.protocols import PoseSource, RobotLink
 from systems.named_classes import OwnClassError
+from systems.reference.cartesian_path import OutOfReachError
 
 _PATIENCE = 30.0  # s in which a cell must have ended
 
@@ -67,7 +68,7 @@ def station_clients(
                 frames = link.camera_frame.pose(), link.tool_frame.pose()
                 camera = stack.enter_context(link.camera.connect(*frames, delay, camera_port))
             yield StationClients(client, camera, cell)
-    except (StationError, OwnClassError) as error:
+    except (StationError, OwnClassError, OutOfReachError) as error:
         raise SimulationError(str(error)) from error
 
 

@@ -13,6 +13,7 @@ from systems.estimation.gear_errors import BEFORE, NUM_MODELS, NUM_STATES
 from systems.estimation.kernels.arrays import FollowerState, PathInstant, Planned
 from systems.estimation.memory import Layout
 from systems.estimation.tip_model import TipModel
+from systems.reference.cartesian_path import OutOfReachError
 
 _BLEND = 1.5  # s, in which the robot is led from where it starts onto the path
 _NEWTON_STEP = 1e-5  # rad; what a step of this size leaves is its square
@@ -149,7 +150,7 @@ class PreviewPlanner:
             likely: how likely each model of the gears is, (6, 6).
 
         Raises:
-            RuntimeError: if the robot as it is known does not reach the path there.
+            OutOfReachError: if the robot as it is known does not reach the path there.
         """
         x, rate = parameters
         model = self._model
@@ -172,7 +173,7 @@ class PreviewPlanner:
         planned = Planned(motion, moving, loads, columns, states, others, ratios)
         arm = constants, model.loads.masses, model.unknowns(x), self._gears
         if not kernels.plan.plan(*arm, instant, state, planned) < _LOST:
-            raise RuntimeError(
+            raise OutOfReachError(
                 "the robot as it is known now does not reach its path here: the arm is stretched"
             )
         theta, velocity, acceleration, twist = motion

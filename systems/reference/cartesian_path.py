@@ -10,6 +10,10 @@ from systems.reference.segment import Segment, weights
 from systems.reference.timing import Profile
 
 
+class OutOfReachError(RuntimeError):
+    """A path that the robot does not reach, as has turned out in a run."""
+
+
 class CartesianPath:
     """The desired pose, twist and acceleration of the tool at any time.
 

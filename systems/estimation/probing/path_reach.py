@@ -7,7 +7,7 @@ import numpy as np
 from systems.estimation import kernels
 from systems.estimation.arm_geometry import Constants
 from systems.estimation.probing.path_needs import SCALE, PathNeeds
-from systems.reference.cartesian_path import CartesianPath
+from systems.reference.cartesian_path import CartesianPath, OutOfReachError
 
 _LOOKED_AT = 8  # instants of a lap
 _EVERY = 4  # ticks, one of them
@@ -40,7 +40,7 @@ class PathReach:
             tick: its number.
 
         Raises:
-            RuntimeError: if the robot does not get there, with how much is missing and when that is.
+            OutOfReachError: if the robot does not get there, with how much is missing and when that is.
         """
         number, rest = divmod(tick, _EVERY)
         if rest:
@@ -54,10 +54,9 @@ class PathReach:
             return
         missing = [self._missing(constants, x, each) for each in range(len(self._times))]
         worst = int(np.argmax(missing))
-        raise RuntimeError(
-            f"self_calibrating: the robot as it is known now does not reach its path: "
-            f"{1e3 * missing[worst]:.0f} mm are missing {self._times[worst] - self._start:.1f} s after its "
-            "begin. Move the path nearer to the robot"
+        raise OutOfReachError(
+            f"the robot as it is known now does not reach its path: {1e3 * missing[worst]:.0f} mm are missing"
+            f" {self._times[worst] - self._start:.1f} s after its begin. Move the path nearer to the robot"
         )
 
     def _missing(self, constants: Constants, x: np.ndarray, k: int) -> float:

@@ -7,6 +7,7 @@ from robots.kinematics.forward import Kinematics
 from robots.pose import zyx_from_rotation
 from systems.estimation.probing.path_needs import PathNeeds
 from systems.estimation.probing.path_reach import PathReach
+from systems.reference.cartesian_path import OutOfReachError
 from systems.reference.paths import ReferenceConfig, make_path
 from systems.reference.shapes import Points, Waypoint
 from tests.systems.estimation.arms import CAMERA, tip_model
@@ -57,7 +58,7 @@ def look(reach: PathReach, x: np.ndarray, covariance: np.ndarray) -> None:
 
 def test_a_robot_that_is_known_to_be_too_short_is_refused_with_what_is_missing(line):
     needs, reach = line
-    with pytest.raises(RuntimeError, match=r"does not reach its path: \d+ mm are missing \d\.\d s after"):
+    with pytest.raises(OutOfReachError, match=r"does not reach its path: \d+ mm are missing \d\.\d s after"):
         look(reach, shorter(needs, 0.03), SURE)
 
 
