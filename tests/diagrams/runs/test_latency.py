@@ -185,6 +185,6 @@ def test_whoever_ends_it_gets_a_smooth_stop():
             scenario, ROBOT, config, wire.link, wire.camera(), now=wire.now, is_asked_to_end=is_asked_to_end
         )
     assert wire.time < ended[0] + 1.0
-    speeds = [decode_command(data)[1].velocity for _, data in wire.sent]
+    speeds = [np.asarray(decode_command(data)[1].velocity, dtype=float) for _, data in wire.sent]
     assert np.abs(speeds[-30]).max() > 0.0
     assert np.abs(speeds[-1]).max() == 0.0
