@@ -15,6 +15,7 @@ TABLE_HEAD = ("leg", "s", "usual", "%", "J", "usual", "%", "C", "usual", "limits
 _PLANNED, _USUAL = "#0f7cc0", "#c0392b"
 _SHOWN = 0.5  # use of a limit, below which it is not in the picture
 _COLOURS = "Blues"
+_MARGINS, _ROW = 140, 18  # pixels: of a picture of limits, and of a row that can be read
 
 
 def table_rows(plan: Plan, results: list[LegResult]) -> list[list[str]]:
@@ -67,7 +68,7 @@ def binding_figure(plan: Plan, result: LegResult) -> go.Figure:
     run = result.planned.run
     use: Use = run.use(plan.limits)
     moving = run.times <= result.planned.timing.duration
-    rows = [i for i in np.argsort(use.shares.max(axis=1)) if use.shares[i].max() > _SHOWN]
+    rows = _shown(use)
     figure = go.Figure(
         go.Heatmap(
             x=1e3 * run.times[moving],
@@ -86,7 +87,12 @@ def binding_figure(plan: Plan, result: LegResult) -> go.Figure:
             x=1e3 * run.times[at], y=[use.names[i]] * int(at.sum()), mode="markers", showlegend=False
         )
         figure.add_trace(marks.update(marker={"color": _USUAL, "size": 5}, hoverinfo="skip"))
-    return figure.update_layout(xaxis={"title": "time in ms"}, yaxis={"automargin": True})
+    return figure.update_layout(xaxis={"title": "time in ms"}, yaxis={"automargin": True, "dtick": 1})
+
+
+def _shown(use: Use) -> list[int]:
+    """Rows of limits that are used enough to be in the picture, the least used one first."""
+    return [int(i) for i in np.argsort(use.shares.max(axis=1)) if use.shares[i].max() > _SHOWN]
 
 
 def motion_figure(result: LegResult) -> go.Figure:
@@ -132,7 +138,8 @@ def write_plan_page(path: Path, plan: Plan, results: list[LegResult]) -> None:
         sections.append(Section("Time against energy", note, front_figure(results), 420))
     for each in results:
         note = "Share of each limit that motors and gears of the plant use; red where it binds."
-        sections.append(Section(f"Limits, {each.leg.name}", note, binding_figure(plan, each), 460))
+        height = max(460, _MARGINS + _ROW * len(_shown(each.planned.run.use(plan.limits))))
+        sections.append(Section(f"Limits, {each.leg.name}", note, binding_figure(plan, each), height))
         note = "Speed of the tool, usual and planned, and torques of the gears as measured in the plant."
         sections.append(Section(f"Motion, {each.leg.name}", note, motion_figure(each), 760))
     sections.insert(1, Section("All legs", text, html_table(TABLE_HEAD, table_rows(plan, results))))
