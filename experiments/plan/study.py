@@ -219,7 +219,7 @@ def _timed(plan: Plan, leg: Leg, at_most: float) -> TimedLeg | None:
         timed = timed_leg(plan.robot, plan.payload, leg, plan.limits, plan.plant, at_most)
     except PathError:
         return None
-    return timed if is_clear(plan.robot, timed.way, plan.obstacles) else None
+    return timed if is_clear(plan.robot, timed.leg.path, plan.obstacles) else None
 
 
 class _SlowerError(Exception):

@@ -14,8 +14,9 @@ from systems.estimation.kernels.tip import deflect, move_by_geometry
 
 # s, in which models of gears come to count as much as they are likely, so that no plan jerks
 _LED = 0.5
-# Of the search for the nearest pose: m for a rad, what damps it in m, and where it ends
-_ARM, _DAMPING, _NEAR, _MOST_STEPS = 0.25, 0.01, 1e-5, 20
+# Of the search for the nearest pose: m for a rad, what damps it in m at first, by which it is damped less,
+# and where it ends
+_ARM, _DAMPING, _RELAX, _NEAR, _MOST_STEPS = 0.25, 0.01, 3.0, 1e-5, 30
 
 
 @inner
@@ -200,32 +201,38 @@ def plan(c, masses, unknowns, gears, wanted, state, planned):
     return missed
 
 
+@inner
+def _apart(c, x, X_WE, q, frames, columns, r):
+    """How far the tip is from a pose, in m; renews the columns and the error ``r``, both in m."""
+    X, square = np.empty((4, 4)), 0.0
+    place(c, q, X, frames, columns)
+    move_by_geometry(c, x, columns, X, r)
+    error(X_WE, X, r)
+    for i in range(6):
+        arm = _ARM if i < 3 else 1.0
+        r[i] *= arm
+        square += r[i] * r[i]
+        for j in range(6):
+            columns[i, j] *= arm
+    return math.sqrt(square)
+
+
 @compiled
 def missing(c, x, X_WE, q):
     """How far the tip stays from a pose at best, in m, turns counted at an arm of 0.25 m.
 
-    Levenberg's method, which a stretched arm does not throw about as it does Newton's.
+    By Levenberg and Marquardt: what comes no nearer is damped more, so a stretched arm is not thrown about as
+    by Newton's method.
 
     Args:
         c, x: the arm, without its loads.
         X_WE: the pose, (4, 4).
         q: near to it, rad, (6,); is renewed.
     """
-    frames, columns, X = np.empty((7, 4, 4)), np.empty((6, len(c.frame))), np.empty((4, 4))
-    r, normal, inverse, slope = np.empty(6), np.empty((6, 6)), np.empty((6, 6)), np.empty(6)
-    left = math.inf
+    frames, columns, r = np.empty((7, 4, 4)), np.empty((6, len(c.frame))), np.empty(6)
+    normal, inverse, slope, tried = np.empty((6, 6)), np.empty((6, 6)), np.empty(6), np.empty(6)
+    left, damping = _apart(c, x, X_WE, q, frames, columns, r), _DAMPING
     for _ in range(_MOST_STEPS):
-        place(c, q, X, frames, columns)
-        move_by_geometry(c, x, columns, X, r)
-        error(X_WE, X, r)
-        square = 0.0
-        for i in range(6):
-            arm = _ARM if i < 3 else 1.0
-            r[i] *= arm
-            square += r[i] * r[i]
-            for j in range(6):
-                columns[i, j] *= arm
-        left = math.sqrt(square)
         if left < _NEAR:
             break
         for i in range(6):
@@ -233,13 +240,20 @@ def missing(c, x, X_WE, q):
             for k in range(6):
                 slope[i] += columns[k, i] * r[k]
             for j in range(6):
-                normal[i, j] = _DAMPING * _DAMPING if i == j else 0.0
+                normal[i, j] = damping * damping if i == j else 0.0
                 for k in range(6):
                     normal[i, j] += columns[k, i] * columns[k, j]
         invert(normal, inverse)
         for i in range(6):
+            tried[i] = q[i]
             for j in range(6):
-                q[i] += inverse[i, j] * slope[j]
+                tried[i] += inverse[i, j] * slope[j]
+        now = _apart(c, x, X_WE, tried, frames, columns, r)
+        if now < left:
+            q[:], left, damping = tried, now, damping / _RELAX
+        else:
+            damping *= _RELAX * _RELAX
+            _apart(c, x, X_WE, q, frames, columns, r)
     return left
 
 

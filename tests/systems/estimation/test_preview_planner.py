@@ -7,6 +7,7 @@ from robots.description.model import load_robot
 from robots.dynamics.newton_inverse import inverse_kinematics
 from robots.pose import pose_error
 from systems.estimation.preview_planner import PreviewPlanner, Wanted
+from systems.reference.cartesian_path import OutOfReachError
 from systems.reference.paths import ReferenceConfig, make_path
 from tests.systems.estimation.arms import tip_model, true_unknowns
 
@@ -60,6 +61,17 @@ def test_it_begins_where_the_robot_stands_and_at_rest(model):
     plan, _ = session.step()
     np.testing.assert_allclose(plan.theta, session.start, atol=1e-6)
     assert np.abs(plan.velocity).max() < 1e-3
+
+
+def test_a_plan_that_is_lost_is_refused(model):
+    session = Session(true_unknowns(model, 4), model)
+    while session.time < 1.6:  # led onto the path
+        session.step()
+    X_WE = session.path.sample(session.time)[0]
+    X_WE[:3, 3] += [2.0, 0.0, 0.0]  # no arm of 0.9 m gets there
+    wanted = Wanted(X_WE, np.zeros(6), NO_MOTION)
+    with pytest.raises(OutOfReachError, match="does not reach its path here"):
+        session.planner.step(session.memory, (session.x, session.rate), wanted, session.time, PERIOD)
 
 
 def test_velocities_and_accelerations_belong_to_the_positions():

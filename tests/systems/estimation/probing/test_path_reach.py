@@ -2,10 +2,12 @@
 
 import numpy as np
 import pytest
+from scipy.optimize import least_squares
 
 from robots.kinematics.forward import Kinematics
-from robots.pose import zyx_from_rotation
-from systems.estimation.probing.path_needs import PathNeeds
+from robots.pose import pose_error, zyx_from_rotation
+from systems.estimation import kernels
+from systems.estimation.probing.path_needs import SCALE, PathNeeds
 from systems.estimation.probing.path_reach import PathReach
 from systems.reference.cartesian_path import OutOfReachError
 from systems.reference.paths import ReferenceConfig, make_path
@@ -49,6 +51,23 @@ def shorter(needs: PathNeeds, by: float) -> np.ndarray:
     x = MODEL.mean.copy()
     x[MODEL.G] -= by * along / (needs.H[end, 3, MODEL.G] @ needs.H[end, 3, MODEL.G])
     return x
+
+
+@pytest.mark.parametrize("beyond", [0.0, 0.02, 0.1])
+def test_what_is_missing_is_what_a_general_solver_finds(line, beyond: float):
+    needs, _ = line
+    c, x = MODEL.constants(MODEL.mean), MODEL.mean
+    q = needs.q[needs.times.argmax()]
+    X_WE = MODEL.forward(c, x, q[None])[0][0]
+    X_WE[0, 3] += beyond
+
+    def apart(joints: np.ndarray) -> np.ndarray:
+        return SCALE * pose_error(X_WE, MODEL.forward(c, x, joints[None])[0][0])
+
+    found = least_squares(apart, q, xtol=1e-14, ftol=1e-14, gtol=1e-14)
+    expected = float(np.linalg.norm(found.fun))
+    # It has few steps, and of what is missing nobody wants more than two digits.
+    assert kernels.plan.missing(c, x, X_WE, q.copy()) == pytest.approx(expected, rel=0.01, abs=1e-5)
 
 
 def look(reach: PathReach, x: np.ndarray, covariance: np.ndarray) -> None:
