@@ -1,5 +1,6 @@
 """What the motors make of commands: known up to factors, which their encoders show."""
 
+import math
 from types import SimpleNamespace
 from typing import NamedTuple
 
@@ -162,6 +163,7 @@ class DriveModel:
             P=(SIZE, SIZE),
             correction=(6,),
             smoothed=(6,),
+            misfit=(6,),  # rad^2, mean square of what is left of following errors beyond P, fading
             hung=(2, 6),  # rad, by which motors were off when they were slow, fading, and are if they are
             deviation=Layout(last=(6, 6), z=(6, 6, 2), out=(6, 6)),  # of `deviate`
             wound=(3, 6),  # of what drives wound up meanwhile: integral and error; for how long, s
@@ -274,14 +276,16 @@ class DriveModel:
             The most that was not explained before, beyond what friction may do, in rad.
         """
         doubt = 0.0 if self._hides_sticking else _DOUBT
-        known = memory.hung, memory.P, memory.beta, self._config.following_sigma**2, doubt, most
+        known = memory.hung, memory.misfit, memory.P, memory.beta
+        weighing = self._config.following_sigma**2, doubt, most
         then = planned, beside, regressors, actual, memory.deviation.out
-        return kernels.drives.look_back(self._as_found(memory), *then, *known)
+        return kernels.drives.look_back(self._as_found(memory), *then, *known, *weighing)
 
     def learn(self, memory: SimpleNamespace, Phi: np.ndarray, y: np.ndarray) -> None:
         """One step of recursive least squares: the motors were y behind a plan without correction, (6,)."""
         variances = np.full(len(y), self._config.following_sigma**2)
-        kernels.drives.learn(memory.P, memory.beta, Phi, y, variances)
+        fading = math.exp(-self._drives.period / kernels.drives.MATCHED)
+        kernels.drives.learn(memory.P, memory.beta, Phi, y, variances, memory.misfit, fading)
 
     def open_low_speeds(self, memory: SimpleNamespace, is_early: bool = False) -> None:
         """From now on friction at low speeds may be another one than believed.

@@ -15,6 +15,7 @@ from systems.estimation.kernels.plan import follow
 _SHARP_WIDTH, _THIRD_WIDTH = 0.02, 0.3
 _STILL = 0.1  # of that width, below which a motor may hang in its friction
 _FORGOTTEN = 0.1  # s, in which what it was off by then has fallen to a third
+MATCHED = 0.1  # s, over which variances follow what the model leaves of following errors
 _WINDS = 0.5  # s, longer at rest than that, steps of an encoder may be taken for it
 _MOST_PERIODS = 1.5  # by which torques are sent ahead or held back
 
@@ -84,8 +85,13 @@ def _behind(v, a, rows, beta, i):
 
 
 @compiled
-def learn(P, beta, Phi, y, variances):
-    """Takes six equations y = Phi beta of variances (6,) into covariance P and parameters beta."""
+def learn(P, beta, Phi, y, variances, misfit, fading):
+    """Takes six equations y = Phi beta of variances (6,) into covariance P and parameters beta.
+
+    A joint whose innovations have been larger than both covariances explain counts by as much less: what its
+    model leaves is no noise, and would be taken for what the others share with it. Their mean square beyond
+    P is ``misfit`` (6,), which is renewed and fades by a factor in each step.
+    """
     n, m = len(beta), len(y)
     # Transposed, as rows are quicker.
     PH, S, gain, r = np.zeros((m, n)), np.zeros((m, m)), np.empty((m, n)), np.empty(m)
@@ -95,11 +101,14 @@ def learn(P, beta, Phi, y, variances):
                 for i in range(n):
                     PH[k, i] += Phi[k, j] * P[j, i]
     for k in range(m):
-        S[k, k] = variances[k]
+        r[k] = y[k]
         for i in range(n):
             if Phi[k, i] != 0.0:
+                r[k] -= Phi[k, i] * beta[i]
                 for j in range(m):
                     S[k, j] += Phi[k, i] * PH[j, i]
+        misfit[k] = fading * misfit[k] + (1.0 - fading) * (r[k] * r[k] - S[k, k])
+        S[k, k] += max(variances[k], misfit[k])
     # S = L L^T, and gain = P H S^-1 by two triangular solutions.
     for k in range(m):
         for j in range(k + 1):
@@ -122,10 +131,6 @@ def learn(P, beta, Phi, y, variances):
         for i in range(n):
             gain[k, i] /= S[k, k]
     for k in range(m):
-        r[k] = y[k]
-        for i in range(n):
-            r[k] -= Phi[k, i] * beta[i]
-    for k in range(m):
         for i in range(n):
             beta[i] += gain[k, i] * r[k]
     for i in range(n):
@@ -140,7 +145,7 @@ def learn(P, beta, Phi, y, variances):
 
 
 @compiled
-def look_back(drives, planned, beside, rows, actual, deviation, hung, P, beta, variance, doubt, most):
+def look_back(drives, planned, beside, rows, actual, deviation, hung, misfit, P, beta, variance, doubt, most):
     """Learns from one planned instant that has passed; see `DriveModel.look_back`.
 
     Args:
@@ -152,7 +157,7 @@ def look_back(drives, planned, beside, rows, actual, deviation, hung, P, beta, v
         deviation: (6, 6) rad, of `deviate`.
         hung: rad, (2, 6), by which motors were off when they were slow, fading, and are if they are; is
             renewed.
-        P, beta: as of `learn`.
+        misfit, P, beta: as of `learn`.
         variance: of the following error of a motor that does not hang.
         doubt: times what a motor hung by, by which its following error may be due to that.
         most: rad, that may be unexplained if there shall be something to learn.
@@ -182,7 +187,7 @@ def look_back(drives, planned, beside, rows, actual, deviation, hung, P, beta, v
             unexplained -= Phi[i, j] * beta[j]
         largest = max(largest, abs(unexplained) - drives.slack[i])
     if largest <= most:
-        learn(P, beta, Phi, y, variances)
+        learn(P, beta, Phi, y, variances, misfit, math.exp(-drives.period / MATCHED))
     return largest
 
 
