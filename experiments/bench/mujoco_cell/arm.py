@@ -11,6 +11,7 @@ import mujoco
 import numpy as np
 from scipy.spatial.transform import Rotation
 
+from robots.description.counterbalance_spring import free_length
 from robots.description.model import Link, Placement, RobotModel
 
 STEP = 2.5e-4  # s, of the physics
@@ -54,9 +55,17 @@ class Arm:
         data.qpos[self.motors] = theta
         for _ in range(10):
             mujoco.mj_forward(self.model, data)
-            data.qpos[self.sprung] = -data.qfrc_bias[self.sprung] / self.model.jnt_stiffness[self.sprung]
+            left = data.qfrc_passive[self.sprung] - data.qfrc_bias[self.sprung]
+            data.qpos[self.sprung] += left / self.model.jnt_stiffness[self.sprung]
         mujoco.mj_forward(self.model, data)
         return data
+
+    def holding(self, data: mujoco.MjData, theta: np.ndarray) -> np.ndarray:
+        """The torques in N m, (6,), that hold a rigid arm still at theta (rad, (6,)); data is overwritten."""
+        data.qpos[self.motors] = theta
+        mujoco.mj_fwdPosition(self.model, data)
+        mujoco.mj_fwdVelocity(self.model, data)
+        return (data.qfrc_bias - data.qfrc_passive)[self.motors]
 
     def tip(self, data: mujoco.MjData) -> np.ndarray:
         """The pose of the tool in the world, (4, 4)."""
@@ -75,10 +84,10 @@ def true_arm(robot: RobotModel, payload: float, wrong: Wrong, seed: int) -> Arm:
         seed: of the draw.
 
     Raises:
-        ValueError: if the robot has what is not in the model: a counterbalance, or links that are beams.
+        ValueError: if a link bends otherwise than in proportion to its load, which is not in the model.
     """
-    if robot.counterbalance or any(link.beam for link in robot.links):
-        raise ValueError(f"{robot.name} has a counterbalance or links that bend, which this model has not")
+    if any(stiffening for link in robot.links if link.beam for stiffening in link.beam.stiffening):
+        raise ValueError(f"{robot.name} has links that stiffen as they bend, which this model has not")
     rng = np.random.default_rng(seed)
 
     def off(bound: float, *shape: int) -> np.ndarray:
@@ -107,7 +116,7 @@ def drawn_arm(robot: RobotModel, payload: float) -> Arm:
         for number in JOINTS
     ]
     zero = np.zeros((_FRAMES, 3))
-    return Arm(_model(robot, payload, robot.payload.center_of_mass, zero, zero, joints, 0.0))
+    return Arm(_model(robot, payload, robot.payload.center_of_mass, zero, zero, joints, None))
 
 
 def _elastic(
@@ -141,25 +150,22 @@ def _model(
     shifts: np.ndarray,
     turns: np.ndarray,
     joints: list[str],
-    bending: float,
+    bending: float | None,
 ) -> mujoco.MjModel:
-    """The model of frames that are off by shifts (8, 3) in m and turns (8, 3) in rad, with six joints."""
+    """The model of frames that are off by shifts (8, 3) in m and turns (8, 3) in rad, with six joints.
+
+    Args:
+        bending: as of `Wrong`, beside the beams of the robot's file; None: links are rigid.
+    """
     open_bodies, xml = 1, [f'<body name="base" {_frame(robot.base, shifts[0], turns[0])}>']
     for number, (joint, link, text) in enumerate(zip(robot.joints, robot.links, joints, strict=True), 1):
         xml.append(f'<body name="link_{number}" {_frame(joint.placement, shifts[number], turns[number])}>')
-        xml += [text, _inertial(link)]
+        xml += [text, _inertial(link), _pivot(robot, number)]
         open_bodies += 1
-        if bending and number in (2, 3) and joint.tilting is not None:
-            # All that follows hangs on two hinges in the middle of the link.
-            middle = 0.5 * robot.joints[number].placement.translation
-            springs = np.asarray(joint.tilting.stiffness) / bending, joint.tilting.damping
-            across = _across(middle if middle.any() else joint.axis)
-            hinges = (
-                _spring(f"bend_{number}_{k}", axis, stiffness, damping, middle)
-                for k, (axis, stiffness, damping) in enumerate(zip(across, *springs, strict=True))
-            )
-            tiny = f'<inertial pos="{_text(middle)}" mass="1e-3" diaginertia="1e-3 1e-3 1e-3"/>'
-            xml.append(f'<body name="far_{number}">{"".join(hinges)}{tiny}')
+        place, hinges = _hinges(robot, number, bending) if bending is not None else (None, "")
+        if hinges:  # all that follows hangs on them
+            tiny = f'<inertial pos="{_text(place)}" mass="1e-3" diaginertia="1e-3 1e-3 1e-3"/>'
+            xml.append(f'<body name="far_{number}">{hinges}{tiny}')
             open_bodies += 1
     if payload > 0.0:
         share = payload / robot.payload.largest_mass
@@ -172,7 +178,47 @@ def _model(
     text = "".join(xml)
     name = quoteattr(robot.name)
     return mujoco.MjModel.from_xml_string(
-        f"<mujoco model={name}>{option}<worldbody>{text}</worldbody></mujoco>"
+        f"<mujoco model={name}>{option}<worldbody>{text}</worldbody>{_balancer(robot)}</mujoco>"
+    )
+
+
+def _hinges(robot: RobotModel, number: int, bending: float) -> tuple[np.ndarray, str]:
+    """Where a link bends, in its frame, and on which sprung hinges; none if it does not."""
+    joint, beam = robot.joints[number - 1], robot.links[number - 1].beam
+    if beam is not None:
+        # Under a force at its end a cantilever bends by F l^3 / (3 EI) and turns by F l^2 / (2 EI).
+        u, l = "xyz".index(beam.along), beam.length
+        place = (beam.start + l / 3.0) * np.eye(3)[u]
+        springs = beam.stiffness * np.where(np.arange(3) == u, 1.0, 4.0 / 3.0) / l
+        axes, dampers = np.eye(3), beam.retardation_time * springs
+    elif bending and number in (2, 3) and joint.tilting is not None:
+        place = 0.5 * robot.joints[number].placement.translation
+        axes = np.array(_across(place if place.any() else joint.axis))
+        springs, dampers = np.asarray(joint.tilting.stiffness) / bending, joint.tilting.damping
+    else:
+        return np.zeros(3), ""
+    parts = enumerate(zip(axes, springs, dampers, strict=True))
+    return place, "".join(_spring(f"bend_{number}_{k}", *part, place) for k, part in parts)
+
+
+def _pivot(robot: RobotModel, number: int) -> str:
+    """Where the counterbalance takes hold of a link."""
+    spring = robot.counterbalance
+    if spring is None or number > 2:
+        return ""
+    place = spring.base_pivot if number == 1 else spring.arm_pivot
+    return f'<site name="pivot_{number}" pos="{_text(place)}"/>'
+
+
+def _balancer(robot: RobotModel) -> str:
+    """The counterbalance, a spring between its two pivots."""
+    spring = robot.counterbalance
+    if spring is None:
+        return ""
+    length = free_length(robot.counterbalance_at_axis_2)
+    return (
+        f'<tendon><spatial stiffness="{_text([spring.stiffness])}" damping="{_text([spring.damping])}" '
+        f'springlength="{_text([length])}"><site site="pivot_1"/><site site="pivot_2"/></spatial></tendon>'
     )
 
 

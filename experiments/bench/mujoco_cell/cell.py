@@ -158,11 +158,7 @@ class MujocoCell(LeafSystem):
 
     def _gravity(self, theta: np.ndarray) -> np.ndarray:
         """What holds the robot of the drawing at theta, N m, (6,)."""
-        self._weight.qpos[self._drawn.motors] = theta
-        mujoco.mj_kinematics(self._drawn.model, self._weight)
-        mujoco.mj_comPos(self._drawn.model, self._weight)
-        mujoco.mj_rne(self._drawn.model, self._weight, 0, self._weight.qfrc_bias)
-        return self._weight.qfrc_bias[self._drawn.motors].copy()
+        return self._drawn.holding(self._weight, theta)
 
     def _advance(self, context: Context, state: State) -> None:
         """From the last tick to the next one."""
