@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from systems.servo.law import LawInput, LawOutput, ServoLaw
+from systems.servo.law import LawInput, LawOutput, ServoLaw, check_branch_continuity
 from systems.servo.law_config import LawConfig
 
 
@@ -38,18 +38,25 @@ class NumericalIk(ServoLaw):
 
     def step(self, moment: LawInput, memory: np.ndarray) -> LawOutput:
         """One step of the trapezoidal rule, with feedback of the pose error where there is a sample."""
-        config, measured = self.config, moment.measured
-        rows, J = self.kinematics.rows_and_jacobian(memory[18:])
-        following, correction = self.kernels.numerical_ik(
+        config, kinematics, kernels = self.config, self.kinematics, self.kernels
+        commanded = kinematics.rows_and_jacobian(memory[6:12])
+        follow, places = kernels.numerical_ik, kinematics.rows_and_jacobian(memory[18:])
+        closeness = kernels.closeness(commanded[1])
+        if closeness > 0.0:
+            follow = kernels.numerical_ik_at_singularity
+            nominal = kinematics.rows_and_jacobian(memory[:6])
+            check_branch_continuity(kernels.follow_path(moment.X_WD, moment.V_WD, *nominal)[:, 0])
+            places = nominal, commanded, places[1], closeness
+        following, correction = follow(
             moment.X_WD,
             moment.V_WD,
-            *(measured or (rows, rows)),
-            measured is not None,
-            rows,
-            J,
+            *(moment.measured or (moment.X_WD, moment.X_WD)),
+            moment.measured is not None,
+            *places,
             memory,
             (config.rotation, config.translation),
             (self.angle_limit, config.correction_limit),
             self.period,
         )
+        check_branch_continuity(following[:6] - memory[:6])
         return LawOutput(following[6:12], following[12:18], correction, following)

@@ -41,6 +41,8 @@ class Pbvs(ServoLaw):
         rows, J = self.kinematics.rows_and_jacobian(memory)
         rates = self.kernels.follow_path(moment.X_WD, moment.V_WD, rows, J)
         check_branch_continuity(rates[:, 0])
+        if self.kernels.closeness(J) > 0.0:
+            rates = self.kernels.bounded_path(moment.X_WD, moment.V_WD, rows, J)
         velocity = rates[:, 1]
         q_d = memory + rates[:, 0] + self.period * velocity
         rows, J = self.kinematics.rows_and_jacobian(moment.position)
@@ -48,7 +50,11 @@ class Pbvs(ServoLaw):
         self.kernels.error(rows, moment.X_WD, correction)
         if moment.measured is not None:
             twist = self.within_limits(self._feedback(*moment.measured), correction)
-            added = self.kernels.robust_solve(J, twist[:, None])[:, 0]
+            if self.kernels.closeness(J) > 0.0:
+                back = self.config.translation * (memory - moment.position)
+                added = self.kernels.bounded_rates(J, twist, back)
+            else:
+                added = self.kernels.robust_solve(J, twist[:, None])[:, 0]
             fastest = math.radians(self.config.correction_speed_limit_deg_s)
             largest = max(map(abs, added.tolist()))
             velocity = velocity + added * min(1.0, fastest / max(largest, 1e-12))

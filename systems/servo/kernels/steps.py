@@ -8,12 +8,14 @@ import math
 import numpy as np
 
 from robots.compiled import compiled
-from robots.kinematics.kernels import robust_solve
+from robots.kinematics.kernels import robust_solve, solve
 from systems.estimation.kernels.poses import error
 
 _SMALLEST_COSINE = math.cos(math.radians(60.0))  # L is singular at 90 degrees
 _NEWTON_STEP = 5e-5  # rad; what one such step leaves is its square, a few nanometres
 _DAMPED = 1e-10  # rad and m that a step leaves which was not damped
+# Smallest singular value of a Jacobian in rad and m: an elbow is 3 to 8 degrees from stretched there.
+NEARLY_SINGULAR = 0.03
 
 
 @compiled
@@ -77,6 +79,56 @@ def sine_feedback(wanted, seen, V_WD, rotation, translation):
 def follow_path(X_WD, V_WD, X_WE, J):
     """Motions of the joints as columns, (6, 2): the step in rad from X_WE to X_WD, the rates for V_WD."""
     return robust_solve(J, _to_path(X_WD, V_WD, X_WE))
+
+
+@compiled
+def closeness(J):
+    """How close to a singularity joints are: from 0, outside `NEARLY_SINGULAR`, to 1 in it."""
+    square = 0.0
+    for i in range(6):
+        for j in range(6):
+            square += J[i, j] ** 2
+    # The other five singular values are at most equal shares of all squares: mostly that is enough to know.
+    determinant = abs(solve(J.copy(), np.zeros((6, 1))))
+    if determinant > NEARLY_SINGULAR * (0.2 * square) ** 2.5:
+        return 0.0
+    return max(0.0, 1.0 - np.linalg.svd(J)[1][5] / NEARLY_SINGULAR)
+
+
+@compiled
+def bounded_rates(J, twist, back):
+    """Joint velocities (6,) at a singularity: for a twist as far as the tool can follow, and back from it.
+
+    By singular values s of J, the twist counts by s / e^2 below e = `NEARLY_SINGULAR` and by 1 / s above, as
+    damped least squares have it with the damping e^2 - s^2: feedback ends where the error gets no smaller.
+    At a stretched arm either way to bend would be as good; ``back`` says which one it is.
+
+    Args:
+        J: Jacobian at the joints.
+        twist: of the tool, (6,) in rad/s and m/s.
+        back: velocities to joints on the wanted side, (6,) in rad/s, of which 1 - (s / e)^2 counts.
+    """
+    U, s, Vt = np.linalg.svd(J)
+    rates = np.zeros(6)
+    for k in range(6):
+        along = aside = 0.0
+        for i in range(6):
+            along += U[i, k] * twist[i]
+            aside += Vt[k, i] * back[i]
+        along *= s[k] / max(s[k], NEARLY_SINGULAR) ** 2
+        along += aside * max(0.0, 1.0 - (s[k] / NEARLY_SINGULAR) ** 2)
+        for i in range(6):
+            rates[i] += Vt[k, i] * along
+    return rates
+
+
+@compiled
+def bounded_path(X_WD, V_WD, X_WE, J):
+    """As `follow_path`, by `bounded_rates`: no step leads beyond a stretched arm, to another branch."""
+    twists, rates, nowhere = _to_path(X_WD, V_WD, X_WE), np.empty((6, 2)), np.zeros(6)
+    for k in range(2):
+        rates[:, k] = bounded_rates(J, twists[:, k].copy(), nowhere)
+    return rates
 
 
 @compiled
@@ -150,6 +202,41 @@ def numerical_ik(X_WD, V_WD, wanted, seen, is_seen, X_WE, J, memory, gains, limi
 
 
 @compiled
+def numerical_ik_at_singularity(
+    X_WD, V_WD, wanted, seen, is_seen, nominal, commanded, J, closeness, memory, gains, limits, period
+):
+    """`numerical_ik` where the commanded joints are nearly singular, and those halfway say little of them.
+
+    Args:
+        X_WD, V_WD, wanted, seen, is_seen: as there.
+        nominal: pose and Jacobian at the joints on the path.
+        commanded: pose and Jacobian at the commanded joints.
+        J: Jacobian at the joints halfway.
+        closeness: of the commanded joints; from a half on they count alone.
+        memory, gains, limits, period: as there.
+    """
+    correction, twist = np.empty(6), V_WD.copy()
+    error(commanded[0], X_WD, correction)
+    if is_seen:
+        feedback = sine_feedback(wanted, seen, V_WD, gains[0], gains[1])
+        limit_twist(feedback, correction, limits[0], limits[1])
+        for i in range(6):
+            twist[i] += feedback[i]
+    on_path = bounded_path(X_WD, V_WD, nominal[0], nominal[1])
+    back = gains[1] * (memory[:6] - memory[6:12])
+    share, halfway = min(1.0, 2.0 * closeness), follow_path(X_WD, twist, X_WD, J)
+    rates = share * bounded_rates(commanded[1], twist, back) + (1.0 - share) * halfway[:, 1]
+    following = np.empty(24)
+    for i in range(6):
+        # One Newton step at its own place, and on to the next tick.
+        q_d = memory[i] + on_path[i, 0]
+        q_c = memory[6 + i] + period * rates[i]
+        following[i], following[6 + i], following[12 + i] = q_d + period * on_path[i, 1], q_c, rates[i]
+        following[18 + i] = 0.5 * (q_c + q_d) + 0.5 * period * (rates[i] + on_path[i, 1])
+    return following, correction
+
+
+@compiled
 def turned_by(turn, out):
     """The rotation matrix of a rotation vector (3,) in rad into (3, 3), the Euler-Rodrigues formula."""
     angle = math.sqrt(turn[0] ** 2 + turn[1] ** 2 + turn[2] ** 2)
@@ -218,8 +305,11 @@ def warm_up() -> None:
     distance(X, X)
     limit_twist(sine_feedback(X, X, V, 1.0, 1.0), V, 1.0, 1.0)
     follow_path(X, V, X, J)
+    bounded_path(X, V, X, J)
     newton_step(X, V, X, J, V, V, np.zeros(12))
     robust_solve(J, V[:, None])
     error(X, X, np.empty(6))
     numerical_ik(X, V, X, X, True, X, J, np.zeros(24), (1.0, 1.0), (1.0, 1.0), 1.0)
+    places = (X, J), (X, J), J, closeness(J)
+    numerical_ik_at_singularity(X, V, X, X, True, *places, np.zeros(24), (1.0, 1.0), (1.0, 1.0), 1.0)
     corrected_pose(X, V, X, X, True, np.zeros(24), (1.0, 1.0), (1.0, 1.0), 1.0)

@@ -226,7 +226,7 @@ def test_the_correction_stops_at_its_limit(law: str):
     assert moved == pytest.approx(0.02, abs=2e-3)  # within a tick of 5 1/s * 4 ms * 0.1 m
 
 
-@pytest.mark.parametrize("law", ["position_level", "open_loop", "pbvs"])
+@pytest.mark.parametrize("law", ["position_level", "open_loop", "pbvs", "numerical_ik"])
 def test_a_pose_out_of_reach_gives_no_command_and_the_law_goes_on_when_it_returns(law: str):
     far = at((2000.0, 0.0, 400.0), (20.0, 5.0, 90.0))
     rig = LawRig(law, ROBOT, lambda t: (far if 0.1 < t < 0.15 else HOME, np.zeros(6)), joints_at(HOME))
