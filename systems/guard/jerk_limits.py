@@ -182,8 +182,10 @@ class JerkLimits:
         goal = np.minimum(np.maximum(goal, -down), up)
         change = self._jerk * before
         goal = np.minimum(np.maximum(goal, turning - change), turning + change)
-        # Where both cannot be kept, because the time between two commands has changed, acceleration counts.
-        return speed + span * np.minimum(np.maximum(goal, -limits.acceleration), limits.acceleration)
+        # Not all can be kept where the time between two commands has changed: acceleration and speed are.
+        found = speed + span * np.minimum(np.maximum(goal, -limits.acceleration), limits.acceleration)
+        top = np.maximum(limits.speed, np.abs(speed))
+        return np.minimum(np.maximum(found, -top), top)
 
     def _leaves(
         self, position: np.ndarray, speed: np.ndarray, turning: np.ndarray, period: float

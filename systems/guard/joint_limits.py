@@ -14,7 +14,8 @@ class JointLimits:
 
     A joint's motion is told by its mean speeds between commands. From one to the next such a speed may change
     by the acceleration times the time between the middles of the two intervals. So that a joint can always
-    stop before the end of its range, its speed is bounded by what can be braked away in the steps left.
+    stop before the end of its range, its speed is bounded by what can be braked away in the way left,
+    whenever the commands after this one come.
     """
 
     def __init__(self, robot: RobotModel, speed_share: float = 1.0) -> None:
@@ -77,8 +78,8 @@ class JointLimits:
     ) -> np.ndarray:
         """The allowed speeds nearest to those that are wanted, joint by joint; arguments as of `step`."""
         change = self.acceleration * span
-        up = fastest(self.upper - position, change, period)
-        down = -fastest(position - self.lower, change, period)
+        up = stoppable(self.upper - position, self.acceleration, period)
+        down = -stoppable(position - self.lower, self.acceleration, period)
         low, high = speed - change, speed + change
         wanted = np.minimum(np.maximum(wanted, np.maximum(down, -self.speed)), np.minimum(up, self.speed))
         return np.minimum(np.maximum(wanted, low), high)
@@ -97,6 +98,17 @@ class JointLimits:
         stride, change = grown * period * self.speed, grown * period * self.acceleration
         columns = (self.lower, self.upper, grown * self.speed, stride, change, period * change + _SMALLEST)
         return np.stack(columns, axis=1)
+
+
+def stoppable(distance: np.ndarray, acceleration: np.ndarray, period: float) -> np.ndarray:
+    """The largest speeds (rad/s) until the next command from which joints stop within distances (rad).
+
+    A mean speed v until then stands for v - a h / 2 at its end, h being the period and a the acceleration.
+    Braked with a from there, mean speeds cover v h + (v - a h / 2)^2 / 2 a in all, whatever the steps are.
+    """
+    distance, half = np.maximum(distance, 0.0), 0.5 * period * acceleration
+    braking = np.sqrt(2.0 * acceleration * distance)
+    return np.where(braking > 2.0 * half, braking - half, distance / period)
 
 
 def fastest(distance: np.ndarray, change: np.ndarray, period: float) -> np.ndarray:

@@ -88,14 +88,10 @@ def may_be_sent(rows, position, velocity, mean, speed, last, passed, span, slack
             and abs(mean[i] - speed[i]) <= span * most
         ):
             return False
-        # What is left of the range must suffice for braking: `systems.guard.joint_limits.fastest`.
-        change = span * most
-        if abs(mean[i]) > change:
-            room = upper - position[i] if mean[i] > 0.0 else position[i] - lower
-            far = (room + passed * abs(mean[i])) / (passed * change)
-            n = math.floor(0.5 * (math.sqrt(1.0 + 8.0 * far) - 1.0))
-            if abs(mean[i]) > slack * (n + (far - 0.5 * n * (n + 1.0)) / (n + 1.0)) * change:
-                return False
+        # What is left of the range must suffice for braking: `systems.guard.joint_limits.stoppable`.
+        room = upper - position[i] if mean[i] > 0.0 else position[i] - lower
+        if abs(mean[i]) > slack * (0.5 * passed * most + math.sqrt(2.0 * most * room)):
+            return False
     return True
 
 

@@ -116,6 +116,25 @@ def test_messages_keep_it_too_and_so_does_their_stop(jerk: float):
     assert_jerk(robot, *(np.array(part) for part in zip(*sent, strict=True)))
 
 
+@pytest.mark.parametrize("jerk", [300.0, 3000.0])
+def test_however_long_it_is_from_message_to_message_speed_acceleration_and_range_are_kept(jerk: float):
+    robot, random = with_jerk(jerk), np.random.default_rng(0)
+    for spans in random.uniform(5e-4, 0.032, (12, 4)):
+        guard = MessageGuard(JointLimits(robot), PERIOD, False)
+        guard.forget(MIDDLE)
+        position, rate, sent = MIDDLE, np.zeros(6), [MIDDLE]
+        passed = random.choice(spans, 400)
+        for span in passed:
+            rate = np.minimum(rate + 0.5 * span * robot.acceleration, robot.speed)
+            position = position + span * rate
+            sent.append(guard.judged(position, rate, float(span))[0])
+        means = np.diff(sent, axis=0) / passed[:, None]
+        turns = np.abs(np.diff(means, axis=0)) / (0.5 * (passed[1:] + passed[:-1])[:, None])
+        assert (np.abs(means) <= robot.speed * SLACK).all()
+        assert (turns <= robot.acceleration * SLACK + 1e-9).all()
+        assert (np.array(sent) <= robot.upper).all()
+
+
 def test_a_joint_brakes_before_the_end_of_its_range():
     """It is led beyond with all its speed, and stops short of the end by less than two degrees."""
     robot = with_jerk(1000.0)

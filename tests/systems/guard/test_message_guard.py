@@ -215,3 +215,21 @@ def test_a_joint_that_is_sent_out_of_its_range_comes_to_rest_at_its_end(share):
         sent, _ = stream.send(position, rate)
     stream.check()
     assert sent == pytest.approx(ROBOT.upper, abs=1e-6)
+
+
+uneven = st.lists(st.floats(5e-4, 0.04), min_size=2, max_size=40)
+
+
+@settings(max_examples=60)
+@given(spans=uneven, share=st.floats(0.1, 1.0), side=st.sampled_from([-1.0, 1.0]))
+def test_so_it_does_however_long_it_is_from_message_to_message(spans, share, side):
+    """From the middle of its range it is led beyond an end, brakes as it may, and stands at it then."""
+    stream, position, rate = Stream(), MIDDLE, np.zeros(6)
+    for span in itertools.chain(itertools.islice(itertools.cycle(spans), 1200), 60 * [0.02]):
+        rate = side * np.minimum(np.abs(rate) + 0.5 * span * ROBOT.acceleration, share * ROBOT.speed)
+        position = position + span * rate
+        sent, _ = stream.send(position, rate, stamp=span, own=span)
+    stream.check()
+    is_there = np.abs(position - MIDDLE) > 0.5 * (ROBOT.upper - ROBOT.lower)
+    end = ROBOT.upper if side > 0.0 else ROBOT.lower
+    np.testing.assert_allclose(sent[is_there], end[is_there], atol=1e-6)
