@@ -5,6 +5,7 @@ from typing import NamedTuple
 import numpy as np
 
 from robots.description.model import NUM_JOINTS
+from systems.guard.way_back import way_left
 from systems.link.client import LinkClient
 from systems.link.guided import GuidedRobot
 from systems.link.kuka.setpoint_age import SetpointAge
@@ -13,6 +14,8 @@ from systems.link.session import Link
 
 _OLD = 0.1  # s, beyond which an earlier message says nothing of the present motion
 _WRAP = 2**32
+_FADES = 1.0  # s, in which commands come from the set-point to what they say
+_NOTHING = np.zeros(NUM_JOINTS)
 _KEPT = 12  # replies that a set-point may not contain yet
 _NOT_FOLLOWED = (
     "the set-point ASPos does not follow the corrections: an ASPos without them, answers that come too "
@@ -44,6 +47,10 @@ class RsiCodec:
     A relative correction is worked out from the set-point of the telegram that it answers and the corrections
     that this set-point cannot contain yet. So replies that were lost are made up for, and never faster than
     the axes may turn.
+
+    Commands begin, and begin anew, where the joints are measured. A controller may keep them off its
+    set-point, by a following error or because the arm sags, and would make a step of that: so commands count
+    from the set-point at first, and what this adds to them fades smoothly.
     """
 
     def __init__(
@@ -61,6 +68,8 @@ class RsiCodec:
         self._largest_step, self._cycle = np.asarray(largest_speed) * cycle, cycle
         self._is_relative, self._name, self._age = is_relative, name, SetpointAge(behind)
         self._sent: dict[int, np.ndarray] = {}  # (6,) rad, by the number of the telegram that was answered
+        self._begins, self._began = True, -np.inf  # s, when commands began
+        self._aside = np.zeros(NUM_JOINTS)  # rad, from the first command to the set-point of then
 
     @property
     def behind(self) -> int:
@@ -87,7 +96,14 @@ class RsiCodec:
         self._age.note(last, telegram.setpoint, self._sent, telegram.late)
         unseen = [step for each, step in self._sent.items() if last - each <= self.behind]
         setpoint = telegram.setpoint + sum(unseen)
-        step = command.velocity * self._cycle if command.is_speed_only else command.position - setpoint
+        if self._begins:
+            self._begins, self._began = False, now
+            # Commands that go on from those before begin at the set-point themselves.
+            off, error = setpoint - command.position, setpoint - telegram.measured
+            self._aside = np.clip(off, np.minimum(error, 0.0), np.maximum(error, 0.0))
+        aside, _ = way_left(min(1.0, (now - self._began) / _FADES), _FADES, self._aside, _NOTHING)
+        wanted = command.position + aside
+        step = command.velocity * self._cycle if command.is_speed_only else wanted - setpoint
         step = np.minimum(np.maximum(step, -self._largest_step), self._largest_step)
         correction = step
         if not self._is_relative and telegram.correction is not None:
@@ -97,7 +113,8 @@ class RsiCodec:
         return data
 
     def at(self, report: RsiReport) -> RsiCommand:
-        """To stay at the set-point of a report."""
+        """To stay at the set-point of a report; what is commanded next begins anew."""
+        self._begins = True
         return RsiCommand(report.telegram.setpoint, np.zeros(NUM_JOINTS))
 
     def standing(self, safe: RsiCommand, asked: RsiCommand) -> RsiCommand:

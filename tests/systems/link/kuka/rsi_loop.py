@@ -16,15 +16,21 @@ SENDER = ("127.0.0.1", 59152)
 
 
 class RsiLoop:
-    """Joints that are where the controller's reference was in the cycle before."""
+    """Joints that are where the controller's reference was in the cycle before, less a following error."""
 
-    def __init__(self, **settings) -> None:
+    def __init__(self, following_error: np.ndarray | None = None, **settings) -> None:
         config = RsiRunConfig(**settings)
         self.controller = RsiController(ROBOT, config)
         self._is_relative = config.correction == "relative"
+        self.following_error = np.zeros(6) if following_error is None else following_error  # rad
         self.change_client()
         self.time, self.planned = 100.0, START.copy()
         self._coming = self._report()
+
+    @property
+    def measured(self) -> np.ndarray:
+        """Where the joints are, (6,) rad."""
+        return self.planned - self.following_error
 
     def change_client(self) -> None:
         """A new client comes; the last reply of the one before is lost."""
@@ -58,4 +64,4 @@ class RsiLoop:
         return planned
 
     def _report(self) -> bytes | None:
-        return self.controller.report(self.time, self.planned, self.planned, np.zeros(6))
+        return self.controller.report(self.time, self.measured, self.planned, np.zeros(6))

@@ -96,6 +96,35 @@ def test_a_client_that_begins_anew_takes_the_robot_over_where_it_is(mode):
     np.testing.assert_allclose(planned, np.broadcast_to(there, planned.shape), atol=1e-9)
 
 
+SAG = np.deg2rad([0.0, 0.4, -0.3, 0.05, -0.1, 0.0])
+
+
+@pytest.mark.parametrize("mode", MODES)
+def test_a_following_error_that_the_controller_keeps_is_no_step_when_commands_begin(mode):
+    """They begin at the measured joints, which the arm's weight keeps off the set-point, and move on."""
+    loop = RsiLoop(SAG, correction=mode)
+    joints = loop.measured
+    planned = loop.run(500, lambda time: joints + sway(time) - START)
+    wanted = joints + np.array([sway(CYCLE * cycle) for cycle in range(500)]) - START
+    steps = np.diff(planned, axis=0)
+    assert (np.abs(np.diff(steps, axis=0)) <= 0.1 * ROBOT.acceleration * CYCLE**2).all()
+    np.testing.assert_allclose(planned[300:], wanted[299:-1], atol=1e-8)  # after a second as ever
+
+
+@pytest.mark.parametrize("mode", MODES)
+def test_nor_is_it_when_rsi_begins_anew(mode):
+    loop = RsiLoop(SAG, correction=mode, late_limit=5, restart_after=0.1)
+    loop.run(200, lambda time: START)
+    loop.run(60, lambda time: START, lambda cycle: cycle < 10)
+    assert loop.controller.restarts == 1
+    there = loop.measured
+    loop.change_client()
+    planned = loop.run(400, lambda time: there)
+    steps = np.diff(planned, axis=0)
+    assert (np.abs(np.diff(steps, axis=0)) <= 0.1 * ROBOT.acceleration * CYCLE**2).all()
+    np.testing.assert_allclose(planned[-1], there, atol=1e-8)
+
+
 def test_too_many_late_replies_in_a_row_end_rsi_and_the_robot_stands():
     loop = RsiLoop(late_limit=5, restart_after=-1.0)
     planned = loop.run(100, sway, lambda cycle: cycle >= 50)
