@@ -51,6 +51,7 @@ _MOVED = 2e-4  # rad, slack of a joint whose motor is off by friction more than 
 _SLACK = 0.3  # of Coulomb's friction, by which it may be off while little is known of it
 _STEEPEST = 0.5  # rad/s, what learning may add to the speed of a joint
 _RESTS = {"cascade": 1e-5, "velocity": 1e-5, "position": 3e-5}  # rad, where a motor rests beside its command
+_OF_ACCELERATION = 0.9  # share of a joint's largest acceleration that commands may have
 _LED_IN = 40.0  # rad/s, with which commands follow what was learnt, critically damped
 
 
@@ -129,6 +130,7 @@ class DriveModel:
             payload,
             model.takes_torque,
             config.position if model.takes_torque else config.following,
+            _OF_ACCELERATION * robot.acceleration,
         )
         self._rings = kind == "position"
         self._gains = config.position, config.integral
@@ -167,6 +169,7 @@ class DriveModel:
             hung=(2, 6),  # rad, by which motors were off when they were slow, fading, and are if they are
             deviation=Layout(last=(6, 6), z=(6, 6, 2), out=(6, 6)),  # of `deviate`
             wound=(3, 6),  # of what drives wound up meanwhile: integral and error; for how long, s
+            aside=(3, 6),  # rad and rad/s, of commands what is beside the plan, see `DriveMemory`
             gains=gains_layout,
             coming=gains_layout,  # gains that were found and not taken yet; factors of 0: there are none
         )
@@ -217,6 +220,7 @@ class DriveModel:
             memory.smoothed,
             memory.hung,
             memory.wound,
+            memory.aside,
         )
         out, regressors = np.empty((4, 6)), np.empty(REGRESSORS)
         limits = _LED_IN, _STEEPEST

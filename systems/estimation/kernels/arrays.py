@@ -123,6 +123,7 @@ class Drives(NamedTuple):
     takes_torque: bool
     # 1/s, gain of a planner that follows references, or of position loops where drives take torques
     following: float
+    acceleration: np.ndarray  # (6,) rad/s^2, of commands
 
 
 class DriveMemory(NamedTuple):
@@ -138,6 +139,8 @@ class DriveMemory(NamedTuple):
     smoothed: np.ndarray  # (6,) rad/s, accelerations through 1 / (s + following)
     hung: np.ndarray  # (2, 6) rad, by which motors were off when they were slow, fading, and are if they are
     wound: np.ndarray  # (3, 6), integral and error left of what drives wound up; s, that motors hang
+    # (3, 6), what was commanded beside the plan: rad; rad/s, mean speed until then and the commanded one
+    aside: np.ndarray
 
 
 class Gap(NamedTuple):

@@ -240,6 +240,42 @@ def _learnt(z, beta, i):
 
 
 @inner
+def _bounded(drives, a, position, speed, is_first, aside, i):
+    """What is commanded beside the plan, so that a joint is accelerated no more than it may be.
+
+    Friction that turns over asks for its torque at once, and a soft drive gives it for a large step only.
+    Where that were too quick, the command follows as fast as it may, and still comes to rest beside it.
+
+    Args:
+        a: planned acceleration of this joint.
+        position, speed: rad and rad/s, beside the plan, that are wanted.
+        is_first: whether nothing was commanded before.
+        aside: (3, 6), of the command before; is renewed.
+        i: which joint.
+
+    Returns:
+        Position and speed that may be.
+    """
+    period = drives.period
+    change = period * max(drives.acceleration[i] - abs(a), 0.1 * drives.acceleration[i])
+    before, mean, last = aside[0, i], aside[1, i], aside[2, i]
+    way = (position - before) / period
+    if is_first:
+        way = speed
+        last = speed
+    elif abs(way - mean) > change:
+        off = position - before - period * speed
+        far = abs(off) / (change * period)
+        n = math.floor(0.5 * (math.sqrt(1.0 + 8.0 * far) - 1.0))  # as `systems.guard.joint_limits.fastest`
+        most = min((n + (far - 0.5 * n * (n + 1.0)) / (n + 1.0)) * change, abs(off) / period)
+        way = min(max(speed + math.copysign(most, off), mean - change), mean + change)
+        position, speed = before + period * way, way
+    speed = min(max(speed, last - change), last + change)
+    aside[0, i], aside[1, i], aside[2, i] = position, way, speed
+    return position, speed
+
+
+@inner
 def _mean_sign(v, change, width):
     """The mean of tanh(v / width) while the speed changes evenly by so much."""
     begin, end = v / width, (v + change) / width
@@ -347,4 +383,9 @@ def command(drives, arm, masses, memory, motion, loads, mass, limits, out, rows)
         out[3, i] = correction + unwound
         out[0, i] += out[3, i]
         out[1, i] += (correction - before) / drives.period + speed
+        wanted = out[0, i] - theta[i], out[1, i] - v[i]
+        position, speed = _bounded(drives, a[i], *wanted, is_first, memory.aside, i)
+        if position != wanted[0] or speed != wanted[1]:
+            out[3, i] += position - wanted[0]
+            out[0, i], out[1, i] = theta[i] + position, v[i] + speed
     memory.started[0] = 1.0

@@ -42,6 +42,7 @@ def _renewed(memory: SimpleNamespace) -> list[np.ndarray]:
         drives.led.ravel(),
         drives.smoothed,
         drives.wound.ravel(),
+        drives.aside.ravel(),
         drives.gains.all,
         drives.coming.all,
         delay.delay,
