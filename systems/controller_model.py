@@ -4,7 +4,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from robots.configuration.quantity import choice, numbers, quantity
+from robots.configuration.quantity import choice, file_name, numbers, quantity
 from robots.description.model import RobotModel
 from robots.dynamics.plant import ELASTICITIES
 
@@ -54,7 +54,7 @@ class Mismatch:
 class ControllerModelConfig:
     """What the controller believes, as a scenario says it; what is left empty is as in the station."""
 
-    robot: str = ""  # a shipped robot or the path of a robot file
+    robot: str = file_name()  # a shipped robot or the path of a robot file
     payload: float | None = quantity(None, 0.0, 1000.0, "kg")  # at the flange
     payload_centre_mm: list[float] = numbers((), (0, 3), unit="mm")  # three, in the frame of the flange
     camera_period: float | None = quantity(None, 5e-4, 1.0, "s")  # between two exposures

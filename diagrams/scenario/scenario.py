@@ -9,7 +9,7 @@ from diagrams.integration import IntegratorConfig
 from diagrams.scenario.own_laws import without_own_laws
 from diagrams.scenario.scenario_file import ScenarioError, read_scenario_nodes, shipped_scenarios
 from robots.configuration.nodes import ConfigurationError
-from robots.configuration.quantity import choice, numbers, quantity
+from robots.configuration.quantity import choice, file_name, numbers, quantity
 from robots.configuration.typed import typed
 from robots.description.geometric_errors import GeometricErrors
 from robots.description.model import NUM_JOINTS
@@ -88,8 +88,8 @@ class Scenario:
     """Everything that an experiment needs to know."""
 
     description: str = ""  # one line, for lists and reports
-    robot: str = "irb1200"  # a shipped robot or the path of a robot file
-    law: str = "numerical_ik"  # the law that `truetip run` runs
+    robot: str = file_name("irb1200")  # a shipped robot or the path of a robot file
+    law: str = file_name("numerical_ik")  # the law that `truetip run` runs
     seed: int = quantity(0, 0, 2**32 - 1)  # of the camera's noise
     home_deg: np.ndarray = field(
         default_factory=lambda: np.zeros(NUM_JOINTS)

@@ -8,9 +8,11 @@ from rich.console import Console
 
 from diagrams.runs.simulation import Experiment, nominal_robot
 from diagrams.scenario.carried import HOME, PATH, carried_over, with_robot
-from diagrams.scenario.scenario import Scenario, ScenarioError, load_scenario, scenario_text
+from diagrams.scenario.kept import kept_text
+from diagrams.scenario.scenario import Scenario, ScenarioError, load_scenario
 from diagrams.scenario.scenario_file import OptionSetting, read_scenario_nodes, stated_keys
 from experiments.cli.console import print_note
+from robots.description.calibration import is_same_robot
 from robots.description.foreign_sources import foreign_sources_note
 from robots.description.model import RobotFileError, RobotModel, load_robot
 from robots.description.placement import long_tool_note
@@ -33,6 +35,7 @@ class Prepared:
     scenario: Scenario
     robot: RobotModel  # as the controller knows it
     carried: str = ""  # what of the scenario was made to fit this robot, and what the controller knows of it
+    calibrated: str = ""  # the file of the robot that the controller knows, where that is a calibrated one
 
     @property
     def nominal_robot(self) -> RobotModel:
@@ -57,9 +60,14 @@ class Prepared:
         return "; ".join(filter(None, (self.carried, _file_note(self.robot))))
 
     @property
+    def kept(self) -> str:
+        """The whole scenario as YAML, to run it again: `kept_text`."""
+        return kept_text(self.scenario, self.calibrated)
+
+    @property
     def text(self) -> str:
-        """The whole scenario as YAML under its title."""
-        return f"# {self.title}\n{scenario_text(self.scenario)}"
+        """The same under its title."""
+        return f"# {self.title}\n{self.kept}"
 
 
 def noted_robot(console: Console, name: str) -> RobotModel:
@@ -100,14 +108,19 @@ def prepare(
     """
     scenario = load_scenario(name, list(settings))
     differences = list(settings)
-    model = load_robot(robot) if robot else _robot_of(name, settings, scenario)
+    calibrated = _calibrated_belief(scenario) if robot is None else ""
     if robot is not None:
+        model = load_robot(robot)
         if model.calibration.of:  # it is what the controller knows, whatever the scenario says
-            belief = replace(scenario.servo.model, robot="")
-            scenario = replace(scenario, servo=replace(scenario.servo, model=belief))
+            calibrated = robot
         else:
             scenario = with_robot(scenario, robot)
         differences.append(f"robot={robot}")
+    else:
+        model = load_robot(calibrated) if calibrated else _robot_of(name, settings, scenario)
+    if calibrated:
+        belief = replace(scenario.servo.model, robot="")
+        scenario = replace(scenario, servo=replace(scenario.servo, model=belief))
     scenario, carried = _fitted(name, settings, scenario, robot, needs_path)
     if robot is not None and scenario.servo.model.robot:
         known = f"the controller knows {load_robot(scenario.servo.model.robot).name}"
@@ -120,7 +133,14 @@ def prepare(
     if needs_path and scenario.station.kind == "simulated" and scenario.station.events:
         _require_possible_events(name, settings, scenario)
     title = Path(name).stem + (f" ({'; '.join(differences)})" if differences else "")
-    return Prepared(title, scenario, model, carried)
+    return Prepared(title, scenario, model, carried, calibrated)
+
+
+def _calibrated_belief(scenario: Scenario) -> str:
+    """The file of the calibrated robot in `servo.model.robot`; empty where that is none of the station's."""
+    name = scenario.servo.model.robot
+    of = load_robot(name).calibration.of if name else ""
+    return name if of and is_same_robot(of, scenario.robot) else ""
 
 
 def _robot_of(name: str, settings: Sequence[str], scenario: Scenario) -> RobotModel:

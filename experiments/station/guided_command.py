@@ -15,7 +15,7 @@ from diagrams.record.foxglove_server import FoxgloveServer
 from diagrams.record.log import RunLog
 from diagrams.record.run_record import RunRecord
 from diagrams.runs.real_time import RealTimeRecord
-from diagrams.scenario.scenario import StationConfig, load_scenario, scenario_text
+from diagrams.scenario.scenario import StationConfig, load_scenario
 from diagrams.scenario.scenario_file import OptionSetting
 from experiments.cli.console import BROKEN_OFF, count, progress_bar, refusing
 from experiments.cli.ending import asking
@@ -150,7 +150,7 @@ def guide(
         # Where it stays: what is only moved there in the end is lost with the process.
         out.mkdir(parents=True, exist_ok=True)
         path = out / f"{law_file_name(law)}-{number}.mcap"
-        streams.append(RunRecord(path, scenario_text(prepared.scenario), viewer))
+        streams.append(RunRecord(path, prepared.kept, viewer))
         return streams[-1]
 
     label = f"{count(cycles * len(laws), 'run')} on {where}"

@@ -17,7 +17,6 @@ from diagrams.record.recorded_link import RecordedStation
 from diagrams.record.run_record import RunRecord
 from diagrams.runs.path_correction import CorrectedPass, PathCorrectionRun
 from diagrams.runs.virtual_cell import CellRecord
-from diagrams.scenario.scenario import scenario_text
 from experiments.cli.console import BROKEN_OFF, print_files, progress_bar, refusing
 from experiments.cli.ending import asking
 from experiments.cli.option_limits import one_of
@@ -137,7 +136,7 @@ def _run(
         camera = station.camera
         assert camera is not None
         if record_file:
-            record = RunRecord(record_file, scenario_text(prepared.scenario))
+            record = RunRecord(record_file, prepared.kept)
             stack.callback(record.close)
             recorded = RecordedStation(client, camera, record)
             client, camera = recorded.client, recorded.camera

@@ -12,7 +12,7 @@ from diagrams.hardware_link import EndedOnRequest
 from diagrams.record.recorded_link import RecordedStation
 from diagrams.record.run_record import RunRecord
 from diagrams.runs.guided_measurement import GuidedMeasurement, Row, Visit
-from diagrams.scenario.scenario import load_scenario, scenario_text
+from diagrams.scenario.scenario import load_scenario
 from experiments.cli.console import BROKEN_OFF, count, print_files, progress_bar, refusing
 from experiments.cli.ending import asking
 from experiments.cli.json_output import human_console, json_output
@@ -126,7 +126,7 @@ def _recorded(
     def keep(visit: Visit, row: Row) -> None:
         table.append(visit.number, row)
 
-    text = scenario_text(prepared.scenario)
+    text = prepared.kept
     with (
         ExitStack() as stack,
         asking() as end,

@@ -48,6 +48,7 @@ class Declaration:
     limits: Limits = Limits()
     sizes: tuple[int, ...] = ()  # how many numbers a list may have; empty for any
     choices: Callable[[], Collection[str]] | None = None  # of a text
+    is_file: bool = False  # whether a text is a path, or the name of something that is shipped
 
 
 def quantity(
@@ -114,6 +115,11 @@ def choice(default: str, names: Collection[str] | Callable[[], Collection[str]])
     """A field that holds one of the names; a function is asked for them when they are needed."""
     choices = names if callable(names) else lambda: names
     return field(default=default, metadata={_KEY: Declaration(choices=choices)})
+
+
+def file_name(default: str = "") -> Any:
+    """A field that holds the path of a file, ``FILE.py:CLASS``, or the name of something that is shipped."""
+    return field(default=default, metadata={_KEY: Declaration(is_file=True)})
 
 
 def declaration(entry: Field) -> Declaration:

@@ -14,6 +14,7 @@ from pydrake.math import RigidTransform
 from pydrake.systems.framework import Context, DiscreteValues, LeafSystem
 from scipy.special import ndtri
 
+from robots.configuration.quantity import file_name
 from robots.description.model import NUM_JOINTS, RobotModel
 from robots.kinematics.arm_capsules import ArmCapsules
 from robots.pose import pose_error
@@ -37,10 +38,10 @@ class MarkerCameraConfig(ExposureConfig):
 
     kind: ClassVar[str]
 
-    cell: str = "probst"  # a shipped cell or the path of a cell file
+    cell: str = file_name("probst")  # a shipped cell or the path of a cell file
     # The cell as the tracker knows it, such as `truetip cameras calibrate --write` makes; none: as it is.
-    calibration: str = ""
-    body: str = "probst"  # a shipped detection body or the path of a body file
+    calibration: str = file_name()
+    body: str = file_name("probst")  # a shipped detection body or the path of a body file
     features: FeatureConfig = field(default_factory=FeatureConfig)
     images: ImageConfig = field(default_factory=ImageConfig)
     centroids: CentroidConfig = field(default_factory=CentroidConfig)

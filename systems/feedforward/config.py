@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass, field
 
-from robots.configuration.quantity import choice, quantity
+from robots.configuration.quantity import choice, file_name, quantity
 from systems.feedforward.predictive.config import PredictiveConfig
 from systems.feedforward.prefilter import PrefilterConfig
 
@@ -20,7 +20,7 @@ class CorrectionConfig:
 class FeedforwardConfig:
     """Which inverse model runs beside the law; read from a scenario file."""
 
-    kind: str = "none"  # none, one of `systems.feedforward.FEEDFORWARDS` or FILE.py:CLASS
+    kind: str = file_name("none")  # none, one of `systems.feedforward.FEEDFORWARDS` or FILE.py:CLASS
     # By which share stiffness and damping of the model are above the robot's
     stiffness_error: float = quantity(0.0, -0.9, 10.0)
     # By which share masses and inertias of the model are above the robot's

@@ -9,7 +9,7 @@ from pydrake.common import RandomDistribution
 from pydrake.common.value import Value
 from pydrake.systems.framework import Context, LeafSystem, State
 
-from robots.configuration.quantity import numbers, quantity
+from robots.configuration.quantity import file_name, numbers, quantity
 from robots.description.model import NUM_JOINTS
 from robots.kinematics.arm_capsules import ArmCapsules, Capsules
 from systems.cell.overview.person import PersonConfig, WalkingPerson
@@ -40,8 +40,8 @@ class OverviewConfig:
     """Whole images of the cameras of a cell, and who walks through it; read from a scenario file."""
 
     enabled: bool = False  # whether the station has them and the robot is slowed for people
-    cell: str = "probst"  # the cameras, a shipped cell or a file
-    surroundings: str = "probst"  # what stands still about the robot, likewise
+    cell: str = file_name("probst")  # the cameras, a shipped cell or a file
+    surroundings: str = file_name("probst")  # what stands still about the robot, likewise
     people: list[PersonConfig] = field(default_factory=list)  # who walks through the cell
     width: int = quantity(640, 64, 8192, "px")  # of a whole image
     period: float = quantity(0.05, 1e-3, 10.0, "s")  # between two sets of images

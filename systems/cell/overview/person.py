@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from pydrake.math import RigidTransform, RotationMatrix
 
-from robots.configuration.quantity import quantity, vector
+from robots.configuration.quantity import file_name, quantity, vector
 from robots.kinematics.arm_capsules import Capsules
 
 _SKIN, _SHIRT, _TROUSERS, _SHOES = (0.85, 0.65, 0.52), (0.2, 0.35, 0.6), (0.15, 0.15, 0.2), (0.1, 0.08, 0.08)
@@ -40,7 +40,7 @@ class PersonConfig:
     facing_deg: float = quantity(0.0, unit="deg")  # where it looks at a single point
     # A file (.obj, .gltf, .glb; m, z upwards, looking along x, feet about the origin) that is drawn in its
     # place; the figure's distance still counts, and a virtual cell in real time draws the figure
-    mesh: str = ""
+    mesh: str = file_name()
 
 
 class WalkingPerson:

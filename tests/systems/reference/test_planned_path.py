@@ -1,5 +1,8 @@
 """Planned motions from files: written and read, between samples, and what is refused."""
 
+import pickle
+import shutil
+
 import numpy as np
 import pytest
 
@@ -81,6 +84,14 @@ def test_a_file_that_is_no_motion_is_refused_with_its_line(file, tmp_path, chang
     wrong.write_text("\n".join(change(rows)))
     with pytest.raises(ValueError, match=reason):
         read_planned(str(wrong))
+
+
+def test_a_file_that_is_written_anew_meanwhile_is_another_motion_for_nobody(file, tmp_path):
+    copy = shutil.copy(file, tmp_path)
+    shape = Planned(str(copy))
+    first = shape.motion()
+    (tmp_path / "circle.csv").write_text("")
+    np.testing.assert_array_equal(pickle.loads(pickle.dumps(shape)).motion().q, first.q)
 
 
 def test_a_planned_path_without_a_file_is_refused():
