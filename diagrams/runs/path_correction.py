@@ -122,7 +122,7 @@ class PathCorrectionRun:
                 break
             report = wire.next_report(wait=_SILENCE)
             if report is None or not report.is_ready:
-                left = self._line.length - float(self._line.along[robot_at])
+                left = self._line.length - self._line.way_to(robot_at)
                 ended = "path"
                 if left >= _NEAR_END:
                     why = wire.trouble or _broken(report is None, left)
@@ -181,7 +181,8 @@ class PathCorrectionRun:
         found, index = np.zeros((len(p_WE), 2)), 0
         for row, point, robot_at in zip(found, p_WE, places, strict=True):
             index = self._line.place(point, index).index
-            row[:] = (self._line.points[index] - point) @ self._line.R_WP[robot_at, :, 1:]
+            (seen, _), (moved, _) = self._line.row(index), self._line.row(robot_at)
+            row[:] = (self._line.points[seen] - point) @ self._line.R_WP[moved, :, 1:]
         return found
 
 

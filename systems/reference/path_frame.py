@@ -5,7 +5,7 @@ the z axis of the tool as that allows, y = z x x.
 """
 
 from collections.abc import Callable
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -21,14 +21,20 @@ _LEAST_ANGLE = 0.1  # of directions, below which z of the tool says nothing
 class Place(NamedTuple):
     """Where a point is beside a path."""
 
-    index: int  # of the nearest point of the line, for the next look
+    index: int  # of the nearest point of the line, all laps counted, for the next look
     along: float  # m, from the start
     R_WP: np.ndarray  # (3, 3), axes of the path's frame in the world
     p_error_W: np.ndarray  # (3,) m, from the point to the line, at a right angle to it
 
 
 class PathLine:
-    """Points of a path at even distances, with a frame at each."""
+    """Points of a path at even distances, with a frame at each.
+
+    Attributes:
+        along: m from the start of a lap, shape (n,). All laps are the same, and only one is kept.
+        points: of a lap, (n, 3) in m.
+        R_WP: axes of the path's frame at these in the world, (n, 3, 3).
+    """
 
     def __init__(self, path: CartesianPath) -> None:
         """Samples the path.
@@ -36,8 +42,10 @@ class PathLine:
         Raises:
             ValueError: if the tool only turns on the spot, so that there is nothing beside the path.
         """
-        times = np.arange(path.path_start, path.dwell_start + _SAMPLING, _SAMPLING)
-        X_WE = path.sample(np.minimum(times, path.dwell_start))[0]
+        self._laps = len(path.lap_starts)
+        end = float(path.lap_starts[1]) if self._laps > 1 else path.dwell_start
+        times = np.arange(path.path_start, end + _SAMPLING, _SAMPLING)
+        X_WE = path.sample(np.minimum(times, end))[0]
         way = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(X_WE[:, :3, 3], axis=0), axis=1))])
         if way[-1] < 2.0 * _SPACING:
             raise ValueError("path correction: the path has no length, the tool only turns on the spot")
@@ -51,14 +59,23 @@ class PathLine:
 
     @property
     def length(self) -> float:
-        """Of the path in m."""
-        return float(self.along[-1])
+        """Of the path with all its laps in m."""
+        return self._laps * float(self.along[-1])
+
+    def row(self, index: Any) -> tuple[Any, Any]:
+        """Which row of a lap a point of the line is, and of which lap: the end is that of the last one."""
+        steps = len(self.along) - 1
+        lap = np.minimum(index // steps, self._laps - 1)
+        return index - lap * steps, lap
+
+    def way_to(self, index: int) -> float:
+        """How far a point of the line is from the start, in m."""
+        row, lap = self.row(index)
+        return float(self.along[row] + lap * self.along[-1])
 
     def place(self, p_WE: np.ndarray, last: int) -> Place:
         """Where a point (3,) in m is, not far from the point of the line where it was last."""
-        return self._nearest(
-            p_WE, slice(max(0, last - self._steps(_LOOK_BACK)), last + self._steps(_LOOK_AHEAD))
-        )
+        return self._nearest(p_WE, max(0, last - self._steps(_LOOK_BACK)), last + self._steps(_LOOK_AHEAD))
 
     def shifted(self, p_WE: np.ndarray, last: int, shifts: Callable[[np.ndarray], np.ndarray]) -> Place:
         """Where on its way a robot is that has been shifted beside the path; it never goes back.
@@ -69,16 +86,22 @@ class PathLine:
             shifts: from frames R_WP of the path (n, 3, 3), in which the robot may be, to the shifts (n, 3) in
                 m in the world that it would have in them.
         """
-        return self._nearest(p_WE, slice(last, last + self._steps(_STEP_AHEAD)), shifts)
+        return self._nearest(p_WE, last, last + self._steps(_STEP_AHEAD), shifts)
 
     def _nearest(
-        self, p_WE: np.ndarray, among: slice, shifts: Callable[[np.ndarray], np.ndarray] | None = None
+        self,
+        p_WE: np.ndarray,
+        first: int,
+        end: int,
+        shifts: Callable[[np.ndarray], np.ndarray] | None = None,
     ) -> Place:
-        near = self.points[among] + (shifts(self.R_WP[among]) if shifts else 0.0)
-        index = among.start + int(np.argmin(((near - p_WE) ** 2).sum(axis=1)))
-        error = self.points[index] - p_WE
-        tangent = self.R_WP[index, :, 0]
-        return Place(index, float(self.along[index]), self.R_WP[index], error - (tangent @ error) * tangent)
+        among = np.arange(first, min(end, self._laps * (len(self.along) - 1) + 1))
+        rows, _ = self.row(among)
+        near = self.points[rows] + (shifts(self.R_WP[rows]) if shifts else 0.0)
+        k = int(np.argmin(((near - p_WE) ** 2).sum(axis=1)))
+        index, R_WP, error = int(among[k]), self.R_WP[rows[k]], self.points[rows[k]] - p_WE
+        tangent = R_WP[:, 0]
+        return Place(index, self.way_to(index), R_WP, error - (tangent @ error) * tangent)
 
     def _steps(self, way: float) -> int:
         return int(way / self.along[1]) + 1

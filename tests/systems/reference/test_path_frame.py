@@ -24,6 +24,26 @@ def test_a_point_of_the_path_lies_nowhere_beside_it():
         assert place.along == pytest.approx(line.length, abs=1e-3)
 
 
+def test_all_laps_are_counted_and_one_is_kept():
+    path = make_path(ReferenceConfig(laps=3))
+    line, one, index = PathLine(path), PathLine(SQUARE), 0
+    np.testing.assert_allclose(line.points, one.points, atol=1e-9)
+    assert line.length == pytest.approx(3.0 * one.length)
+    went = []
+    for time in np.arange(path.path_start, path.dwell_start + 0.02, 0.02):
+        tip = path.sample(time)[0][:3, 3]
+        place = line.place(tip, index)
+        index = place.index
+        went.append(place.along)
+        assert np.linalg.norm(place.p_error_W) < 2.6e-4
+        assert line.way_to(index) == place.along
+    assert np.diff(went).min() > -1e-3
+    assert went[-1] == pytest.approx(line.length, abs=1e-3)
+    # Behind the last lap there is nothing: the frame stays that of the last edge.
+    np.testing.assert_array_equal(place.R_WP, line.R_WP[-1])
+    assert len(PathLine(make_path(ReferenceConfig(laps=10000))).points) == len(one.points)
+
+
 def test_a_shift_across_is_the_error_and_one_along_is_none():
     line = PathLine(SQUARE)
     index = len(line.along) // 8
