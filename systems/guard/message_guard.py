@@ -19,15 +19,15 @@ class PassedTime:
     """The time from message to message: what the sender's stamps say, but never more than has passed here.
 
     Messages come early and late, and after a silence often many at once. What they are late by is left to
-    those that come early after them, up to `LONGEST_OWED`; in sum the time is never ahead of the own clock. A
-    stamp that is not later than the newest one is of a message that was overtaken, or of a clock that was set
-    back: it counts from the stamp before it, and what it was given is taken from the next one that is later.
-    After `LONGEST_OWED` of such stamps the clock was set, and goes on from there.
+    those that come early after them, up to `LONGEST_OWED`; in sum the time since the first message is never
+    ahead of the own clock. A stamp that is not later than the newest one is of a message that was overtaken,
+    or of a clock that was set back: it counts from the stamp before it, and what it was given is taken from
+    the next one that is later. After `LONGEST_OWED` of such stamps the clock was set, and goes on from there.
     """
 
     def __init__(self, period: float) -> None:
         """Starts with the time of one message, ``period`` in s."""
-        self._period, self._most, self._credit = period, MOST_BRIDGED * period, period
+        self._period, self._most, self._credit = period, MOST_BRIDGED * period, 0.0
         self._newest: float | None = None
         self._behind_since: float | None = None  # on the own clock, when the first stamp was not the newest
         self._last = self._aside = self._now = self._advanced = 0.0
@@ -42,9 +42,9 @@ class PassedTime:
         if self._newest is None:
             self._newest = self._last = stamp
             self._now = self._advanced = now
-            return self._credit
+            return self._period
         self._credit = min(self._credit + max(0.0, now - self._now), LONGEST_OWED)
-        self._now = now
+        self._now = max(now, self._now)
         ahead, is_newest = stamp - self._last, stamp > self._newest
         if is_newest:
             passed = stamp - self._newest - self._aside
