@@ -35,6 +35,7 @@ _SILENCE = 1.0  # s that end a pass; meanwhile the controller goes on, or stops 
 _SMOOTHING = 0.05  # s, of what the camera says: twelve exposures at 4 ms
 _KEPT = 1.0  # s, for which it is known where the joints were
 _NEAR_END = 0.005  # m before the end of the path, from which a controller that stops has finished it
+_STANDS = 20.0  # s beside rests of the path, in which a robot that runs it has moved on by the way above
 _FAR = 0.1  # m beside the path: the robot runs another one
 REQUESTED = "ended on request"
 
@@ -116,6 +117,8 @@ class PathCorrectionRun:
         taken = _TakenUp(self._lag)
         nominal: deque[np.ndarray] = deque()  # time in s, and where the joints put the tool in m
         began, began_here, ended = None, now(), ""
+        reference = self._scenario.reference
+        rest, moved_at, moved = _STANDS + max(reference.settle, reference.dwell), began_here, 0.0
         while not ended:
             if is_asked_to_end():
                 ended = REQUESTED
@@ -136,6 +139,11 @@ class PathCorrectionRun:
             place = self._line.shifted(tip, robot_at, partial(taken.up_to, time))
             robot_at = place.index
             taken.note(time, place.R_WP)
+            if place.along > moved + _NEAR_END:
+                moved_at, moved = now(), place.along
+            elif now() > moved_at + rest:
+                ended = f"the robot has not moved on for {rest:.0f} s; does its controller run the path?"
+                break
             sample = wire.pose_at(time)
             if sample.valid and sample.time > exposed:
                 share = 1.0 if math.isinf(exposed) else 1.0 - math.exp((exposed - sample.time) / _SMOOTHING)

@@ -19,6 +19,8 @@ from experiments.cli.former_options import renamed
 
 FILES_HELP = "Columns and keys of files: reference/files.html in the manual, which make docs writes to site/."
 
+_STAYING = "truetip.staying"  # in a context, what `stays` has noted
+
 _running: ContextVar[Any] = ContextVar("running", default=None)  # the context of the command that runs
 
 
@@ -40,6 +42,19 @@ def naming(file: Path) -> list[str]:
         if any(isinstance(value, str | Path) and _is(file, value) for value in values):
             found.append(each.opts[0] if each.param_type_name == "option" else _shown(each).strip("[]."))
     return found
+
+
+def stays(file: str | Path) -> None:
+    """Notes a file that the running command writes where it stays, whatever becomes of its other results."""
+    context = _running.get()
+    if context is not None:
+        context.meta.setdefault(_STAYING, []).append(Path(file))
+
+
+def staying() -> list[Path]:
+    """The files that the running command has written where they stay."""
+    context = _running.get()
+    return [file for file in context.meta.get(_STAYING, ()) if file.exists()] if context else []
 
 
 def _is(file: Path, given: str | Path) -> bool:

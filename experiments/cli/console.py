@@ -13,7 +13,7 @@ from rich.markup import escape
 from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeRemainingColumn
 from rich.table import Table
 
-from experiments.cli.command_table import option_with
+from experiments.cli.command_table import option_with, staying
 from experiments.cli.ending import exit_code
 from experiments.cli.workers import SimulationError
 
@@ -32,7 +32,10 @@ def refusing(*refusals: type[Exception]) -> Iterator[None]:
     except SimulationError as error:
         fail(str(error), BROKEN_OFF)
     except KeyboardInterrupt as error:
-        fail("interrupted, nothing was written", exit_code(error))
+        kept = " and ".join(str(file) for file in staying())
+        fail(
+            f"interrupted; {kept} was kept" if kept else "interrupted, nothing was written", exit_code(error)
+        )
 
 
 def _plain(error: Exception) -> str:

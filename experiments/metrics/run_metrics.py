@@ -201,10 +201,12 @@ def with_timing(result: dict[str, Any], times: Mapping[str, Any]) -> dict[str, A
 def best_law(result: Mapping[str, Any]) -> str:
     """The law of a `summary` whose largest distance is smallest; the open loop only if it is alone.
 
-    Where the laws start from the same error and it stays the largest, the root mean square decides.
+    Where the laws start from the same error and it stays the largest, the root mean square decides. One that
+    did not come to the end of its path has not kept near it; it is the best only if all have not.
     """
     runs, source = result["runs"], judged_by(result)
     laws = [law for law in runs if law != "open_loop"] or list(runs)
+    laws = [law for law in laws if None not in runs[law][source]["static_mm"]] or laws
     smallest = min(_sortable(runs[law][source]["max_norm_mm"]) for law in laws)
     alike = [law for law in laws if _sortable(runs[law][source]["max_norm_mm"]) <= 1.001 * smallest]
     return min(alike, key=lambda law: _sortable(runs[law][source]["rms_norm_mm"]))

@@ -97,6 +97,8 @@ def verdict(summary: Mapping[str, Any]) -> str:
     best, runs = best_law(summary), summary["runs"]
     source = judged_by(summary)
     numbers, tip = runs[best][source], _TIPS[source]
+    if numbers["max_norm_mm"] is None:
+        return f"{law_title(best)}: no pose of the tip was seen on the path, so its error is not known."
     if numbers["settling_s"] is None:
         course = (
             f"keeps {tip} within {_text(numbers['max_norm_mm'])} mm and "
@@ -107,12 +109,13 @@ def verdict(summary: Mapping[str, Any]) -> str:
             f"keeps {tip} within {_text(numbers['max_norm_mm'])} mm of the wanted path, within 5 % of the "
             f"distance at the start after {_text(numbers['settling_s'])} s,"
         )
-    text = (
-        f"{law_title(best)} {course} and comes to rest "
-        f"{_text(norm(numbers['static_mm']))} mm and {_text(norm(numbers['static_deg']))}° from it."
-    )
-    if "open_loop" in runs and best != "open_loop":
-        baseline = runs["open_loop"][source]
+    off, turned = norm(numbers["static_mm"]), norm(numbers["static_deg"])
+    rest = f"comes to rest {_text(off)} mm and {_text(turned)}° from it"
+    if off is None:  # the run was ended, or the camera was blind then
+        rest = "was not seen at rest"
+    text = f"{law_title(best)} {course} and {rest}."
+    baseline = runs.get("open_loop", {}).get(source)
+    if baseline and best != "open_loop" and baseline["max_norm_mm"] is not None:
         text += (
             f" Without the camera the tip is off by up to {_text(baseline['max_norm_mm'])} mm and "
             f"{_text(baseline['max_angle_deg'])}°, and by {_text(norm(baseline['static_mm']))} mm at rest."

@@ -17,6 +17,7 @@ from diagrams.record.run_record import RunRecord
 from diagrams.runs.real_time import RealTimeRecord
 from diagrams.scenario.scenario import StationConfig, load_scenario
 from diagrams.scenario.scenario_file import OptionSetting
+from experiments.cli.command_table import stays
 from experiments.cli.console import BROKEN_OFF, count, progress_bar, refusing
 from experiments.cli.ending import asking
 from experiments.cli.prepare import Prepared
@@ -151,6 +152,7 @@ def guide(
         out.mkdir(parents=True, exist_ok=True)
         path = out / f"{law_file_name(law)}-{number}.mcap"
         streams.append(RunRecord(path, prepared.kept, viewer))
+        stays(path)
         return streams[-1]
 
     label = f"{count(cycles * len(laws), 'run')} on {where}"

@@ -17,7 +17,8 @@ from diagrams.record.recorded_link import RecordedStation
 from diagrams.record.run_record import RunRecord
 from diagrams.runs.path_correction import CorrectedPass, PathCorrectionRun
 from diagrams.runs.virtual_cell import CellRecord
-from experiments.cli.console import BROKEN_OFF, print_files, progress_bar, refusing
+from experiments.cli.command_table import stays
+from experiments.cli.console import BROKEN_OFF, fail, print_files, progress_bar, refusing
 from experiments.cli.ending import asking
 from experiments.cli.option_limits import one_of
 from experiments.cli.prepare import Prepared
@@ -99,7 +100,7 @@ def correct_path(console: Console, prepared: Prepared, with_cell: bool, out: Pat
                 passes[name] = _run(
                     prepared,
                     run,
-                    (with_cell, stage / _RECORD if name == _CORRECTED else None),
+                    (with_cell, out / _RECORD if name == _CORRECTED else None),
                     name == _CORRECTED,
                     lambda share, number=number: progress((number + share) / len(names)),
                     end.is_asked,
@@ -107,7 +108,7 @@ def correct_path(console: Console, prepared: Prepared, with_cell: bool, out: Pat
                 if passes[name].found.ended != "path":
                     break
         except EndedOnRequest:
-            raise typer.Exit(end.code or BROKEN_OFF) from None
+            fail("ended on request before the path began", end.code or BROKEN_OFF)
         numbers = {name: _numbers(each) for name, each in passes.items()}
         write_json(stage / _NUMBERS, numbers)
         said = _verdict(numbers)
@@ -136,7 +137,10 @@ def _run(
         camera = station.camera
         assert camera is not None
         if record_file:
+            # Where it stays: what is only moved there in the end is lost with the process.
+            record_file.parent.mkdir(parents=True, exist_ok=True)
             record = RunRecord(record_file, prepared.kept)
+            stays(record_file)
             stack.callback(record.close)
             recorded = RecordedStation(client, camera, record)
             client, camera = recorded.client, recorded.camera

@@ -13,6 +13,7 @@ from diagrams.record.recorded_link import RecordedStation
 from diagrams.record.run_record import RunRecord
 from diagrams.runs.guided_measurement import GuidedMeasurement, Row, Visit
 from diagrams.scenario.scenario import load_scenario
+from experiments.cli.command_table import stays
 from experiments.cli.console import BROKEN_OFF, count, print_files, progress_bar, refusing
 from experiments.cli.ending import asking
 from experiments.cli.json_output import human_console, json_output
@@ -79,6 +80,7 @@ def record_command(
         if table.measured:
             human.print(f"{out} has {len(table.measured)} of {len(q)} configurations; the others follow")
         ask_before_moving(human, prepared, with_cell or yes)
+        stays(out)
         unseen, ended, code = _recorded(prepared, run, (visits, ways), table, (with_cell, mcap))
         result = {
             "configurations": len(q),
@@ -137,6 +139,7 @@ def _recorded(
         assert camera is not None
         if mcap:
             record = RunRecord(mcap, text)
+            stays(mcap)
             stack.callback(record.close)
             recorded = RecordedStation(client, camera, record)
             client, camera = recorded.client, recorded.camera

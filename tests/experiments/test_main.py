@@ -12,6 +12,7 @@ import pytest
 
 from diagrams.scenario.scenario import load_scenario, shipped_scenarios
 from experiments import main
+from experiments.cli.command_table import stays
 from experiments.cli.prepare import check, prepare
 from experiments.running import compare_command, run_command
 from robots.description.model import shipped_robots
@@ -167,6 +168,20 @@ def test_an_interrupted_comparison_leaves_nothing(tmp_path, monkeypatch):
     assert result.exit_code == 130
     assert result.stderr.strip() == "truetip: interrupted, nothing was written"
     assert files(tmp_path) == set()
+
+
+def test_an_interruption_names_what_was_kept_all_the_same(tmp_path, monkeypatch):
+    """As a record that is written while a robot moves, where Ctrl-C comes a second time."""
+
+    def interrupted(*_):
+        (tmp_path / "run.mcap").write_text("")
+        stays(tmp_path / "run.mcap")
+        stays(tmp_path / "not_begun.mcap")
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(compare_command, "compare", interrupted)
+    result = truetip("compare", *SHORT)
+    assert result.stderr.strip() == f"truetip: interrupted; {tmp_path / 'run.mcap'} was kept"
 
 
 @pytest.mark.slow

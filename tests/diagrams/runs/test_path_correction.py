@@ -53,6 +53,13 @@ def test_a_controller_that_stops_ends_the_pass_by_name():
 
 
 @pytest.mark.slow
+def test_a_controller_that_waits_to_be_guided_is_not_waited_for_without_end():
+    """Its robot stands at the start and takes no correction of a path."""
+    found, _, _, _ = run("station.link.run.path_correction=false")
+    assert found.ended == "the robot has not moved on for 21 s; does its controller run the path?"
+
+
+@pytest.mark.slow
 def test_a_robot_on_another_path_is_not_corrected():
     """The circle of the scenario lies far from the rectangle that the controller runs."""
     wire = Lockstep(load_scenario("cell", OWN_PATH))

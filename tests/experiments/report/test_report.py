@@ -130,6 +130,35 @@ def test_the_verdict_names_the_best_law_and_the_baseline():
     assert "off by up to 25.00 mm and 0.50°, and by 5.00 mm at rest" in text
 
 
+def test_the_verdict_says_what_was_not_seen():
+    """A run on a station that ended early, and one without a camera, had dashes in place of numbers."""
+    whole = {
+        "max_norm_mm": 2.0,
+        "rms_norm_mm": 1.0,
+        "max_angle_deg": 0.5,
+        "settling_s": None,
+        "static_mm": [0.003, 0.004, 0.0],
+        "static_deg": [0.0, 0.0, 0.03],
+    }
+    unseen = dict.fromkeys(whole) | {"static_mm": [None] * 3, "static_deg": [None] * 3}
+    early = whole | {"max_norm_mm": 0.1, "static_mm": [None] * 3, "static_deg": [None] * 3}
+
+    def said(**measured: dict) -> str:
+        return verdict({"runs": {law: {"true": unseen, "measured": run} for law, run in measured.items()}})
+
+    assert said(open_loop=unseen) == (
+        "Open loop: no pose of the tip was seen on the path, so its error is not known."
+    )
+    assert said(pbvs=early) == (
+        "PBVS keeps the tip, as the camera sees it, within 0.10 mm and 0.50° of the wanted path and was not "
+        "seen at rest."
+    )
+    # Who has not run its path to the end has not kept nearest to it.
+    text = said(open_loop=unseen, pbvs=early, numerical_ik=whole)
+    assert text.startswith("Numerical IK keeps the tip, as the camera sees it, within 2.00 mm")
+    assert "–" not in text
+
+
 def test_from_the_same_initial_error_the_law_that_settles_well_wins():
     start = {
         "max_norm_mm": 17.3,
