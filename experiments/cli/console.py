@@ -32,10 +32,9 @@ def refusing(*refusals: type[Exception]) -> Iterator[None]:
     except SimulationError as error:
         fail(str(error), BROKEN_OFF)
     except KeyboardInterrupt as error:
-        kept = " and ".join(str(file) for file in staying())
-        fail(
-            f"interrupted; {kept} was kept" if kept else "interrupted, nothing was written", exit_code(error)
-        )
+        kept = [str(file) for file in staying()]
+        what = f"; kept: {', '.join(kept)}" if kept else ", nothing was written"
+        fail(f"interrupted{what}", exit_code(error))
 
 
 def _plain(error: Exception) -> str:

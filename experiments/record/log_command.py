@@ -43,14 +43,13 @@ def log_command(
             np.savez_compressed(arrays, **columns)
     console = Console()
     said = contents.run
-    how = str(said.get("ended", ""))
+    how = str(said.get("ended", "no run of a law"))
     if how == "path":
         how = "ran its path to the end"
     if not contents.is_complete:
         how = "was cut off: what follows is what had been written"
-    console.print(
-        f"{escape(str(file))}: law {escape(str(said.get('law', 'unknown')))}, {escape(how)}", soft_wrap=True
-    )
+    law = f"law {said['law']}, " if "law" in said else ""
+    console.print(escape(f"{file}: {law}{how}"), soft_wrap=True)
     print_table(console, summary_table(contents))
     print_files(console, csv, parquet, npz)
 

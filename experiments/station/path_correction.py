@@ -14,10 +14,8 @@ from rich.markup import escape
 
 from diagrams.hardware_link import EndedOnRequest
 from diagrams.record.recorded_link import RecordedStation
-from diagrams.record.run_record import RunRecord
 from diagrams.runs.path_correction import CorrectedPass, PathCorrectionRun
 from diagrams.runs.virtual_cell import CellRecord
-from experiments.cli.command_table import stays
 from experiments.cli.console import BROKEN_OFF, fail, print_files, progress_bar, refusing
 from experiments.cli.ending import asking
 from experiments.cli.option_limits import one_of
@@ -26,6 +24,7 @@ from experiments.cli.staging import staged_folder
 from experiments.report.files import write_json
 from experiments.report.plot_page import Section, html_table, write_plot_page
 from experiments.station.clients import station_clients
+from experiments.station.kept_record import kept_record
 from systems.link.udp_channel import ChannelError
 
 JOINT, PATH_CORRECTION = "joint", "path_correction"
@@ -137,11 +136,7 @@ def _run(
         camera = station.camera
         assert camera is not None
         if record_file:
-            # Where it stays: what is only moved there in the end is lost with the process.
-            record_file.parent.mkdir(parents=True, exist_ok=True)
-            record = RunRecord(record_file, prepared.kept)
-            stays(record_file)
-            stack.callback(record.close)
+            record = kept_record(stack, record_file, prepared.kept)
             recorded = RecordedStation(client, camera, record)
             client, camera = recorded.client, recorded.camera
         found = run.run(client, camera, corrects, progress, is_asked_to_end=is_asked_to_end)

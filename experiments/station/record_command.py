@@ -10,7 +10,6 @@ import typer
 
 from diagrams.hardware_link import EndedOnRequest
 from diagrams.record.recorded_link import RecordedStation
-from diagrams.record.run_record import RunRecord
 from diagrams.runs.guided_measurement import GuidedMeasurement, Row, Visit
 from diagrams.scenario.scenario import load_scenario
 from experiments.cli.command_table import stays
@@ -20,8 +19,10 @@ from experiments.cli.json_output import human_console, json_output
 from experiments.cli.options import JsonOption, ScenarioOption, SetOption, WithCellOption, YesOption
 from experiments.cli.prepare import Prepared, prepare
 from experiments.cli.staging import TABLE, check_suffix
+from experiments.cli.workers import SimulationError
 from experiments.station.clients import station_clients
 from experiments.station.guided_command import ask_before_moving, check_measures_alone, on_station
+from experiments.station.kept_record import kept_record, next_part
 from experiments.station.measured_table import MeasuredTable, read_configurations
 from robots.calibration.dwells import DwellRule
 from robots.measurement_design.clear_ways import ClearWays
@@ -81,7 +82,15 @@ def record_command(
             human.print(f"{out} has {len(table.measured)} of {len(q)} configurations; the others follow")
         ask_before_moving(human, prepared, with_cell or yes)
         stays(out)
-        unseen, ended, code = _recorded(prepared, run, (visits, ways), table, (with_cell, mcap))
+        # What was said before stays, as what was measured does.
+        part = Path(mcap) if mcap else None
+        part = next_part(part) if part and table.measured else part
+        try:
+            unseen, ended, code = _recorded(prepared, run, (visits, ways), table, (with_cell, part))
+        except SimulationError as error:
+            if not table.measured:
+                raise
+            unseen, ended, code = [], str(error), BROKEN_OFF
         result = {
             "configurations": len(q),
             "measured": len(table.measured),
@@ -93,7 +102,7 @@ def record_command(
     human.print(f"{count(len(table.measured), 'configuration')} of {len(q)} measured")
     if unseen:
         human.print(f"The camera saw too little at configurations {', '.join(map(str, unseen))}")
-    print_files(human, out if table.measured else None, mcap)
+    print_files(human, out if table.measured else None, part)
     if ended != "design":
         typer.echo(f"truetip: {ended}; the same command goes on from here", err=True)
         raise typer.Exit(code)
@@ -118,7 +127,7 @@ def _recorded(
     run: GuidedMeasurement,
     route: tuple[Sequence[Visit], ClearWays],
     table: MeasuredTable,
-    options: tuple[bool, str | None],
+    options: tuple[bool, Path | None],
 ) -> tuple[list[int], str, int]:
     """Runs what is left; gives what was not seen, why it ended and the exit code for that."""
     (visits, ways), (with_cell, mcap) = route, options
@@ -128,7 +137,6 @@ def _recorded(
     def keep(visit: Visit, row: Row) -> None:
         table.append(visit.number, row)
 
-    text = prepared.kept
     with (
         ExitStack() as stack,
         asking() as end,
@@ -138,10 +146,7 @@ def _recorded(
         client, camera = station.client, station.camera
         assert camera is not None
         if mcap:
-            record = RunRecord(mcap, text)
-            stays(mcap)
-            stack.callback(record.close)
-            recorded = RecordedStation(client, camera, record)
+            recorded = RecordedStation(client, camera, kept_record(stack, mcap, prepared.kept))
             client, camera = recorded.client, recorded.camera
         try:
             unseen = run.run(

@@ -181,7 +181,7 @@ def test_an_interruption_names_what_was_kept_all_the_same(tmp_path, monkeypatch)
 
     monkeypatch.setattr(compare_command, "compare", interrupted)
     result = truetip("compare", *SHORT)
-    assert result.stderr.strip() == f"truetip: interrupted; {tmp_path / 'run.mcap'} was kept"
+    assert result.stderr.strip() == f"truetip: interrupted; kept: {tmp_path / 'run.mcap'}"
 
 
 @pytest.mark.slow

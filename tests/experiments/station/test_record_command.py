@@ -8,6 +8,7 @@ from typer.testing import CliRunner
 
 from diagrams.record.run_record import RunRecord
 from diagrams.record.topics import JOINTS, POSE, pose_message
+from experiments.cli.workers import SimulationError
 from experiments.main import app
 from experiments.station import record_command
 from experiments.station.measured_table import MeasuredTable, read_configurations
@@ -87,6 +88,31 @@ def test_the_numbers_of_a_run_are_written(tmp_path, design, monkeypatch: pytest.
     assert json.loads(numbers.read_text()) == {
         "configurations": 3, "measured": 3, "not_seen": [2], "ended": "design", "file": str(table)
     }  # fmt: skip
+
+
+def test_a_controller_that_stops_leaves_what_was_measured_and_said(
+    tmp_path, design, monkeypatch: pytest.MonkeyPatch
+):
+    """The next part of the run has a recording of its own; the first one was replaced by it."""
+    table, said = tmp_path / "measured.csv", tmp_path / "said.mcap"
+    parts: list[str] = []
+
+    def broken(prepared, run, route, rows, options):
+        rows.append(len(rows.measured) + 1, (Q[len(rows.measured)], np.array([0.5, 0.1, 0.2]), np.eye(3)))
+        parts.append(options[1].name)
+        options[1].write_text("")
+        raise SimulationError("the controller stopped on the way to the goal")
+
+    monkeypatch.setattr(record_command, "_recorded", broken)
+    command = ["record", str(design), "--with-cell", "--write", str(table), "--write-recording", str(said)]
+    for number in (1, 2):
+        result = CliRunner().invoke(app, command, catch_exceptions=False)
+        assert result.exit_code == 1
+        assert f"{number} configuration{'s' if number > 1 else ''} of 3 measured" in result.stdout
+        assert result.stderr.strip() == (
+            "truetip: the controller stopped on the way to the goal; the same command goes on from here"
+        )
+    assert parts == ["said.mcap", "said-2.mcap"]
 
 
 def test_a_recording_without_a_dwell_is_refused_in_one_line(tmp_path):
