@@ -41,10 +41,36 @@ def _make_whole(part: Any) -> None:
             _make_whole(value)
 
 
+def file_of(name: str) -> Path | None:
+    """The file that a name of a robot, a law or the like means; None for what is shipped or not there."""
+    file, is_class, _ = name.partition(_CLASS)
+    path = Path(f"{file}.py" if is_class else name)
+    return path if path.suffix and path.is_file() else None  # what is shipped has no suffix
+
+
+def named_files(scenario: Scenario) -> list[Path]:
+    """The files that a scenario names; not those that these name in turn."""
+    found = [file_of(name) for name in [*_names(scenario), *scenario.servo.laws.own]]
+    return sorted({file for file in found if file})
+
+
+def _names(part: Any) -> list[str]:
+    """What stands in the fields of a tree of dataclasses that name files."""
+    if isinstance(part, list):
+        return [name for each in part for name in _names(each)]
+    if not is_dataclass(part):
+        return []
+    found: list[str] = []
+    for entry in fields(part):
+        value = getattr(part, entry.name)
+        found += [value] if declaration(entry).is_file else _names(value)
+    return found
+
+
 def _whole(name: str) -> str:
     """The same file from any folder; what is no file that is there stays as it is."""
-    file, is_class, inside = name.partition(_CLASS)
-    path = Path(f"{file}.py" if is_class else name)
-    if not path.suffix or not path.is_file():  # what is shipped has no suffix
+    path = file_of(name)
+    if path is None:
         return name
+    _, is_class, inside = name.partition(_CLASS)
     return f"{path.absolute()}:{inside}" if is_class else str(path.absolute())

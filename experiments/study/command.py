@@ -16,6 +16,7 @@ from rich.table import Table
 
 from experiments.cli.cluster import executor
 from experiments.cli.console import count, fail, print_files, print_table, progress_bar, refusing
+from experiments.cli.ending import exit_code
 from experiments.cli.json_output import human_console, json_output
 from experiments.cli.option_limits import at_least
 from experiments.cli.options import JobsOption, JsonOption, SchedulerOption
@@ -32,8 +33,8 @@ from experiments.study.figures import (
     metric_unit,
     spread_figure,
 )
-from experiments.study.rows import StudyRow, first_scenario, run_row, study_rows
-from experiments.study.store import TABLE, StudyStore, columns_of
+from experiments.study.rows import StudyRow, first_run, run_row, study_rows
+from experiments.study.store import TABLE, StudyStore, alone_in, columns_of
 from experiments.study.study_file import Study, load_study
 
 _PAGE = "study.html"
@@ -61,22 +62,23 @@ def study_command(
         at_least("--jobs", 1, jobs)
         study = load_study(file)
         rows = study_rows(study)
-        plan = {"study": asdict(study), "first_scenario": first_scenario(rows)}
+        plan = {"study": asdict(study), **first_run(rows)}
         where = executor(scheduler, jobs)
         factors = {
             name: [dict(row.factors)[name] for row in rows[:: len(study.laws)]] for name in study.factors
         }
-        store = StudyStore(folder, plan, columns_of(factors, list(FIGURES)))
-        finished = store.finished(with_failures=not retry_failed)
-        todo = [row for row in rows if row.number not in finished]
-        if finished and todo:
-            human.print(f"{count(len(finished), 'run')} of {len(rows)} are there from before")
-        _run(store, where, todo, len(rows))
-        table = store.finish()
-        found = {name: _column(table, name) for name in table.column_names}
-        numbers = study_json(study, found, [row.command for row in rows])
-        with staged_file(folder / _PAGE) as page:
-            _write_page(page, study, found, rows)
+        with alone_in(folder):
+            store = StudyStore(folder, plan, columns_of(factors, list(FIGURES)))
+            finished = store.finished(with_failures=not retry_failed)
+            todo = [row for row in rows if row.number not in finished]
+            if finished and todo:
+                human.print(f"{count(len(finished), 'run')} of {len(rows)} are there from before")
+            _run(store, where, todo, len(rows))
+            table = store.finish()
+            found = {name: _column(table, name) for name in table.column_names}
+            numbers = study_json(study, found, [row.command for row in rows])
+            with staged_file(folder / _PAGE) as page:
+                _write_page(page, study, found, rows)
         output.write(numbers | {"seconds": time.perf_counter() - start})
     _print(human, study, found)
     print_files(human, folder / _PAGE, folder / TABLE)
@@ -91,8 +93,8 @@ def _run(store: StudyStore, where: Executor, todo: Sequence[StudyRow], total: in
             with closing(where.completed(run_row, todo, progress)) as completed:
                 for _, line in completed:
                     store.add(line)
-        except KeyboardInterrupt:
-            fail(f"interrupted; {_kept(store, total)}", 130)
+        except KeyboardInterrupt as error:
+            fail(f"interrupted; {_kept(store, total)}", exit_code(error))
         except SimulationError as error:
             raise SimulationError(f"{error}; {_kept(store, total)}") from error
         finally:
@@ -177,10 +179,16 @@ def _write_page(path: Path, study: Study, rows: Rows, plan: Sequence[StudyRow]) 
 
 
 def study_verdict(study: Study, rows: Rows) -> str:
-    """What came out, in a sentence: the best law by the worst run of the first metric."""
+    """What came out, in a sentence: the best law by the worst run of the first metric, if it has not failed.
+
+    The worst run of a law may be one that failed; it is not better than another one for leaving it out.
+    """
     metric = study.metrics[0]
     found = {law: spread(of_law(rows, law)[metric]) for law in study.laws}
-    ranked = sorted((law for law in found if found[law]["runs"]), key=lambda law: found[law]["worst"])
+    failures = {law: int((of_law(rows, law)["failure"] != "").sum()) for law in study.laws}
+    ranked = sorted(
+        (law for law in found if found[law]["runs"]), key=lambda law: (failures[law], found[law]["worst"])
+    )
     failed = int((rows["failure"] != "").sum())
     if not ranked:
         return f"All {count(len(rows['row']), 'run')} failed."

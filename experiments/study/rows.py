@@ -3,9 +3,12 @@
 import shlex
 from collections.abc import Sequence
 from dataclasses import dataclass
+from hashlib import sha256
 from typing import Any
 
 from diagrams.runs.simulation import run
+from diagrams.scenario.kept import file_of, named_files
+from diagrams.scenario.scenario import scenario_text
 from experiments.cli.prepare import prepare
 from experiments.cli.workers import Progress
 from experiments.comparison.compare import simulating
@@ -95,16 +98,26 @@ def run_row(row: StudyRow, progress: Progress) -> dict[str, Any]:
         return line | {"failure": " ".join(str(error).split())}
 
 
-def first_scenario(rows: Sequence[StudyRow]) -> str:
-    """The whole scenario of the first row as YAML; with the commands of the others it says what they run.
+def first_run(rows: Sequence[StudyRow]) -> dict[str, Any]:
+    """What the first row runs; with the commands of the others it says what they run.
 
     It refuses a study whose keys are misspelt or whose values are of the wrong kind before anything runs.
+
+    Returns:
+        The whole scenario as YAML, ``first_scenario``, and if there are any what identifies the files that it
+        and the rows name: ``files``.
 
     Raises:
         ValueError: with what the scenario refuses in the first row.
     """
     first = rows[0]
     try:
-        return prepare(first.scenario, first.all_settings, is_quick=first.is_quick).text
+        prepared = prepare(first.scenario, first.all_settings, is_quick=first.is_quick)
     except ValueError as error:
         raise ValueError(f"the first run of the study is refused: {error}") from error
+    named = {row.law for row in rows} | {value for row in rows for _, value in row.factors}
+    files = {file_of(name) for name in [*named, prepared.calibrated] if isinstance(name, str)}
+    files |= set(named_files(prepared.scenario))
+    said: dict[str, Any] = {"first_scenario": f"# {prepared.title}\n{scenario_text(prepared.scenario)}"}
+    marks = {str(file): sha256(file.read_bytes()).hexdigest() for file in sorted(filter(None, files))}
+    return said | ({"files": marks} if marks else {})

@@ -5,10 +5,12 @@ file in the order of the rows; until then every start reads what is there. A fil
 when it is complete, so a process that is killed leaves nothing half-written.
 """
 
+import fcntl
 import json
 import os
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -20,6 +22,26 @@ from experiments.cli.versions import installed_versions
 TABLE, TIMES = "study.parquet", "times.parquet"
 _PARTS, _PLAN = "parts", "plan.json"
 _FLUSH = 2.0  # s, as much work is lost at most
+
+
+@contextmanager
+def alone_in(folder: Path) -> Iterator[None]:
+    """Keeps other processes from the same study, whose parts would replace one another; it makes the folder.
+
+    Raises:
+        ValueError: if one is at work there.
+        OSError: if the folder cannot be made.
+    """
+    folder.mkdir(parents=True, exist_ok=True)
+    place = os.open(folder, os.O_RDONLY)
+    try:
+        try:
+            fcntl.flock(place, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError as error:
+            raise ValueError(f"another process works on the study in {folder}: wait for it") from error
+        yield
+    finally:
+        os.close(place)
 
 
 class StudyStore:
@@ -105,7 +127,7 @@ class StudyStore:
         path = self._folder / _PLAN
         if path.exists():
             before = json.loads(path.read_text(encoding="utf-8"))
-            different = [key for key in plan if before.get(key) != plan[key]]
+            different = [key for key in sorted({*before, *plan}) if before.get(key) != plan.get(key)]
             if different:
                 what = ", ".join(different)
                 raise ValueError(

@@ -109,6 +109,9 @@ def load_study(path: str | Path) -> Study:
     if "seed" in study.factors and study.repetitions > 1:
         reason = "factors.seed: repetitions would all have the noise of that seed; leave one of the two out"
         raise node.at(["factors", "seed"]).refuse(reason)
+    if "law" in study.factors:
+        reason = "factors.law: it would not change what runs; the laws stand under laws"
+        raise node.at(["factors", "law"]).refuse(reason)
     samples = getattr(study.design, "samples", 1)
     if isinstance(study.design, SobolIndices) and samples & (samples - 1):
         raise node.at(["design", "samples"]).refuse(f"design.samples must be a power of two, got {samples}")

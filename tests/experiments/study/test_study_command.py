@@ -12,13 +12,15 @@ import time
 from collections.abc import Iterator
 from pathlib import Path
 
+import numpy as np
 import pyarrow.parquet as pq
 import pytest
 
 from experiments.cli.cluster import DaskCluster
 from experiments.cli.workers import in_order
-from experiments.study.rows import run_row, study_rows
-from experiments.study.store import TABLE
+from experiments.study.command import study_verdict
+from experiments.study.rows import first_run, run_row, study_rows
+from experiments.study.store import TABLE, alone_in
 from experiments.study.study_file import Levels, Study, load_study
 from tests.experiments.commands import refusal, truetip
 
@@ -83,6 +85,7 @@ def test_the_numbers_name_the_worst_row_of_each_law(study):
     ("text", "reason"),
     [
         ("factors: {station.payload: {values: []}}", "values: at least one is needed"),
+        ("factors: {law: !Names {values: [pbvs]}}", "factors.law: it would not change what runs"),
         ("factors: {station.payload: !Distribution {name: norm}}", "needs a design that samples"),
         (
             "{factors: {seed: !Distribution {name: normal}}, design: !Sobol {}}",
@@ -177,3 +180,35 @@ def test_a_worker_that_is_killed_loses_nothing(tmp_path):
 
 def test_the_file_that_comes_with_the_documentation_is_a_study():
     assert len(study_rows(load_study("docs/studies/payload_and_dead_time.yaml"))) > 10
+
+
+def test_a_file_that_has_changed_since_makes_another_study(tmp_path, monkeypatch: pytest.MonkeyPatch):
+    """The names are the same: rows of two robots would stand in one table."""
+    monkeypatch.chdir(tmp_path)
+    Path("arm.yaml").write_text("extends: irb1200\n")
+    Path("study.yaml").write_text(STUDY.replace("2000]}", "1]}\n  robot: !Names {values: [arm.yaml]}"))
+    rows = study_rows(load_study("study.yaml"))
+    before = first_run(rows)
+    assert list(before["files"]) == ["arm.yaml"]
+    assert first_run(rows) == before
+    Path("arm.yaml").write_text("extends: irb1200\nname: another\n")
+    found = first_run(rows)
+    assert {key for key in found if found[key] != before[key]} == {"files"}
+
+
+def test_two_processes_do_not_work_on_one_study(study):
+    file, out = study
+    with alone_in(out):
+        assert "another process works on the study in" in refusal(truetip("study", file, "--out", out))
+
+
+def test_a_law_that_has_failed_is_not_the_best_for_what_it_leaves_out():
+    table = {
+        "row": np.arange(4),
+        "law": np.array(["open_loop", "open_loop", "pbvs", "pbvs"], dtype=object),
+        "failure": np.array(["", "", "", "out of reach"], dtype=object),
+        "station.payload": np.array([0.0, 1.0, 0.0, 1.0]),
+        "max_norm_mm": np.array([3.0, 4.0, 1.0, np.nan]),
+    }
+    laws = Study(laws=["open_loop", "pbvs"], factors={"station.payload": Levels([0.0, 1.0])})
+    assert study_verdict(laws, table).startswith("Over 4 runs Open loop has the best worst run")
