@@ -86,7 +86,7 @@ def _module_of(file: str, kind: str) -> ModuleType:
     sys.modules[name] = module
     try:
         spec.loader.exec_module(module)
-    except Exception as error:  # whatever the file of somebody else does when it is imported
+    except (Exception, SystemExit) as error:  # whatever the file of somebody else does when it is imported
         del sys.modules[name]
         raise ValueError(f"{kind}: {file}: {type(error).__name__}: {' '.join(str(error).split())}") from error
     return module

@@ -17,8 +17,8 @@ def controller_model(scenario: Scenario, robot: RobotModel | None = None) -> Con
 
     Args:
         scenario: what to do.
-        robot: the robot as the controller knows it, nominal or calibrated, unless `servo.model.robot` names
-            another; None for the scenario's.
+        robot: the robot as the controller knows it. A calibrated one is what it knows, a nominal one unless
+            `servo.model.robot` names another; None for the scenario's.
 
     Raises:
         ScenarioError: if `servo.model` asks for something impossible.
@@ -63,7 +63,7 @@ class _Draw:
 
 def _named_robot(scenario: Scenario, robot: RobotModel | None) -> RobotModel:
     name = scenario.servo.model.robot
-    if not name:
+    if not name or (robot is not None and robot.calibration.of):
         return robot or load_robot(scenario.robot)
     named = load_robot(name)
     if named.calibration.of and not is_same_robot(named.calibration.of, scenario.robot):

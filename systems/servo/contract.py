@@ -1,6 +1,7 @@
 """What a servo asks of a law: its ports, and the traits that stand on its class."""
 
-from dataclasses import dataclass, is_dataclass
+import re
+from dataclasses import dataclass
 from typing import Any
 
 from pydrake.systems.framework import System
@@ -24,6 +25,10 @@ _INPUTS = (*_PATH, "reference", "joint_sample", "pose_sample", "deviation")
 _COMMANDS = ("position_command", "velocity_command")
 
 
+_FIELDS = "__dataclass_fields__"  # what a dataclass has, and has from its base if it is none itself
+_COLOUR = re.compile("(#[0-9a-fA-F]{6})?")
+
+
 @dataclass(frozen=True)
 class LawTraits:
     """What a law is, as its class says it; each has a default."""
@@ -43,17 +48,24 @@ def law_traits(law: type | System) -> LawTraits:
     """The traits of a law, given its class or the system.
 
     Raises:
-        ValueError: if ``Config`` is not a dataclass that extends `LawConfig`.
+        ValueError: if ``Config`` is not a dataclass that extends `LawConfig`, title or colour are none.
     """
     kind = law if isinstance(law, type) else type(law)
     config: Any = getattr(kind, "Config", LawConfig)
-    if not (isinstance(config, type) and issubclass(config, LawConfig) and is_dataclass(config)):
+    # What a class without the decorator says beside its base would not be read.
+    if not (isinstance(config, type) and issubclass(config, LawConfig) and _FIELDS in vars(config)):
         raise ValueError(
-            f"law {kind.__name__}: Config must be a dataclass that extends LawConfig, got {config}"
+            f"law {kind.__name__}: Config must be a dataclass that extends LawConfig, "
+            f"with a @dataclass of its own, got {config}"
         )
+    title, colour = getattr(kind, "title", kind.__name__), getattr(kind, "colour", "")
+    if not isinstance(title, str):
+        raise ValueError(f"law {kind.__name__}: title must be a text, got {title!r}")
+    if not (isinstance(colour, str) and _COLOUR.fullmatch(colour)):
+        raise ValueError(f"law {kind.__name__}: colour must look like #7a5195, or be empty, got {colour!r}")
     return LawTraits(
-        title=getattr(kind, "title", kind.__name__),
-        colour=getattr(kind, "colour", ""),
+        title=title,
+        colour=colour,
         uses_camera=getattr(kind, "uses_camera", True),
         learns_from_camera=getattr(kind, "learns_from_camera", False),
         commands_motors=getattr(kind, "commands_motors", False),

@@ -223,13 +223,31 @@ def test_what_is_no_law_is_refused_in_one_line(tmp_path: Path):
             "from systems.servo.open_loop import OpenLoop\nclass Mine(OpenLoop):\n    Config = dict\n",
             "Config must be a dataclass that extends LawConfig",
         ),
+        (
+            "from systems.servo.law_config import LawConfig\nfrom systems.servo.open_loop import OpenLoop\n"
+            "class Gains(LawConfig):\n    translation: float = 4.0\n"
+            "class Mine(OpenLoop):\n    Config = Gains\n",
+            "with a @dataclass of its own",
+        ),
+        (
+            "from systems.servo.open_loop import OpenLoop\nclass Mine(OpenLoop):\n    title = 42\n",
+            "title must be a text, got 42",
+        ),
+        (
+            "from systems.servo.open_loop import OpenLoop\nclass Mine(OpenLoop):\n    colour = 'mauvish'\n",
+            "colour must look like #7a5195",
+        ),
+        ("import sys\nsys.exit(3)\n", "SystemExit: 3"),
         ("class Mine:\n    pass\n", "Mine"),
         (
             "from systems.servo.law import ServoLaw\nclass Mine(ServoLaw):\n    pass\n",
             "class Mine needs a method 'step'",
         ),
     ],
-    ids=["syntax", "import", "missing port", "unknown port", "config", "no system", "no step"],
+    ids=[
+        *("syntax", "import", "missing port", "unknown port", "config", "no dataclass", "title", "colour"),
+        *("exit", "no system", "no step"),
+    ],
 )
 def test_a_file_that_cannot_be_used_is_refused_in_one_line(tmp_path: Path, text: str, why: str):
     assert why in refused(tmp_path, text)

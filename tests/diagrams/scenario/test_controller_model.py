@@ -1,11 +1,14 @@
 """What the controller believes: the station's values where nothing is said, and any others where it is."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from pydrake.multibody.plant import MultibodyPlant
 
 from diagrams.scenario.controller_model import controller_model
 from diagrams.scenario.scenario import ScenarioError, load_scenario
+from robots.description.calibration import Calibration
 from robots.description.model import load_robot
 from robots.dynamics.plant import add_robot
 from systems.controller_model import ControllerModel
@@ -34,6 +37,14 @@ def test_a_belief_reaches_the_model_and_not_the_station():
     np.testing.assert_allclose(model.robot.joint_stiffness, 1.2 * robot.joint_stiffness)
     ratio = model.robot.joint_viscous_friction / robot.joint_viscous_friction
     np.testing.assert_allclose(ratio, [1, 1, 1, 1, 1, 2])
+
+
+def test_a_calibrated_robot_is_what_the_controller_knows_whatever_the_scenario_says():
+    """The library and the validation of a calibration had the drawing of the scenario in its place."""
+    scenario, true = load_scenario("everything-realistic"), load_robot("irb1200-realistic")
+    calibrated = replace(true, name="calibrated", calibration=Calibration(of="irb1200-realistic"))
+    assert controller_model(scenario, calibrated).robot.name == "calibrated"
+    assert controller_model(scenario, true).robot.name == load_robot("irb1200").name
 
 
 def test_a_mismatch_is_bounded_repeatable_and_of_every_spring():
