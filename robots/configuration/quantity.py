@@ -105,10 +105,11 @@ def named(
     high: float = math.inf,
     unit: str = "",
     is_open: bool = False,
+    default: Callable[[], dict[str, Any]] = dict,
 ) -> Any:
     """A field that holds a number by each of any names, or as many numbers as ``size`` says."""
     declaration = Declaration(Limits(low, high, unit, is_open), (size,) if size else ())
-    return field(default_factory=dict, metadata={_KEY: declaration})
+    return field(default_factory=default, metadata={_KEY: declaration})
 
 
 def choice(default: str, names: Collection[str] | Callable[[], Collection[str]]) -> Any:

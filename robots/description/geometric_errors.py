@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from robots.configuration.quantity import quantity
+from robots.configuration.quantity import named, quantity, vector
 from robots.description.error_parameters import (
     FRAMES,
     OFFSET,
@@ -19,6 +19,10 @@ from robots.description.error_parameters import (
 )
 from robots.description.model import NUM_JOINTS, RobotModel
 
+# More is no error of a geometry but another robot, or a number in another unit.
+_FAR = 200.0  # mm
+_TURNED = 45.0  # degrees
+
 
 @dataclass
 class RandomErrors:
@@ -26,9 +30,9 @@ class RandomErrors:
 
     seed: int = quantity(0, 0, 2**32 - 1)  # of the random draw
     # Largest translation, of a frame or the tool, along each axis
-    translation_mm: float = quantity(0.0, 0.0, unit="mm")
+    translation_mm: float = quantity(0.0, 0.0, _FAR, "mm")
     # Largest rotation, of a joint, body or the tool, about each axis
-    rotation_deg: float = quantity(0.0, 0.0, 180.0, "deg")
+    rotation_deg: float = quantity(0.0, 0.0, _TURNED, "deg")
 
     def vector(self, robot: RobotModel) -> np.ndarray:
         """One draw in m and rad, in the order of `error_parameters`, shape (48,).
@@ -58,18 +62,18 @@ class GeometricErrors:
     """
 
     # True angle minus measured one, six
-    joint_offset_deg: np.ndarray = field(default_factory=lambda: np.zeros(NUM_JOINTS))
+    joint_offset_deg: np.ndarray = vector([0.0] * NUM_JOINTS, -_TURNED, _TURNED, "deg")
     # Added to the tool's, along the axes of the flange
-    tool_translation_mm: np.ndarray = field(default_factory=lambda: np.zeros(3))
+    tool_translation_mm: np.ndarray = vector([0.0] * 3, -_FAR, _FAR, "mm")
     # Alpha, beta, gamma, added to the tool's
-    tool_zyx_deg: np.ndarray = field(default_factory=lambda: np.zeros(3))
+    tool_zyx_deg: np.ndarray = vector([0.0] * 3, -_TURNED, _TURNED, "deg")
     # Displacements along the axes of the parent, by frame: pl_I0 the base, pl_01 to pl_56 the joints
-    frame_translation_mm: dict[str, np.ndarray] = field(
-        default_factory=lambda: {f"pl_{frame}": np.zeros(3) for frame in FRAMES[:TOOL]}
+    frame_translation_mm: dict[str, np.ndarray] = named(
+        3, -_FAR, _FAR, "mm", default=lambda: {f"pl_{frame}": np.zeros(3) for frame in FRAMES[:TOOL]}
     )
     # Small turns about x, y and z, by body: body_0 the base, body_1 to body_6 the links
-    body_rotation_deg: dict[str, np.ndarray] = field(
-        default_factory=lambda: {f"body_{body}": np.zeros(3) for body in range(TOOL)}
+    body_rotation_deg: dict[str, np.ndarray] = named(
+        3, -_TURNED, _TURNED, "deg", default=lambda: {f"body_{body}": np.zeros(3) for body in range(TOOL)}
     )
     random: RandomErrors = field(default_factory=RandomErrors)
 
