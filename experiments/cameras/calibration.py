@@ -64,6 +64,7 @@ def calibration_json(found: CamerasFound) -> dict[str, Any]:
             "position_standard_deviation_mm": float(1e3 * calibration.position_sigma[i]),
             "points": int(calibration.points[i]),
             "left_out": int(calibration.outliers[i]),
+            "unused": int(calibration.unused[i]),
             "rms_px": float(calibration.rms_px[i]),
             "average_residual_mm": float(1e3 * calibration.mean_distance[i]),
             "lens": {
@@ -131,9 +132,9 @@ def verdict(found: CamerasFound) -> str:
 def write_calibration_page(path: Path, title: str, found: CamerasFound) -> None:
     """The page of a calibration; opens offline."""
     note = (
-        "Positions in the frame of the L-frame with their standard deviations along an axis; points used "
-        "and left out; root mean square residuals in px, and average distances between points and rays "
-        "in mm, as in Probst (2024), figure A.10."
+        "Positions in the frame of the L-frame with their standard deviations along an axis; points used, "
+        "and left out as they contradict the other cameras; root mean square residuals in px, and average "
+        "distances between points and rays in mm, as in Probst (2024), figure A.10."
     )
     note_map = (
         "Cameras with their optical axes, where the wand was (grey) and the L-frame at the origin (orange)."

@@ -41,7 +41,8 @@ class WandCalibration:
     covariance: np.ndarray  # of the parameters `camera_parameters.NAMES` of each camera, (n, 15, 15)
     sigma: float  # px, standard deviation of a pixel as the residuals show it
     points: np.ndarray  # of the wand that each camera saw and that were used, (n,)
-    outliers: np.ndarray  # pixels that were left out, (n,)
+    outliers: np.ndarray  # pixels that contradict the other cameras and were left out, (n,)
+    unused: np.ndarray  # pixels of places of the wand of which two cameras did not see both ends, (n,)
     rms_px: np.ndarray  # root mean square distance of seen and expected pixels, (n,)
     mean_distance: np.ndarray  # m, from the point to the ray on average, Probst (2024) figure A.10, (n,)
     wand_lengths: np.ndarray  # m, of each place, by triangulation alone, (f,)
@@ -103,7 +104,7 @@ def calibrate_with_wand(
     everything = ~np.isnan(pixels[..., 0])
     cameras = _once(cameras, scene, everything, with_lens=False)[0].cameras
     _refuse_mirrored(cameras, guess, kit)
-    found, used = _adjusted(cameras, scene, names)
+    found, used, outliers = _adjusted(cameras, scene, names)
     if found.sigma > _LARGEST_SIGMA:
         raise UndeterminedError(
             f"wand: pixels scatter by {found.sigma:.1f} px, {pixel_sigma:g} px are expected: are ends or "
@@ -113,7 +114,7 @@ def calibrate_with_wand(
         raise UndeterminedError(f"wand: the adjustment did not converge in {found.steps} steps")
     _refuse_contradicting_frame(found, scene)
     _refuse_other_resolution(found.cameras, guess)
-    return _report(found, used, run, kit)
+    return _report(found, used, outliers, run, kit)
 
 
 def _refuse_too_little(run: WandRun, seen: np.ndarray, names: list[str]) -> None:
@@ -189,13 +190,14 @@ def _refuse_contradiction(seen: np.ndarray, used: np.ndarray, names: list[str]) 
             )
 
 
-def _adjusted(cameras: Cameras, scene: Scene, names: list[str]) -> tuple[Adjusted, Scene]:
+def _adjusted(cameras: Cameras, scene: Scene, names: list[str]) -> tuple[Adjusted, Scene, np.ndarray]:
     """Adjusts and removes outliers in turn until the set of inliers no longer changes.
 
     Returns:
-        What was found, and the scene with what was used of it.
+        What was found, the scene with what was used of it, and how many outliers each camera has, (n,).
     """
-    used = ~np.isnan(scene.wand_pixels[..., 0])
+    seen_at_all = ~np.isnan(scene.wand_pixels[..., 0])
+    used = seen_at_all
     found, some, whole = _once(cameras, scene, used)
     for _ in range(_ROUNDS):
         cameras = found.cameras
@@ -212,7 +214,7 @@ def _adjusted(cameras: Cameras, scene: Scene, names: list[str]) -> tuple[Adjuste
         used = now
         _refuse_contradiction(~np.isnan(scene.wand_pixels[..., 0]), used, names)
         found, some, whole = _once(cameras, scene, used)
-    return found, some
+    return found, some, np.sum(seen_at_all & ~used, axis=(1, 2))
 
 
 def _once(
@@ -226,7 +228,9 @@ def _once(
     return adjust(cameras, some, wand[whole], with_lens), some, np.flatnonzero(whole)
 
 
-def _report(found: Adjusted, scene: Scene, run: WandRun, kit: CalibrationKit) -> WandCalibration:
+def _report(
+    found: Adjusted, scene: Scene, outliers: np.ndarray, run: WandRun, kit: CalibrationKit
+) -> WandCalibration:
     cameras, (n, f) = found.cameras, found.wand_residual.shape[:2]
     off = np.linalg.norm(found.wand_residual, axis=-1).reshape(n, 2 * f)
     used = ~np.isnan(scene.wand_pixels[..., 0])
@@ -243,7 +247,8 @@ def _report(found: Adjusted, scene: Scene, run: WandRun, kit: CalibrationKit) ->
         found.covariance,
         found.sigma,
         points,
-        np.sum(~np.isnan(run.wand_pixels[..., 0]), axis=(1, 2)) - points,
+        outliers,
+        np.sum(~np.isnan(run.wand_pixels[..., 0]), axis=(1, 2)) - points - outliers,
         np.sqrt(np.nanmean(off**2, axis=1)),
         np.nanmean(distance * cameras.depth(p_Q), axis=1),
         lengths[~np.isnan(lengths)],

@@ -80,6 +80,19 @@ def test_what_was_taken_from_something_else_is_left_out():
     assert calibrated(1).outliers.sum() == 0
 
 
+def test_what_one_camera_alone_saw_contradicts_nobody():
+    """Of every fourth place the first camera alone has pixels: they serve nothing, but are no outliers."""
+    run = waved(1)
+    pixels = run.wand_pixels.copy()
+    pixels[1:, ::4] = np.nan
+    alone = int(np.sum(~np.isnan(pixels[0, ::4, :, 0])))
+    found = calibrate_with_wand(replace(run, wand_pixels=pixels), KIT, GUESS, NAMES)
+    assert alone > 50
+    assert found.outliers.sum() == 0
+    assert found.unused.tolist() == [alone] + [0] * (len(NAMES) - 1)
+    np.testing.assert_array_equal(found.points + found.unused, np.sum(~np.isnan(pixels[..., 0]), axis=(1, 2)))
+
+
 def test_the_residual_is_that_of_opencv_with_the_points_that_were_found():
     """For each camera alone OpenCV may choose lens and pose anew; it gains less than 2 %."""
     run, found = waved(1), calibrated(1)
