@@ -46,7 +46,7 @@ def rapid_run(run: MeasurementRun) -> dict[str, str]:
     output = run.trigger or "doTrigger"
     if not output.isidentifier():
         raise ValueError(f"the trigger must be the name of a digital output in RAPID, got '{run.trigger}'")
-    head = "".join(f"q{joint}_deg;" for joint in range(1, 7))
+    head = ";".join(f"q{joint}_deg" for joint in range(1, 7))
     lines = [
         f"MODULE {run.name}",
         f"    ! Measurement run, {len(run.q)} configurations: move, settle, pulse {output}, note the joints.",
@@ -77,8 +77,8 @@ def rapid_run(run: MeasurementRun) -> dict[str, str]:
         "        here := CJointT();",
     ]
     for joint in range(1, 7):
-        end = "" if joint == 6 else "\\NoNewLine"
-        lines.append(f'        Write table, NumToStr(here.robax.rax_{joint},5) + ";"{end};')
+        end = "" if joint == 6 else ' + ";"\\NoNewLine'
+        lines.append(f"        Write table, NumToStr(here.robax.rax_{joint},5){end};")
     lines += [f"        WaitTime {_EXPOSURE:g};", "    ENDPROC", "ENDMODULE", ""]
     return {f"{run.name}.mod": "\n".join(lines)}
 

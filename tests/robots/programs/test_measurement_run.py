@@ -37,6 +37,15 @@ def test_after_every_move_the_robot_settles_before_the_trigger_and_notes_its_joi
     assert "FOR i=1 TO 7" in source
 
 
+def test_the_table_that_rapid_writes_has_six_columns_and_no_empty_seventh():
+    (module,) = rapid_run(MeasurementRun(Q)).values()
+    written = ""
+    for what, stays in re.findall(r"Write table, (.*?)(\\NoNewLine)?;\n", module):
+        joint = re.sub(r"NumToStr\(here.robax.rax_(\d),5\)", r'"\1"', what)
+        written += joint.replace('" + "', "").strip('"') + ("" if stays else "\n")
+    assert written.splitlines() == ["q1_deg;q2_deg;q3_deg;q4_deg;q5_deg;q6_deg", "1;2;3;4;5;6"]
+
+
 def test_via_points_stand_before_the_moves_that_they_belong_to():
     none = np.zeros((0, 6))
     ways = (none, Q[4:6], *[none] * 4, Q[:1])
