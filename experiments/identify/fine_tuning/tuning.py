@@ -165,7 +165,7 @@ class _Stage:
     ) -> None:
         self._robot, self._plant, self._payload = robot, plant, payload
         self._executor, self._seed = executor, seed
-        self._done: dict[tuple, TipMotion] = {}
+        self._done: dict[tuple[str, frozenset], TipMotion] = {}
         self.runs, self.seconds = 0, 0.0
 
     def begun(
@@ -192,7 +192,7 @@ class _Stage:
 
     def on_robot(self, shape: Shape, factors: dict[str, float]) -> TipMotion:
         """What the robot does with some numbers; what it has done with them it does not do again."""
-        key = shape.name, tuple(value for value in factors.values() if value != 1.0)
+        key = _key(shape, factors)
         if key not in self._done:
             motion = in_order(self._executor, driven, [self._job(shape, factors)])[0]
             self._keep(shape, factors, motion)
@@ -204,9 +204,14 @@ class _Stage:
         return TipRun(belief, self._plant, self._payload, shape, seed)
 
     def _keep(self, shape: Shape, factors: dict[str, float], motion: TipMotion) -> None:
-        self._done[shape.name, tuple(value for value in factors.values() if value != 1.0)] = motion
+        self._done[_key(shape, factors)] = motion
         self.runs += 1
         self.seconds += float(motion.time[-1] - motion.time[0])
+
+
+def _key(shape: Shape, factors: dict[str, float]) -> tuple[str, frozenset]:
+    """What a motion depends on: a number with a factor of one is as it was believed."""
+    return shape.name, frozenset(each for each in factors.items() if each[1] != 1.0)
 
 
 def without_play(robot: RobotModel) -> RobotModel:

@@ -72,6 +72,19 @@ def test_the_spring_of_a_robot_that_differs_in_nothing_else_is_found():
     assert "It is taken over." in outcome(tuning)
 
 
+def test_two_numbers_with_the_same_factor_are_two_motions():
+    """What the robot has done it does not do again, with the same number in the same place alone."""
+    stage = tuning_of_robot._Stage(ROBOT, ROBOT, 210.0, Bending(), 0)
+    second, third = (
+        stage.on_robot(TUNED, {"stiffness_gear_2": a, "stiffness_gear_3": b})
+        for a, b in ((0.9, 1.0), (1.0, 0.9))
+    )
+    assert np.abs(second.true[:, 0]).max() > 1e-4 > np.abs(second.true[:, 1]).max()
+    assert np.abs(third.true[:, 1]).max() > 1e-4 > np.abs(third.true[:, 0]).max()
+    assert stage.on_robot(TUNED, {"stiffness_gear_3": 0.9}) is third
+    assert stage.runs == 2
+
+
 def test_what_the_motion_does_not_show_stays_as_it_was():
     tuning = fine_tune(ROBOT, softer(ROBOT, 0.93), 210.0, Bending())
     for each in tuning.numbers:
