@@ -292,7 +292,8 @@ def nominal_robot(scenario: Scenario, robot: RobotModel | None) -> RobotModel:
         return robot
     if robot is not None and not is_same_robot(robot.calibration.of, scenario.robot):
         raise ScenarioError(
-            f"{robot.name} was calibrated on '{robot.calibration.of}', the scenario has '{scenario.robot}'"
+            f"{robot.name} was calibrated on '{robot.calibration.of}', the scenario has '{scenario.robot}'; "
+            f"--set robot={robot.calibration.of} puts that one there"
         )
     return load_robot(scenario.robot)
 

@@ -101,6 +101,7 @@ class ArmResponse:
 
     def __call__(self, p: np.ndarray, sensitivity: bool = True) -> Response:
         """Goes through all cases with unknowns p, shape (n,)."""
+        from robots.compiled import side_by_side
         from robots.identification import response_kernels  # imports numba
 
         numbers = self._parameters.numbers(p)
@@ -109,13 +110,14 @@ class ArmResponse:
         n = len(self._parameters) if sensitivity else 0
         size = len(self.kept), len(self._cases), self._low_pass.shape[1]
         readings, derived = np.empty(size), np.zeros((*size, n))
-        grid, moved = self._grid, []
+        grid, e = self._grid, springs.shape[1]
         steps = self._h, grid.filtered * grid.steps, grid.kept * grid.steps, grid.steps
-        for i, (case, base) in enumerate(zip(self._cases, self._base, strict=True)):
+
+        def go_through(i: int, case: "CaseOnGrid", base: np.ndarray) -> np.ndarray:
             start = case.start(springs, gears, numbers.ripple, self._columns, n)
             m = len(base)
             shown, by = np.empty((m, size[2])), np.empty((m, size[2], n))
-            moved.append(np.empty((case.samples, 3 * springs.shape[1])))
+            moved = np.empty((case.samples, 3 * e))
             response_kernels.go_through(
                 steps,
                 case.posture(springs),
@@ -125,13 +127,15 @@ class ArmResponse:
                 self._columns,
                 start,
                 self._low_pass,
-                moved[-1],
+                moved,
                 shown,
                 by,
             )
             readings[:m, i], derived[:m, i] = shown + base, by
             readings[m:, i] = readings[m - 1, i]
-        moved = [each.reshape(len(each), 3, -1) for each in moved]
+            return moved.reshape(case.samples, 3, e)
+
+        moved = side_by_side(go_through, range(len(self._cases)), self._cases, self._base)
         return Response(readings, derived if sensitivity else None, moved)
 
 

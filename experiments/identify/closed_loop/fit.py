@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.optimize import least_squares
 
-from experiments.identify.closed_loop.replay import DriveReplay
+from experiments.identify.closed_loop.replay import DriveReplay, Led
 from robots.description import drive_parts
 from robots.description.model import NUM_JOINTS, RobotModel
 from robots.identification.arm_fit import ArmFit, part_of, scatter
@@ -171,10 +171,13 @@ class ClosedLoopProblem:
         step = recorded[0].case.period
         self._ticks = max(1, round(period / step))
         self._last: tuple[DriveConfig, list[DriveTorques]] | None = None
+        self._led: dict[float, list[Led]] = {}  # of all cases, by the delay
 
     def residuals(self, p: np.ndarray, brings_near: bool = False) -> list[np.ndarray]:
         """Of each case (m, 12): modelled less measured, speeds in rad/s and torques in N m between ticks."""
         self.evaluations += 1
+        from robots.compiled import side_by_side  # imports numba
+
         unknowns = self._unknowns
         arm = unknowns.arm(p)
         numbers = arm.parameters.numbers(arm.values)
@@ -186,8 +189,9 @@ class ClosedLoopProblem:
         )
         found = []
         lag = np.full(NUM_JOINTS, unknowns.lag(p))
-        for case, recorded, drive in zip(self._cases, self._recorded, self._played(p), strict=True):
-            motion = case.run(numbers, replace(drive, lag=lag), friction)
+        drives = [replace(drive, lag=lag) for drive in self._played(p)]
+        motions = side_by_side(lambda case, drive: case.run(numbers, drive, friction), self._cases, drives)
+        for case, recorded, motion in zip(self._cases, self._recorded, motions, strict=True):
             if brings_near and np.isfinite(motion.moved).all():
                 case.bring_near(motion.moved)
             both = np.hstack([motion.speeds, motion.torque - recorded.torque])
@@ -200,8 +204,12 @@ class ClosedLoopProblem:
         config = self._unknowns.drive(p)
         if self._last is None or self._last[0] != config:
             replay = DriveReplay(self._robot, config, self._period, self._payload)
-            played = [replay.torques(each.case, each.commands[:: self._ticks]) for each in self._recorded]
-            self._last = config, played
+            delay = config.command_delay
+            if delay not in self._led:  # here and, for a derivative, a little later
+                newest = [*self._led.items()][-1:]
+                led = [replay.led(each.case, each.commands[:: self._ticks]) for each in self._recorded]
+                self._led = {**dict(newest), delay: led}
+            self._last = config, [replay.torques(each) for each in self._led[delay]]
         return self._last[1]
 
 

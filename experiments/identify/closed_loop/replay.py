@@ -1,5 +1,7 @@
 """What the drives of a robot have done with recorded commands: the drives of the cell, played once more."""
 
+from dataclasses import dataclass
+
 import numpy as np
 from pydrake.systems.analysis import Simulator
 from scipy.integrate import cumulative_trapezoid
@@ -10,6 +12,16 @@ from robots.identification.motion import MotionCase
 from systems.cell.drive import Drive, DriveConfig
 
 _COMMANDS = ("position_command", "velocity_command", "torque_feedforward")
+
+
+@dataclass(frozen=True)
+class Led:
+    """How drives lead the motors along a case, before gains come in; N steps of the integration."""
+
+    position: np.ndarray  # set-points beyond where the motors were measured in rad, (N, 6)
+    integral: np.ndarray  # of that, rad s, (N, 6)
+    speed: np.ndarray  # of the set-points beyond that of the motors in rad/s, (N, 6)
+    held: np.ndarray  # torque in N m beside the controllers', (N, 6)
 
 
 class DriveReplay:
@@ -31,8 +43,14 @@ class DriveReplay:
         gains = self._drive.gains
         self._gains = np.stack([gains.proportional, gains.integral, gains.derivative])
 
-    def torques(self, case: MotionCase, commands: np.ndarray) -> DriveTorques:
-        """What the controllers give along a case that begins at a tick, at rest where the commands are.
+    def torques(self, led: Led) -> DriveTorques:
+        """What the controllers give along a case."""
+        by_position, by_integral, by_speed = self._gains
+        told = by_position * led.position + by_integral * led.integral + by_speed * led.speed + led.held
+        return DriveTorques(told, self._gains, np.zeros(NUM_JOINTS))
+
+    def led(self, case: MotionCase, commands: np.ndarray) -> Led:
+        """How the drives lead a case that begins at a tick, at rest where the commands are; with any gains.
 
         Args:
             case: with the motors as measured.
@@ -43,9 +61,7 @@ class DriveReplay:
         integral = cumulative_trapezoid(position, dx=case.period / STEPS, axis=0, initial=0.0)
         # A torque that changes at a tick is half of both there, as the trapezoidal rule takes it.
         held[1:] = np.where(held[1:] != held[:-1], 0.5 * (held[1:] + held[:-1]), held[1:])
-        by_position, by_integral, by_speed = self._gains
-        told = by_position * position + by_integral * integral + by_speed * speed + held
-        return DriveTorques(told, self._gains, np.zeros(NUM_JOINTS))
+        return Led(position, integral, speed, held)
 
     def _ticks(self, case: MotionCase, commands: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Set-points and their speeds, (2, N, 6), and torques beside the controllers', (N, 6)."""

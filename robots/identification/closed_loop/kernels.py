@@ -51,7 +51,7 @@ def drive_through(h, in_sample, posture, load, ripple, springs, gears, start, dr
     integral, late, given = np.zeros(_GEARS), first.copy(), first.copy()
     S, motion_now, rest_now = np.empty((E, E)), np.empty((E, 2 * E)), np.empty((1, E))
     found, place = np.zeros((_GEARS, 10)), np.empty(2 * E)
-    outer = np.zeros(E)
+    outer, free = np.empty(_GEARS), np.empty(E)
     knot, last = 0, 0
     for step in range(len(load)):
         knot, share = place_of(at, knot, step)
@@ -66,6 +66,7 @@ def drive_through(h, in_sample, posture, load, ripple, springs, gears, start, dr
             x_p, v_p = place[:E].copy(), place[E:].copy()
             place[:E] -= rest_now[0]
             inner = -load[step] - springs[0] * x_p - springs[1] * v_p - np.dot(motion_now, place)
+            inside = np.dot(S, inner)
             before = integral.copy()
             late_before, x_before = late.copy(), x[e:].copy()
             for _ in range(_PASSES):
@@ -77,8 +78,12 @@ def drive_through(h, in_sample, posture, load, ripple, springs, gears, start, dr
                     given[j] += gains[1, j] * integral[j]
                     # Backwards, which is right without a lag too.
                     late[j] = (lag[j] * late_before[j] + h * given[j]) / (lag[j] + h)
-                    outer[e + j] = late[j] - _friction(parts[j], speeds[step, j] + rate)
-                free = np.dot(S, inner + outer)
+                    outer[j] = late[j] - _friction(parts[j], speeds[step, j] + rate)
+                # Drives and friction turn the motors alone.
+                for i in range(E):
+                    free[i] = inside[i]
+                    for j in range(_GEARS):
+                        free[i] += S[i, e + j] * outer[j]
                 accelerate(a, free, S, gears, turn, z, ripple[step], springs, x_p, v_p, h, found)
             for j in range(E):
                 x[j], v[j] = x_p[j] + BETA * h * h * a[j], v_p[j] + GAMMA * h * a[j]

@@ -7,7 +7,8 @@ import pytest
 
 from experiments.feedforward.trial import Trial
 from experiments.identify.cases import default_cases
-from experiments.identify.closed_loop.drives import RefinedDrives, refined_drives
+from experiments.identify.closed_loop.drives import RefinedDrives, driven_motions, refined_drives
+from experiments.identify.closed_loop.fit import ClosedLoopProblem, DriveUnknowns
 from experiments.identify.recording_map import Recording
 from experiments.identify.simulated import CaseRun
 from robots.description.model import RobotModel, load_robot
@@ -65,6 +66,26 @@ def found(recording) -> RefinedDrives:
     robot = load_robot("kr210")
     plant = rubbing(robot)
     return refined_drives(robot, plant, PAYLOAD, arm_fit(robot), recording, DriveConfig(), TRUE)
+
+
+def test_what_was_asked_before_changes_no_residual(recording):
+    """Set-points are kept for a delay: with others, and other gains, they are those of a new start."""
+    robot, recorded = load_robot("kr210"), driven_motions(recording)
+    unknowns = DriveUnknowns(robot, arm_fit(robot), DriveConfig(), recording.command_period)
+
+    def problem() -> ClosedLoopProblem:
+        return ClosedLoopProblem(robot, PAYLOAD, unknowns, recorded, recording.command_period)
+
+    stiff, late = unknowns.mean.copy(), unknowns.mean.copy()
+    stiff[0], late[unknowns.names.index("delay")] = 0.2, 6.5
+    one = problem()
+    asked = [one.residuals(p) for p in (unknowns.mean, late, stiff, late, unknowns.mean)]
+    for p, seen in zip((unknowns.mean, late, stiff), asked, strict=False):
+        for a, b in zip(problem().residuals(p), seen, strict=True):
+            np.testing.assert_array_equal(a, b)
+    assert np.abs(asked[0][0] - asked[1][0]).max() > 1e-3 < np.abs(asked[0][0] - asked[2][0]).max()
+    for again, first in ((3, 1), (4, 0)):
+        np.testing.assert_array_equal(asked[again][0], asked[first][0])
 
 
 @pytest.mark.slow
