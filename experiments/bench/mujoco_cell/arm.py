@@ -186,10 +186,10 @@ def _hinges(robot: RobotModel, number: int, bending: float) -> tuple[np.ndarray,
     """Where a link bends, in its frame, and on which sprung hinges; none if it does not."""
     joint, beam = robot.joints[number - 1], robot.links[number - 1].beam
     if beam is not None:
-        # Under a force at its end a cantilever bends by F l^3 / (3 EI) and turns by F l^2 / (2 EI).
-        u, l = "xyz".index(beam.along), beam.length
-        place = (beam.start + l / 3.0) * np.eye(3)[u]
-        springs = beam.stiffness * np.where(np.arange(3) == u, 1.0, 4.0 / 3.0) / l
+        # Under a force at its end a cantilever bends by F L^3 / (3 EI) and turns by F L^2 / (2 EI).
+        u = "xyz".index(beam.along)
+        place = (beam.start + beam.length / 3.0) * np.eye(3)[u]
+        springs = beam.stiffness * np.where(np.arange(3) == u, 1.0, 4.0 / 3.0) / beam.length
         axes, dampers = np.eye(3), beam.retardation_time * springs
     elif bending and number in (2, 3) and joint.tilting is not None:
         place = 0.5 * robot.joints[number].placement.translation

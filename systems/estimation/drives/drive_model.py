@@ -46,7 +46,6 @@ _OTHERWISE = 0.12  # share of what other gains would make of it, in all joints a
 _DOUBT = 30.0  # times what a motor was off by while it hung: by that its following error may be due to it
 _ROTOR_SPREAD = 0.3  # of what a robot's file says of rotors
 _VISCOUS_SPREAD, _COULOMB_SPREAD = 0.3, 0.5  # likewise of friction
-_HIDING = 1e-3  # rad, slack of a joint whose following errors have other reasons at low speeds
 _MOVED = 2e-4  # rad, slack of a joint whose motor is off by friction more than by all else; assumed
 _SLACK = 0.3  # of Coulomb's friction, by which it may be off while little is known of it
 _STEEPEST = 0.5  # rad/s, what learning may add to the speed of a joint
@@ -136,11 +135,8 @@ class DriveModel:
         self._gains = config.position, config.integral
         self.finds_gains = kind == "cascade"
         self.search = GainSearch(gains, *self._gains, model.load_scale, period, model.takes_torque)
-        self._hides_sticking = bool((self._drives.slack > _HIDING).any())
-        self._moved_by_friction = (self._drives.slack > _MOVED) & (not self._hides_sticking)
-        self.is_fed_back = bool(self._moved_by_friction.any()) or not (
-            model.takes_torque or self._hides_sticking
-        )
+        self._moved_by_friction = self._drives.slack > _MOVED
+        self.is_fed_back = bool(self._moved_by_friction.any()) or not model.takes_torque
         # The arm as the drives know it, which hold it against gravity.
         drawn = ArmGeometry(robot, np.array([], dtype=int))
         self._held = drawn.constants(np.zeros(NUM_PARAMETERS)), ArmLoads(robot).masses
@@ -167,7 +163,7 @@ class DriveModel:
             smoothed=(6,),
             misfit=(6,),  # rad^2, mean square of what is left of following errors beyond P, fading
             hung=(2, 6),  # rad, by which motors were off when they were slow, fading, and are if they are
-            deviation=Layout(last=(6, 6), z=(6, 6, 2), out=(6, 6)),  # of `deviate`
+            deviation=Layout(faster=(6,), last=(6, 6), z=(6, 6, 2), out=(6, 6)),  # of `deviate`
             wound=(3, 6),  # of what drives wound up meanwhile: integral and error; for how long, s
             aside=(3, 6),  # rad and rad/s, of commands what is beside the plan, see `DriveMemory`
             gains=gains_layout,
@@ -251,6 +247,7 @@ class DriveModel:
             drives that follow positions alone, which ring faster than differences of positions show.
         """
         parts, needed = memory.deviation, np.zeros((len(TORQUES), 6))
+        parts.faster[:] = dv
         if self._rings:
             return needed
         kernels.drives.deviate(self._as_found(memory), v, dv, da, parts.last, parts.z, parts.out)
@@ -279,11 +276,10 @@ class DriveModel:
         Returns:
             The most that was not explained before, beyond what friction may do, in rad.
         """
-        doubt = 0.0 if self._hides_sticking else _DOUBT
         known = memory.hung, memory.misfit, memory.P, memory.beta
-        weighing = self._config.following_sigma**2, doubt, most
-        then = planned, beside, regressors, actual, memory.deviation.out
-        return kernels.drives.look_back(self._as_found(memory), *then, *known, *weighing)
+        weighing = self._config.following_sigma**2, _DOUBT, most
+        then = planned, beside, regressors, actual, memory.deviation.out, memory.deviation.faster
+        return kernels.drives.look_back(self._as_found(memory), *then, *known, weighing)
 
     def learn(self, memory: SimpleNamespace, Phi: np.ndarray, y: np.ndarray) -> None:
         """One step of recursive least squares: the motors were y behind a plan without correction, (6,)."""
@@ -294,10 +290,9 @@ class DriveModel:
     def open_low_speeds(self, memory: SimpleNamespace, is_early: bool = False) -> None:
         """From now on friction at low speeds may be another one than believed.
 
-        It may have a hump, and it may turn over more sharply; the latter not of a robot whose friction moves
-        motors by milliradians, which hide it. Friction goes by the speed of a motor, and in the model by the
-        planned one. As long as motors are far off their plan, it turns over at other times, and a hump would
-        be what makes up for that.
+        It may have a hump, and it may turn over more sharply. Friction goes by the speed of a motor, and in
+        the model by the planned one. As long as motors are far off their plan, it turns over at other times,
+        and a hump would be what makes up for that.
 
         Args:
             memory: of the layout.
@@ -310,7 +305,7 @@ class DriveModel:
             humps, spread = humps[self._drives.slack > self._config.following_sigma], _EARLY_HUMP
         humps = humps[P[humps, humps] == 0.0]
         P[humps, humps] = spread**2
-        if not P[SHARP, SHARP].any() and not self._hides_sticking:
+        if not P[SHARP, SHARP].any():
             P[SHARP, SHARP] = _SHARPER**2 + _SHARPER_ALONE**2 * np.eye(6)
             P[THIRD, THIRD] = _WITHIN_A_THIRD**2 * (1.0 + np.eye(6))
             # Until now they had to make up for friction that turns over sharply.

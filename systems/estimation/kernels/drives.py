@@ -13,7 +13,8 @@ from systems.estimation.kernels.plan import follow
 # Of the believed width over which friction turns over: where it turns over at once, and where within a third;
 # in that the sign of a measured speed is not known
 _SHARP_WIDTH, _THIRD_WIDTH = 0.02, 0.3
-_STILL = 0.1  # of that width, below which a motor may hang in its friction
+_STILL = 0.1  # of that width, below which a motor may hang in its friction by plan
+_STUCK = 0.3  # likewise as encoders show, while it should move
 _FORGOTTEN = 0.1  # s, in which what it was off by then has fallen to a third
 MATCHED = 0.1  # s, over which variances follow what the model leaves of following errors
 _WINDS = 0.5  # s, longer at rest than that, steps of an encoder may be taken for it
@@ -145,7 +146,7 @@ def learn(P, beta, Phi, y, variances, misfit, fading):
 
 
 @compiled
-def look_back(drives, planned, beside, rows, actual, deviation, hung, misfit, P, beta, variance, doubt, most):
+def look_back(drives, planned, beside, rows, actual, deviation, dv, hung, misfit, P, beta, weighing):
     """Learns from one planned instant that has passed; see `DriveModel.look_back`.
 
     Args:
@@ -155,33 +156,36 @@ def look_back(drives, planned, beside, rows, actual, deviation, hung, misfit, P,
         rows: of the regressors, (17, 6), as `command` writes them.
         actual: positions of the motors, rad, (6,).
         deviation: (6, 6) rad, of `deviate`.
-        hung: rad, (2, 6), by which motors were off when they were slow, fading, and are if they are; is
-            renewed.
+        dv: rad/s, by which motors were faster than planned, (6,).
+        hung: rad, (2, 6), by which motors were off when they were slow, fading, and are if they are so by
+            plan; is renewed.
         misfit, P, beta: as of `learn`.
-        variance: of the following error of a motor that does not hang.
-        doubt: times what a motor hung by, by which its following error may be due to that.
-        most: rad, that may be unexplained if there shall be something to learn.
+        weighing: variance of the following error of a motor that does not hang; times what a motor hung by,
+            by which its following error may be due to that; rad, that may be unexplained if there shall be
+            something to learn.
 
     Returns:
         By how much the positions are off at most at the beta from before, beyond the slack, rad.
     """
     theta, v, a = planned
+    variance, doubt, most = weighing
     Phi, y, variances = np.zeros((6, len(beta))), np.empty(6), np.empty(6)
     features(v, a, rows, Phi)
     largest, fading = 0.0, math.exp(-drives.period / _FORGOTTEN)
     for i in range(6):
         hung[0, i] *= fading
-        hung[1, i] = 0.0
-        if abs(v[i]) < _STILL * drives.width[i] + 0.5 * drives.period * abs(a[i]):
-            hung[1, i] = theta[i] - actual[i]
-            hung[0, i] = max(hung[0, i], abs(hung[1, i]))
+        off, width = theta[i] - actual[i], drives.width[i]
+        is_slow = abs(v[i]) < _STILL * width + 0.5 * drives.period * abs(a[i])
+        hung[1, i] = off if is_slow else 0.0
+        if is_slow or abs(v[i] + dv[i]) < _STUCK * width:  # its friction is whatever keeps it there
+            hung[0, i] = max(hung[0, i], abs(off))
         variances[i] = variance + (doubt * hung[0, i]) ** 2
         # Rotors and friction go by how motors move, not by how they should.
         for k in range(at.OF_FRICTION):
             Phi[i, at.FRICTION + at.OF_FRICTION * i + k] += deviation[1 + k, i]
         Phi[i, at.SHARP + i] += deviation[5, i]
         Phi[i, at.THIRD + i] += deviation[5, i]
-        y[i] = theta[i] - actual[i] + beside[i] - deviation[0, i]
+        y[i] = off + beside[i] - deviation[0, i]
         unexplained = y[i]
         for j in range(len(beta)):
             unexplained -= Phi[i, j] * beta[j]

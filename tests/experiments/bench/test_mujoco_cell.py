@@ -59,8 +59,8 @@ def sag(name: str) -> tuple[np.ndarray, np.ndarray]:
     plant = MultibodyPlant(0.0)
     links = add_robot(plant, robot, "structure", load)
     plant.Finalize()
-    context, arm, rigid = plant.CreateDefaultContext(), true_arm(robot, load, EXACT, 0), drawn_arm(robot, load)
-    tips = []
+    arm, rigid = true_arm(robot, load, EXACT, 0), drawn_arm(robot, load)
+    context, tips = plant.CreateDefaultContext(), []
     for q in np.random.default_rng(1).uniform(-1.5, 1.5, (5, 6)):
         links.set_at_rest(context, q)
         straight = mujoco.MjData(rigid.model)
@@ -180,6 +180,14 @@ def test_the_true_tip_is_on_its_path_from_the_first_lap_on_physics_that_are_not_
     assert found["static_mm"] < 0.005
     assert found["guard"] == 0
     assert not found["learnt"]["events"]
+
+
+@pytest.mark.slow
+def test_a_wrist_whose_friction_moves_its_motors_by_milliradians_is_known_at_rest_and_in_motion():
+    """Ten times the friction for what its motors turn as that of other robots: a KR 16."""
+    found = run(CellRun("kr16", 2), lambda share: None)
+    assert max(lap["max_norm_mm"] for lap in found["laps"]) < 0.2
+    assert found["static_mm"] < 0.05
 
 
 @dataclass(frozen=True)

@@ -87,7 +87,7 @@ def test_drives_that_follow_positions_alone_ring_and_nothing_is_made_of_that():
     model = DriveModel(belief, DriveModelConfig(), "position")
     memory = model.layout.view(np.zeros(model.layout.size))
     assert not model.deviate(memory, motion(0.3)[1], np.full(6, 0.1), np.full(6, 1.0)).any()
-    assert not memory.deviation.all.any()
+    assert not memory.deviation.out.any()
 
 
 def test_motors_on_their_plan_need_nothing_beyond_it():

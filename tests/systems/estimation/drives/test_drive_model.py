@@ -390,8 +390,7 @@ def test_humps_are_open_early_where_friction_moves_a_joint_most(robot, early):
 
     model.open_low_speeds(memory, is_early=True)
     assert np.flatnonzero(spreads()).tolist() == early
-    opened = np.diag(memory.P)[np.r_[SHARP, THIRD]] > 0.0
-    assert (opened == (not early)).all()  # how sharply it turns over, such joints hide
+    assert (np.diag(memory.P)[np.r_[SHARP, THIRD]] > 0.0).all()  # how sharply it turns over
     known = 0.5 * spreads()
     memory.P[np.arange(16, 37, 4), np.arange(16, 37, 4)] = known
     model.open_low_speeds(memory)

@@ -101,7 +101,7 @@ def test_what_motors_that_hung_do_after_a_rest_does_not_hide_that_they_stick():
     model.open_low_speeds(memory)
     moved_with_sticking_friction(model, memory)
     # Were what they do after a rest believed as all else is, it would be 0.5 to 0.6.
-    assert (memory.beta[SHARP] + memory.beta[THIRD] > 0.7).all()
+    assert (memory.beta[SHARP] + memory.beta[THIRD] > 0.65).all()
 
 
 def test_motors_that_hung_do_not_start_with_what_their_drives_wound_up_meanwhile():
@@ -113,16 +113,27 @@ def test_motors_that_hung_do_not_start_with_what_their_drives_wound_up_meanwhile
     assert (farthest[0] < 0.6 * farthest[1]).all()  # of the wrist, which friction moves most
 
 
-@pytest.mark.parametrize(
-    ("robot", "is_doubted"), [("irb1200", True), ("kr16", False), ("kr16-realistic", False)]
-)
-def test_motors_that_hung_are_doubted_but_where_friction_moves_them_by_milliradians(robot, is_doubted):
-    def learnt(hung: float) -> np.ndarray:
+@pytest.mark.parametrize("robot", ["irb1200", "kr16-realistic"])
+def test_of_motors_that_hung_less_is_learnt(robot: str):
+    def learnt(hung: float) -> float:
         model, memory = drives(robot=robot)
         memory.hung[0] = hung
         theta, v, a = motion(1.0)
         regressors = model.command(memory, (theta, v, a), LOADS, 7.0).regressors
         model.look_back(memory, (theta, v, a), regressors, np.zeros(6), theta - 1e-4)
-        return memory.P
+        return np.abs(memory.beta).sum()
 
-    assert np.array_equal(learnt(1e-3), learnt(0.0)) != is_doubted
+    assert 0.0 < learnt(1e-3) < 0.1 * learnt(0.0)
+
+
+@pytest.mark.parametrize(("speed", "hangs"), [(0.0, True), (2e-3, True), (5e-3, False), (0.02, False)])
+def test_a_motor_hangs_that_encoders_show_at_rest_whatever_is_planned(speed: float, hangs: bool):
+    """Friction turns over within 0.01 rad/s, and what holds a motor that should move nobody knows."""
+    model, memory = drives()
+    theta, _, a = motion(1.0)
+    v, off = np.full(6, 0.1), 2e-4
+    regressors = model.command(memory, (theta, v, a), LOADS, 7.0).regressors
+    model.deviate(memory, v, speed - v, np.zeros(6))
+    model.look_back(memory, (theta, v, a), regressors, np.zeros(6), theta - off)
+    np.testing.assert_allclose(memory.hung[0], off if hangs else 0.0, atol=1e-12)
+    assert not memory.hung[1].any()  # nor would a drive that is wound up be told from a late one
