@@ -162,7 +162,7 @@ def _model(
         xml.append(f'<body name="link_{number}" {_frame(joint.placement, shifts[number], turns[number])}>')
         xml += [text, _inertial(link), _pivot(robot, number)]
         open_bodies += 1
-        place, hinges = _hinges(robot, number, bending) if bending is not None else (None, "")
+        place, hinges = _hinges(robot, number, bending)
         if hinges:  # all that follows hangs on them
             tiny = f'<inertial pos="{_text(place)}" mass="1e-3" diaginertia="1e-3 1e-3 1e-3"/>'
             xml.append(f'<body name="far_{number}">{hinges}{tiny}')
@@ -182,9 +182,11 @@ def _model(
     )
 
 
-def _hinges(robot: RobotModel, number: int, bending: float) -> tuple[np.ndarray, str]:
+def _hinges(robot: RobotModel, number: int, bending: float | None) -> tuple[np.ndarray, str]:
     """Where a link bends, in its frame, and on which sprung hinges; none if it does not."""
     joint, beam = robot.joints[number - 1], robot.links[number - 1].beam
+    if bending is None:
+        return np.zeros(3), ""
     if beam is not None:
         # Under a force at its end a cantilever bends by F L^3 / (3 EI) and turns by F L^2 / (2 EI).
         u = "xyz".index(beam.along)
@@ -212,10 +214,10 @@ def _pivot(robot: RobotModel, number: int) -> str:
 
 def _balancer(robot: RobotModel) -> str:
     """The counterbalance, a spring between its two pivots."""
-    spring = robot.counterbalance
-    if spring is None:
+    spring, part = robot.counterbalance, robot.counterbalance_at_axis_2
+    if spring is None or part is None:
         return ""
-    length = free_length(robot.counterbalance_at_axis_2)
+    length = free_length(part)
     return (
         f'<tendon><spatial stiffness="{_text([spring.stiffness])}" damping="{_text([spring.damping])}" '
         f'springlength="{_text([length])}"><site site="pivot_1"/><site site="pivot_2"/></spatial></tendon>'
