@@ -96,6 +96,9 @@ def run_row(row: StudyRow, progress: Progress) -> dict[str, Any]:
     # A refused combination or a run that broke off is a result of the study; the others shall go on.
     except (ValueError, RuntimeError) as error:
         return line | {"failure": " ".join(str(error).split())}
+    # What else a class of one's own raises, and what Drake's own checks do.
+    except (Exception, SystemExit) as error:
+        return line | {"failure": f"{type(error).__name__}: {' '.join(str(error).split())}"}
 
 
 def first_run(rows: Sequence[StudyRow]) -> dict[str, Any]:

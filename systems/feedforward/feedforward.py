@@ -1,5 +1,6 @@
 """What all feedforwards share: ports, the joint reference with its derivatives, and the load of the links."""
 
+import math
 from collections.abc import Sequence
 
 import numpy as np
@@ -187,6 +188,11 @@ class Feedforward(LeafSystem):
                 shape = "x".join(map(str, given)) or "one number"
                 wanted = f"drive_under must give {size} numbers as {name}"
                 raise OwnClassError(f"class {type(self).__name__}: {wanted}, got {shape}")
+        for name in sizes:
+            given = np.asarray(getattr(drive, name))
+            if given.dtype.kind not in "fiu" or not math.isfinite(sum(given.tolist())):
+                wanted = f"drive_under must give finite numbers as {name}"
+                raise OwnClassError(f"class {type(self).__name__}: {wanted}, got {given.tolist()}")
 
     def play(self, references: Sequence[JointReference]) -> np.ndarray:
         """Commands at successive ticks: positions in rad, velocities in rad/s, torques in N m; (n, 3, 6)."""

@@ -7,6 +7,7 @@ curve.
 
 import math
 from dataclasses import dataclass, field
+from typing import get_args
 
 import numpy as np
 
@@ -67,6 +68,9 @@ def make_path(config: ReferenceConfig) -> CartesianPath:
     if config.timing not in TIMINGS:
         raise ValueError(f"reference: timing must be one of {', '.join(TIMINGS)}, got '{config.timing}'")
     shape = config.path
+    if not isinstance(shape, Shape):
+        kinds = ", ".join(each.__name__ for each in get_args(Shape))
+        raise ValueError(f"reference: path must be a {kinds} of systems.reference.shapes, got {shape!r}")
     if isinstance(shape, Planned):
         path: CartesianPath = PlannedPath(shape.motion(), config.settle, config.dwell, config.laps)
     else:

@@ -58,6 +58,8 @@ def test_one_that_computes_nothing_is_refused_before_anything_runs(tmp_path: Pat
     [
         ("Drive(np.zeros(6)", "Drive(np.zeros(5)", "must give 6 numbers as deflection, got 5"),
         ("return Drive", "Drive", "must return a Drive, got None"),
+        ("Drive(np.zeros(6)", "Drive(np.full(6, np.nan)", "must give finite numbers as deflection, got"),
+        ("torque, memory)", "np.array(list('abcdef')), memory)", "must give finite numbers as torque, got"),
     ],
 )
 def test_a_wrong_result_is_named(tmp_path: Path, right: str, wrong: str, why: str):

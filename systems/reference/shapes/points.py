@@ -41,9 +41,11 @@ class _ThroughWaypoints:
 
     def segments(self) -> list[Segment]:
         """The pieces of the path. Raises ValueError if the way points are impossible."""
-        if not self.waypoints:
+        if len(self.waypoints) == 0:
             raise ValueError(f"reference: path '{self.kind}' needs at least one waypoint, got none")
         for number, waypoint in enumerate(self.waypoints, 1):
+            if not isinstance(waypoint, Waypoint):
+                raise ValueError(f"reference: waypoint {number} must be a Waypoint, got {waypoint!r}")
             require_vectors(f"waypoint {number}", waypoint, "translation_mm", "zyx_deg")
         poses = [waypoint.pose() for waypoint in self.waypoints]
         if len(poses) == 1:  # a pose that is held for as long as a segment takes

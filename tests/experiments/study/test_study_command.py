@@ -18,6 +18,7 @@ import pytest
 
 from experiments.cli.cluster import DaskCluster
 from experiments.cli.workers import in_order
+from experiments.study import rows
 from experiments.study.command import study_verdict
 from experiments.study.rows import first_run, run_row, study_rows
 from experiments.study.store import TABLE, alone_in
@@ -212,3 +213,23 @@ def test_a_law_that_has_failed_is_not_the_best_for_what_it_leaves_out():
     }
     laws = Study(laws=["open_loop", "pbvs"], factors={"station.payload": Levels([0.0, 1.0])})
     assert study_verdict(laws, table).startswith("Over 4 runs Open loop has the best worst run")
+
+
+@pytest.mark.parametrize(
+    ("error", "reason"),
+    [
+        (ZeroDivisionError("by zero"), "ZeroDivisionError: by zero"),
+        (SystemExit("condition 'AllFinite(q)' failed."), "SystemExit: condition 'AllFinite(q)' failed."),
+    ],
+)
+def test_a_class_of_ones_own_that_raises_fails_its_row_and_no_other(
+    monkeypatch: pytest.MonkeyPatch, error: BaseException, reason: str
+):
+    """Drake's own checks raise SystemExit."""
+
+    def raising(*_, **__):
+        raise error
+
+    monkeypatch.setattr(rows, "run", raising)
+    study = Study(laws=["open_loop"], factors={"station.payload": Levels([1.0])})
+    assert run_row(study_rows(study)[0], lambda share: None)["failure"] == reason

@@ -234,6 +234,11 @@ def test_a_new_path_is_a_few_lines_of_a_scenario():
         ),
         (ReferenceConfig(Rectangle([Waypoint(zyx_deg=np.zeros(2)), Waypoint()])), "waypoint 1 zyx_deg"),
         (ReferenceConfig(Circle(radius_mm=0.0)), "circle radius_mm must be"),
+        (ReferenceConfig("circle"), "path must be a Rectangle, Circle, .* got 'circle'"),  # type: ignore
+        (
+            ReferenceConfig(Points([(0.5, 0.0, 0.4)])),  # type: ignore
+            r"waypoint 1 must be a Waypoint, got \(0.5, 0.0, 0.4\)",
+        ),
         (ReferenceConfig(Circle(turns=0)), "circle turns must be between 1 and 100000, got 0"),
         (
             ReferenceConfig(FigureEight(width_mm=-1.0)),
