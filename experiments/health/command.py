@@ -67,7 +67,7 @@ def health_command(
             "--change-at",
             metavar="N",
             help="The check in which it changes.",
-            show_default="the first new one",
+            show_default="the first new one, and not the first of all for joint and tool",
         ),
     ] = None,
     cell: Annotated[str, typer.Option(metavar="NAME|FILE", help="The cameras.")] = "probst",
@@ -95,8 +95,15 @@ def health_command(
         injected = Injected.parse(change, study.names) if change else None
         if change_at is not None and injected is None:
             raise ValueError("--change-at needs --change")
-        first = len(before.time) + 1 if change_at is None else change_at
-        at_least("--change-at", 1, first)
+        # Joints and tool are held against the first check: one that has changed before it looks well.
+        compared = 2 if injected is not None and injected.is_of_robot else 1
+        first = max(len(before.time) + 1, compared) if change_at is None else change_at
+        at_least("--change-at", compared, first)
+        if first > len(before.time) + checks and change_at is None:
+            raise ValueError(
+                f"--change {change}: joints and tool are held against the first check, which {history} does "
+                "not have yet; say --checks 2 or more"
+            )
         if first > len(before.time) + checks:
             raise ValueError(
                 f"--change-at {first}: the last check of this run is {len(before.time) + checks}"

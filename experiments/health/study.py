@@ -76,6 +76,11 @@ class Injected:
             return cls(kind, rest[0], 1e-3 * size)
         raise ValueError(f"--change must be {form}, got '{text}'")
 
+    @property
+    def is_of_robot(self) -> bool:
+        """Whether it is the true robot that changes, and not what sees it."""
+        return self.kind in ("joint", "tool")
+
     def station(self, scenario: Scenario) -> Scenario:
         """The scenario with the change in its true robot."""
         errors = scenario.station.errors

@@ -58,6 +58,13 @@ def test_a_history_goes_on_and_a_joint_that_drifts_is_named(tmp_path: Path):
 
 
 @pytest.mark.slow
+def test_without_a_history_a_joint_drifts_behind_the_first_check(tmp_path: Path):
+    """It had drifted before the first check, with which all others are compared, and nothing showed."""
+    (alarm,) = health(tmp_path, "--change", "joint:3:40", "--checks", "2")["alarms"]
+    assert (alarm["what"], alarm["onset_s"]) == ("joint 3", 86400.0)
+
+
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
@@ -67,6 +74,11 @@ def test_a_history_goes_on_and_a_joint_that_drifts_is_named(tmp_path: Path):
         (["--change", "marker:5:nan"], "--change marker:5:nan: the size must be a finite number, got 'nan'"),
         (["--change", "joint:3:inf"], "--change joint:3:inf: the size must be a finite number, got 'inf'"),
         (["--change-at", "2"], "--change-at needs --change"),
+        (["--change", "joint:3:40"], "joints and tool are held against the first check"),
+        (
+            ["--change", "tool:0.2", "--change-at", "1", "--checks", "3"],
+            "--change-at must be at least 2, got 1",
+        ),
         (["--change", "joint:3:40", "--change-at", "2"], "--change-at 2: the last check of this run is 1"),
         (["--with-cell", "--change", "joint:3:40"], "--change changes a simulated station"),
         (
