@@ -32,9 +32,10 @@ TITLES = {
 _NOTE = (
     "The largest over the poses or along the square P2, P3, P4, P5. The speed of a path rises and falls "
     "between corners; velocity is compared over the middle of the edges. Stabilisation counts from the end "
-    "of the command. Drift is between the first and the last quarter of the cycles, not over the eight hours "
-    "of the standard. There is no stabilisation time where the tip has not stayed within the band before the "
-    "next motion began."
+    "of the command; there is none where the tip has not stayed within the band before the next motion "
+    "began. Drift is how far P1 moves from the first to the last quarter of the cycles, in place of the "
+    "difference of its accuracies over eight hours, which is never more for the same time. The three sides "
+    "of vAP are P5, P2 and P4, not at right angles to each other."
 )
 _NAMES = ("P1", "P2", "P3", "P4", "P5")
 _WIDTH = 0.5  # of a pose's place on the axis that its visits take
@@ -93,7 +94,8 @@ def write_acceptance_page(page: Path, title: str, told: str, scenario: str, rows
     )
     square = (
         "Above, the mean of all cycles, its distance to the path as a curve: its maximum is AT. Below, how "
-        "far the cycles are apart at the same time, mean and three standard deviations: its maximum is RT."
+        "far the cycles are apart across it, mean and three standard deviations: its maximum is RT. Being "
+        "late is neither."
     )
     sections = [
         Section("Attained poses", poses, _poses_figure(rows), 620),

@@ -161,6 +161,37 @@ def test_a_tip_that_goes_on_behind_a_corner_overshoots_it_by_that():
     assert found["CO_mm"] == pytest.approx(0.5, rel=0.02)
 
 
+@pytest.mark.parametrize(("least", "most"), [(0.14, 0.14), (0.3, 0.3), (0.02, 0.03)])
+def test_a_tip_that_is_late_keeps_to_the_path_and_does_not_scatter(least: float, most: float):
+    """It begins the first cycle at rest and is on its way to the corner where others begin."""
+    scenario = path_scenario(BASE, CYCLE, CYCLES, 1.0)
+    path, by = make_path(scenario.reference), np.linspace(least, most, CYCLES)
+
+    def late(t: np.ndarray) -> np.ndarray:
+        cycle = np.clip(np.searchsorted(path.lap_starts, t, side="right") - 1, 0, CYCLES - 1)
+        return path.sample(np.maximum(t - by[cycle], 0.0))[0][:, :3, 3] - path.sample(t)[0][:, :3, 3]
+
+    found = path_results(log_of(scenario, late), scenario, CYCLE).results
+    assert found["AT_mm"] < 0.003
+    assert found["RT_mm"] < 0.003
+
+
+def test_cycles_that_are_apart_across_the_path_scatter_by_that():
+    scenario = path_scenario(BASE, CYCLE, CYCLES, 1.0)
+    path = make_path(scenario.reference)
+    normal = np.cross(*(CYCLE.poses[[1, 2], :3, 3] - CYCLE.poses[0, :3, 3]))
+    normal /= np.linalg.norm(normal)
+
+    def apart(t: np.ndarray) -> np.ndarray:
+        cycle = np.clip(np.searchsorted(path.lap_starts, t, side="right") - 1, 0, CYCLES - 1)
+        return np.outer(np.where(cycle % 2, 1e-4, -1e-4), normal)
+
+    found = path_results(log_of(scenario, apart), scenario, CYCLE)
+    inside = (found.edge > 0.02) & (found.edge < 3.98)
+    assert found.off[inside].max() < 1e-9
+    np.testing.assert_allclose(found.scatter[inside], 1e-4, rtol=1e-3)  # alike far from the middle
+
+
 @pytest.mark.parametrize("edge", [0.25, 0.02])
 def test_noise_and_an_offset_of_the_tip_are_no_velocity(edge):
     cycle = Cycle(cube_poses(BASE, edge), dwell=0.5, band=1e-4)
