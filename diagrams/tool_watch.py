@@ -22,8 +22,9 @@ class ToolWatch:
     """Compares poses of the camera with the joints at their exposures, one after the other.
 
     A robot that is not calibrated is off by a bend along its way, in the frame of the tool too; a tool that
-    is displaced is off by a step in it. A camera that is knocked makes such a step as well. It begins anew
-    after a gap in the samples.
+    is displaced is off by a step in it. A camera that is knocked makes such a step as well. Clocks of robot
+    and camera may be apart, as where stamps of joints are late: what is off by the speed of the tool is none.
+    It begins anew after a gap in the samples.
     """
 
     def __init__(self, robot: RobotModel) -> None:
@@ -75,7 +76,7 @@ class ToolWatch:
             self._steps = StepDetector(self._least)
         self._last = sample.time
         deviation = self._deviation(sample)
-        found = None if deviation is None else self._steps.add(sample.time, deviation)
+        found = None if deviation is None else self._steps.add(sample.time, *deviation)
         if found is None:
             return None
         size, sigma = 1e3 * float(np.linalg.norm(found.size)), 1e3 * found.sigma
@@ -84,13 +85,18 @@ class ToolWatch:
             "the camera if it was touched"
         )
 
-    def _deviation(self, sample: PoseSample) -> np.ndarray | None:
-        """Seen less believed place of the tool in its frame in m, (3,); None if the joints are not known."""
+    def _deviation(self, sample: PoseSample) -> tuple[np.ndarray, np.ndarray] | None:
+        """Seen less believed place of the tool in its frame, m, and how fast it moves in it, m/s, (3,) each.
+
+        None if the joints are not known.
+        """
         kept = np.roll(self._joints, -(self._count % _KEPT), axis=0)[-min(self._count, _KEPT) :]
         after = int(np.searchsorted(kept[:, 0], sample.time))
         if not 0 < after < len(kept):
             return None
         before, behind = kept[after - 1], kept[after]
-        share = (sample.time - before[0]) / (behind[0] - before[0])
-        X_WE, _ = self._kinematics.rows_and_jacobian(before[1:] + share * (behind[1:] - before[1:]))
-        return X_WE[:, :3].T @ (sample.X_WE.translation() - X_WE[:, 3])
+        passed, moved = behind[0] - before[0], behind[1:] - before[1:]
+        share = (sample.time - before[0]) / passed
+        X_WE, J = self._kinematics.rows_and_jacobian(before[1:] + share * moved)
+        R_EW = X_WE[:, :3].T
+        return R_EW @ (sample.X_WE.translation() - X_WE[:, 3]), R_EW @ J[3:] @ moved / passed

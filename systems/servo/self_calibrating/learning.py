@@ -28,6 +28,7 @@ from systems.servo.self_calibrating.motors import PLAN, MotorLearning
 
 _REACH = 0.1  # s, how far back plans and encoders are remembered, beyond the delays
 _LOOKED_AT, _LEAST_CHANGE = 250, 0.3  # samples since an upset, until a mass (kg) is compared with that before
+_MOST_WAITING = 16  # poses that wait for encoders
 _SETTLING = 0.2  # s that the drives take to come to rest after a dead time was corrected
 _ASTRAY = 3e-3  # rad, by which motors may miss their plan before its loads are not those of the robot
 UNREST = 0.5  # m/s^2, while the robot is led onto its plan, or the plan is not where motors are
@@ -63,12 +64,12 @@ class Learning:
                 is_new=(1,),  # whether nothing has been learnt of it yet
                 time=(1,),
                 joints=(1,),  # when they were there, s
-                has_pose=(1,),
                 newest=(1,),  # exposure of the newest pose, s
-                X_WE=(4, 4),
                 accepted=(1,),  # when the last pose came that was learnt from, s
                 path_start=(1,),
             ),
+            # Poses that are waiting for the encoders of their instant: how many, stamps in s, and poses
+            "waiting": Layout(count=(1,), stamps=(_MOST_WAITING,), poses=(_MOST_WAITING, 4, 4)),
             "pair": Layout(theta=(6,), then=PLAN, now=PLAN, X_WE=(4, 4)),  # room for that of an exposure
             "load": Layout(mass=(1,), time=(1,), samples=(1,)),  # kg and s at an upset, and how many since
             "implausible": (1,),  # the most parameters that were beyond all bounds so far
@@ -104,9 +105,11 @@ class Learning:
         heard = memory.heard
         heard.time[0], heard.is_new[0], heard.path_start[0] = time, 1.0, path_start
         heard.joints[0] = joints.time
-        heard.has_pose[0] = sample.valid and sample.time > heard.newest[0]
-        if heard.has_pose[0]:
-            heard.newest[0], heard.X_WE[:] = sample.time, sample.X_WE.GetAsMatrix4()
+        if sample.valid and sample.time > heard.newest[0]:
+            heard.newest[0], waiting = sample.time, memory.waiting
+            place = min(int(waiting.count[0]), _MOST_WAITING - 1)
+            waiting.stamps[place], waiting.poses[place] = sample.time, sample.X_WE.GetAsMatrix4()
+            waiting.count[0] = place + 1.0
 
     def learn(self, memory: SimpleNamespace) -> None:
         """Learns from what was heard last; once."""
@@ -117,8 +120,12 @@ class Learning:
         time = float(heard.time[0])
         self._watch_delay(memory, time)
         self.motors.compare(memory)
-        if heard.has_pose[0]:
-            pair = self.pair(memory, float(heard.newest[0]), heard.X_WE)
+        waiting = memory.waiting
+        if self._is_due(memory):
+            stamp, X_WE = float(waiting.stamps[0]), waiting.poses[0].copy()
+            waiting.count[0] -= 1.0
+            waiting.stamps[:-1], waiting.poses[:-1] = waiting.stamps[1:].copy(), waiting.poses[1:].copy()
+            pair = self.pair(memory, stamp, X_WE)
             if pair is not None:
                 event = self.estimator.add(memory.estimator, pair)
                 if event is not None:
@@ -129,6 +136,19 @@ class Learning:
                 self._note_load(memory)
                 heard.accepted[0] = time
         self.estimator.work(memory.estimator)
+
+    def _is_due(self, memory: SimpleNamespace) -> bool:
+        """Whether there is a pose whose encoders have come, or that has waited as long as there is room.
+
+        Where the stamps of the joints are late against those of the camera, a pose comes before them.
+        """
+        waiting, encoders = memory.waiting, memory.encoders
+        count, heard = int(waiting.count[0]), int(encoders.count[0])
+        if not count or count == _MOST_WAITING or not heard:
+            return count > 0
+        stamp = float(waiting.stamps[0])
+        newest = float(encoders.times[(heard - 1) % self.motors.encoders.length])
+        return stamp + self.estimator.clock_offset(memory.estimator, stamp) <= newest + 0.5 * self._period
 
     def pair(self, memory: SimpleNamespace, stamp: float, X_WE: np.ndarray) -> Pair | None:
         """The encoders and the plan at the instant of an exposure; None if they are not known, or astray.

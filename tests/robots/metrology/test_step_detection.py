@@ -9,9 +9,10 @@ PERIOD, SIGMA = 0.004, 50e-6  # s, m
 LEAST = 1e-4  # m
 
 
-def steps(values: np.ndarray) -> list[Step]:
-    detector = StepDetector(LEAST)
-    found = (detector.add(PERIOD * k, value) for k, value in enumerate(values))
+def steps(values: np.ndarray, rates: np.ndarray | None = None) -> list[Step]:
+    detector, rates = StepDetector(LEAST), np.zeros_like(values) if rates is None else rates
+    both = enumerate(zip(values, rates, strict=True))
+    found = (detector.add(PERIOD * k, value, rate) for k, (value, rate) in both)
     return [each for each in found if each is not None]
 
 
@@ -52,3 +53,24 @@ def test_neither_noise_nor_bends_nor_vibration_are_steps():
     t = np.arange(len(calm))[:, None] * PERIOD
     assert not steps(calm)
     assert not steps(calm + 3e-4 * np.sin(2 * np.pi * 9.0 * t) * np.exp(-np.mod(t, 3.0)))
+
+
+@pytest.mark.parametrize("late", [-0.02, 0.02])
+def test_what_clocks_that_are_apart_make_of_a_motion_is_no_step_and_hides_none(late: float):
+    """A tool at rest that starts within a tenth of a second, and comes to rest again, four times."""
+    calm = motion(8.0, 2)
+    t = np.arange(len(calm)) * PERIOD
+    speed = 0.1 * (np.tanh((np.mod(t, 2.0) - 0.5) / 0.04) - np.tanh((np.mod(t, 2.0) - 1.5) / 0.04))
+    rates = speed[:, None] * [0.6, -0.48, 0.64]
+    assert steps(calm + late * rates)
+    assert not steps(calm + late * rates, rates)
+    calm[1000:] += [2e-4, 0.0, 0.0]
+    (found,) = steps(calm + late * rates, rates)
+    assert found.onset == pytest.approx(1000 * PERIOD, abs=5 * PERIOD)
+
+
+def test_an_arm_that_bends_as_it_starts_off_makes_no_step():
+    """By a millimetre within a third of a second, of which the rest of the window says little."""
+    calm = motion(8.0, 3)
+    t = np.arange(len(calm))[:, None] * PERIOD
+    assert not steps(calm + 5e-4 * np.tanh((t - 4.0) / 0.1) * [0.6, -0.48, 0.64])
