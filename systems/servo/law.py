@@ -44,6 +44,8 @@ class LawInput(NamedTuple):
     position: np.ndarray  # measured joint positions, (6,) rad
     # Wanted and seen pose at an exposure, (3, 4) each, if it may be used
     measured: tuple[np.ndarray, np.ndarray] | None
+    acts_at: float = math.nan  # s, time on the path when the command is believed to act
+    exposed_at: float = math.nan  # s, time on the path at that exposure
 
 
 class LawOutput(NamedTuple):
@@ -121,7 +123,7 @@ class ServoLaw(LeafSystem):
         # From the joints of the last tick, as `joints_at` has them, to their positions at this one.
         self._prediction = np.kron([1.0, 1.5 * period, -0.5 * period], np.eye(NUM_JOINTS))
         self.angle_limit = math.radians(config.correction_limit_deg)
-        self._guard, self._preview = guard, preview
+        self._guard, self._preview, self._acts_after = guard, preview, model.command_delay
         self._smallest_trace = 1.0 + 2.0 * math.cos(math.radians(guard.largest_deviation_deg))
         self._oldest = model.camera_delay + guard.hold_after + 2.0 * period  # s, of what is compared
         self._reference = self.DeclareAbstractInputPort("reference", Value[object]())
@@ -168,7 +170,9 @@ class ServoLaw(LeafSystem):
                     last_used = time
 
         wanted = ahead.moment(time + self._preview)
-        moment = LawInput(wanted.X_WE, wanted.V_WE, joints.position, measured)
+        acts_at = ahead.path_time(time + self._acts_after)
+        exposed_at = math.nan if measured is None else ahead.path_time(sample.time)
+        moment = LawInput(wanted.X_WE, wanted.V_WE, joints.position, measured, acts_at, exposed_at)
         memory = state.value(_MEMORY).copy()
         if self.memory_size and math.isnan(memory[0]):
             memory = self.initial_state(moment)

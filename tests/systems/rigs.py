@@ -149,6 +149,9 @@ class _Wanted:
         X_WD, V_WD = self.path(t)
         return PathMoment(X_WD[:3], V_WD, np.zeros(6))
 
+    def path_time(self, t: float) -> float:
+        return t
+
 
 def assert_within_limits(robot: RobotModel, positions: np.ndarray, velocities: np.ndarray) -> None:
     """Speed and acceleration of every joint from each command to the next; (n, 6) in rad and rad/s."""
@@ -177,7 +180,9 @@ class LawRig:
         delay: int = 1,
         preview: float = 0.0,
     ) -> None:
-        model = ControllerModel(nominal, period=PERIOD, preview=preview, camera_delay=0.2)
+        model = ControllerModel(
+            nominal, period=PERIOD, preview=preview, camera_delay=0.2, command_delay=preview
+        )
         config = LAWS[law].Config(**vars(config or LawConfig()))
         self.law = LAWS[law](model, config, GuardConfig())
         self.context = self.law.CreateDefaultContext()
