@@ -40,7 +40,8 @@ class LiveView:
             OSError: if no port is free.
         """
         self._experiment, path = experiment, experiment.path
-        times = np.arange(path.path_start, path.duration, experiment.scenario.station.period)
+        period = experiment.scenario.station.period
+        times = np.append(np.arange(path.path_start, path.lap_end, period), path.lap_end)
         wanted = path.sample(times)[0][:, :3, 3]
         self.meshcat = open_meshcat(wanted, port)
         self._picture = RobotPicture(self.meshcat, robot, experiment.scenario.station.errors)

@@ -228,7 +228,7 @@ def foxglove_server(console: Console, prepared: Prepared, address: str | None) -
         )
     server = FoxgloveServer(address, prepared.robot)
     path = make_path(prepared.scenario.reference)
-    server.show_path(path.sample(np.linspace(path.path_start, path.dwell_start, 500))[0][:, :3, 3])
+    server.show_path(path.sample(np.linspace(path.path_start, path.lap_end, 500))[0][:, :3, 3])
     console.print(f"Foxglove: open {server.address}")
     return server
 

@@ -58,6 +58,11 @@ class CartesianPath:
         self._poses = np.array([segment.pose for segment in segments])
         self._twists = np.array([segment.twist for segment in segments])
 
+    @property
+    def lap_end(self) -> float:
+        """When the first lap is over, s; all others are the same."""
+        return float(self.lap_starts[1]) if len(self.lap_starts) > 1 else self.dwell_start
+
     @overload
     def sample(self, time: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]: ...
     @overload

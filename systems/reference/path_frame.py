@@ -43,7 +43,7 @@ class PathLine:
             ValueError: if the tool only turns on the spot, so that there is nothing beside the path.
         """
         self._laps = len(path.lap_starts)
-        end = float(path.lap_starts[1]) if self._laps > 1 else path.dwell_start
+        end = path.lap_end
         times = np.arange(path.path_start, end + _SAMPLING, _SAMPLING)
         X_WE = path.sample(np.minimum(times, end))[0]
         way = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(X_WE[:, :3, 3], axis=0), axis=1))])
