@@ -10,7 +10,7 @@ from rich.markup import escape
 from rich.table import Table
 
 from diagrams.scenario.scenario import StationConfig
-from experiments.cli.console import print_files, print_table, progress_bar, refusing
+from experiments.cli.console import print_files, print_note, print_table, progress_bar, refusing
 from experiments.cli.json_output import human_console, json_output
 from experiments.cli.options import JsonOption, PayloadOption, StudiedRobotOption
 from experiments.cli.prepare import noted_robot
@@ -26,6 +26,7 @@ from robots.measurement_design.obstacles import read_obstacles
 from robots.planning.limits import DUTY, RESERVE, motion_limits
 from robots.planning.path_dynamics import DYNAMICS
 from robots.programs.planned_moves import FILES, MOVES
+from robots.programs.read import joints_in_doubt
 from systems.reference.planned_file import planned_text
 
 
@@ -116,6 +117,7 @@ def plan_command(
             raise ValueError("--obstacles counts on free ways only; give --free too")
         boxes = read_obstacles(obstacles) if obstacles else ()
         model = noted_robot(human, robot)
+        print_note(human, joints_in_doubt(path))
         mass = model.payload.largest_mass if payload is None else payload
         limits = motion_limits(model, tool_speed, tool_acceleration, duty).with_reserve(reserve)
         true = None if plant is None else load_robot(plant)

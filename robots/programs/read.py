@@ -9,7 +9,16 @@ import numpy as np
 from robots.description.placement import LONGEST_TOOL
 from robots.programs.krl import read_krl
 from robots.programs.pose_table import read_pose_table
-from robots.programs.program import Note, Program, ProgramContext, ProgramError, Source, read_source
+from robots.programs.program import (
+    DEGREE,
+    JOINTS,
+    Note,
+    Program,
+    ProgramContext,
+    ProgramError,
+    Source,
+    read_source,
+)
 from robots.programs.rapid import read_rapid
 
 _RAPID, _KRL, _TABLE = (".mod", ".prg", ".sys", ".modx", ".sysx"), (".src", ".dat"), (".csv", ".txt")
@@ -19,6 +28,7 @@ _READERS = {
     **dict.fromkeys(_TABLE, read_pose_table),
 }
 SUFFIXES = tuple(_READERS)
+_ROWS = 2  # of a table, from which on its values say something of their unit
 _SHORTEST_TOOL = 2e-3  # m; one of up to 2 m whose numbers are in m and not in mm is shorter
 
 
@@ -45,6 +55,31 @@ def parse_program(source: Source, context: ProgramContext | None = None) -> Prog
         raise ProgramError(f"{source.name}: the name of a program must end in one of {', '.join(_READERS)}")
     program = _READERS[suffix](source, context or ProgramContext())
     return replace(program, notes=(*program.notes, *_doubtful_tools(source, program)))
+
+
+def joints_in_doubt(path: str | Path) -> str:
+    """Why a table of joints seems to be in another unit than it says; empty if it does not, or is no table.
+
+    Radians below heads of degrees are all within a turn of 6.28, and hardly any is a whole number.
+
+    Raises:
+        ProgramError: as of `read_program`.
+    """
+    if Path(path).suffix.lower() not in _TABLE:
+        return ""
+    program = read_program(path)
+    if len(program.targets) < _ROWS or not all(each.has_joints for each in program.targets):
+        return ""
+    joints = [target.numbers[role] for target in program.targets for role in JOINTS]
+    values = np.array([joint.value for joint in joints])
+    is_small = all(joint.unit == DEGREE for joint in joints) and np.abs(values).max() <= 2.0 * np.pi
+    broken = np.count_nonzero(values != np.round(values))
+    if not is_small or 2 * broken <= np.count_nonzero(values):
+        return ""
+    return (
+        f"{program.name}: all joints are within 6.28 degrees of zero; if they are in rad, its columns are "
+        "q1_rad to q6_rad"
+    )
 
 
 def _doubtful_tools(source: Source, program: Program) -> list[Note]:

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from robots.programs.program import Program, ProgramContext, ProgramError, Source
-from robots.programs.read import parse_program
+from robots.programs.read import joints_in_doubt, parse_program
 
 EXTERNAL = "[9E9,9E9,9E9,9E9,9E9,9E9]"
 
@@ -313,3 +313,19 @@ def test_a_row_that_cannot_be_meant_as_it_stands_is_left_alone_and_named(
     program = parse_program(Source("t.csv", f"{head}\n{good}\n{bad}\n"))
     assert [each.line for each in program.targets] == [2]
     assert [(note.line, note.text) for note in program.notes] == [(3, f"{why}, row left alone")]
+
+
+@pytest.mark.parametrize(
+    ("rows", "is_doubted"),
+    [
+        ("0.17,-1.2,1.4,-0.35,1.05,0.5\n0.5,-1.1,1.3,-0.7,0.9,0.2", True),
+        ("10,-70,80,-20,60,30\n30,-60,70,-40,50,10", False),
+        ("0,-5,5,0,0,0\n0,5,-5,0,1.5,0", False),  # some degrees about zero
+    ],
+)
+@pytest.mark.parametrize("unit", ["deg", "rad"])
+def test_radians_below_heads_of_degrees_are_doubted(tmp_path, rows: str, is_doubted: bool, unit: str):
+    path = tmp_path / "joints.csv"
+    path.write_text(",".join(f"q{joint}_{unit}" for joint in range(1, 7)) + f"\n{rows}\n")
+    assert bool(joints_in_doubt(path)) is (is_doubted and unit == "deg")
+    assert not joints_in_doubt("rectangle")
