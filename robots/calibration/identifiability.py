@@ -16,7 +16,7 @@ _CONFIGURATIONS = 200  # random ones; 24 would do for 48 columns, the rest makes
 # that is added where axes miss each other by 0.1 mm, as in files made from drawings: it lies on columns that
 # follow, or no measurement shows it, and of an error of 6 mm less than a micrometre is lost.
 _INDEPENDENT = 1e-4
-_NEGLIGIBLE = 1e-9  # a coefficient below this is rounding
+_NEGLIGIBLE = 1e-9  # a coefficient below this is rounding, and so is a column, as a share of the longest
 
 
 @dataclass(frozen=True)
@@ -83,12 +83,14 @@ def identifiable_parameters(robot: RobotModel, position_only: bool = False) -> I
     names = parameter_names(robot)
     basis = np.empty((len(stacked), 0))
     independent, dependent = [], []
+    rounding = _NEGLIGIBLE * float(np.linalg.norm(stacked, axis=0).max())
     for index, column in enumerate(stacked.T):
         size = float(np.linalg.norm(column))
         residual = column.copy()
         for _ in range(2):  # once more removes what rounding left of the first projection
             residual -= basis @ (basis.T @ residual)
-        share = float(np.linalg.norm(residual)) / size if size > 0.0 else 0.0
+        # A tool on axis 6 does not move with it, but for the last digits of a column of sines.
+        share = float(np.linalg.norm(residual)) / size if size > rounding else 0.0
         if share >= _INDEPENDENT:
             independent.append(index)
             basis = np.column_stack([basis, residual / np.linalg.norm(residual)])
@@ -155,7 +157,9 @@ def completeness(robot: RobotModel, position_only: bool = False) -> Completeness
     theirs = theirs.reshape(-1, NUM_PARAMETERS)
     every = complete.forward_and_regressor(q, np.zeros(len(complete)))[1][:, rows]
     every = every.reshape(-1, len(complete)) * parameter_sizes(complete.names)
-    U, s, _ = np.linalg.svd(theirs / np.maximum(np.linalg.norm(theirs, axis=0), 1e-300), full_matrices=False)
+    sizes = np.linalg.norm(theirs, axis=0)
+    seen = sizes > _NEGLIGIBLE * sizes.max()
+    U, s, _ = np.linalg.svd(theirs[:, seen] / sizes[seen], full_matrices=False)
     basis = U[:, s > TOLERANCE * s[0]]
     rest = every - basis @ (basis.T @ every)
     rest -= basis @ (basis.T @ rest)
