@@ -37,6 +37,10 @@ _JUMP = 0.6  # rad between two of them: another branch
 _MARGIN = np.deg2rad(3.0)  # from the limits of the joints
 _SPEED = 0.4  # share of the largest joint speeds: a quick comparison is twice as fast
 _DEXTERITY = 0.25  # on the path, over that of the best position
+# Of the length of the arm, by which poses may be moved away where it is stretched most: robots differ from
+# their drawings by centimetres at the tool
+_REACH, _STEPS, _WEAKEST = 0.05, 5, 8
+_ARM = 0.25  # m, by which a turn counts as a way
 
 
 def is_alike(robot: RobotModel, other: RobotModel) -> bool:
@@ -300,7 +304,21 @@ class _Trial:
             and self._admissible(q[::8]).all()
         )
         speed = step / np.diff(times)[:, None] / (_SPEED * robot.speed)
-        return (q[0], float(speed.max())) if is_free else None
+        return (q[0], float(speed.max())) if is_free and self._has_reach_left(X, q) else None
+
+    def _has_reach_left(self, X_WE: np.ndarray, q: np.ndarray) -> bool:
+        """Whether a robot that differs from this one gets to poses (n, 4, 4), too, where this one is at q."""
+        J = self._kinematics.jacobian(q)
+        J[:, :3] *= _ARM
+        U, weakness, _ = np.linalg.svd(J)
+        ways = U[:, 3:, -1] / np.maximum(np.linalg.norm(U[:, 3:, -1], axis=1), 1e-9)[:, None]
+        for k, side in product(np.argsort(weakness[:, -1], kind="stable")[:_WEAKEST], (1.0, -1.0)):
+            away = np.repeat(X_WE[k : k + 1], _STEPS, axis=0)
+            steps = side * _REACH * arm_length(self._robot) / _STEPS * np.arange(1, _STEPS + 1)
+            away[:, :3, 3] += steps[:, None] * ways[k]
+            if self._followed(away, q[k]) is None:
+                return False
+        return True
 
     def _followed(self, X_WE: np.ndarray, q: np.ndarray) -> np.ndarray | None:
         """Joint positions along poses (n, 4, 4) from a configuration on, (n, 6); None if it ends or jumps."""

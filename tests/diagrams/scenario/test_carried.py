@@ -45,6 +45,20 @@ def test_the_path_is_followed_on_one_branch_within_limits_and_speeds(name: str):
     assert scenario.station.payload == pytest.approx(robot.payload.largest_mass, rel=1e-3)
 
 
+@pytest.mark.parametrize("name", ["tx2_90", "irb140"])
+def test_a_robot_that_is_off_by_centimetres_reaches_the_path_as_well(name: str):
+    """By 4 % of the length of its arm, in whatever direction; a TX2-90 had 30 mm left."""
+    robot = load_robot(name)
+    scenario, _ = carried_over(load_scenario("everything"), IRB1200, robot)
+    X = poses(scenario)[1][::5]
+    ways = np.random.default_rng(0).standard_normal((24, 3))
+    for way in 0.04 * arm_length(robot) * ways / np.linalg.norm(ways, axis=1)[:, None]:
+        moved = X.copy()
+        moved[:, :3, 3] += way
+        q = inverse_kinematics(robot).along(moved, np.deg2rad(scenario.home_deg))
+        assert np.abs(np.diff(q, axis=0)).max() < 1.0
+
+
 def test_slow_joints_get_a_slower_path_unless_its_speed_is_said():
     """A Kinova whose joints turn by 36 degrees a second."""
     robot, scenario = robot_of("kinova.urdf"), load_scenario("misaligned")
