@@ -194,7 +194,9 @@ class MotorLearning:
         return self.drives.take_gains(memory.drives)
 
     def _asks_for_gains(self, memory: SimpleNamespace) -> bool:
-        return self.drives.finds_gains and memory.gains.looks[0] == memory.gains.taken[0]
+        if not (self.drives.finds_gains and math.isfinite(memory.shown_at[0])):  # or no probe shows them
+            return False
+        return bool(memory.gains.looks[0] == memory.gains.taken[0])
 
     def _learn_drives(self, memory: SimpleNamespace, instant: float, actual: np.ndarray) -> None:
         """Learns from the instant that has just passed."""
