@@ -239,6 +239,8 @@ class LinkSession(Generic[Report]):
             report, _MANY_CONFIRMATIONS if is_late else _CONFIRMATIONS
         ):
             self._begin()
+            # Where a robot jumped to, what was safe before is a long way off.
+            self._safe = self.codec.at(report) if report.is_ready else None
             return True
         if is_late:
             self.counters.late += 1

@@ -144,6 +144,21 @@ def test_after_a_stop_an_old_command_is_never_replayed():
     np.testing.assert_allclose(command.position, here)
 
 
+def test_nor_after_joints_have_jumped():
+    """The robot is another one, or stands elsewhere: what was safe before would be a way of 20 degrees."""
+    rig = Rig()
+    rig.hear(report(1))
+    rig.session.reply(Mode.JOINT_SPEED, HOLD, rig.now)
+    there = np.full(6, np.deg2rad(20.0))
+    epoch = rig.session.epoch
+    heard = [rig.hear(report(number, there)) for number in range(2, 8)]
+    assert heard[-1] is not None
+    assert rig.session.epoch == epoch + 1
+    answer = rig.session.reply(Mode.JOINT_SPEED, Command(np.full(6, np.nan), np.zeros(6)), rig.now)
+    _, command = decode_command(answer)
+    assert command.position == pytest.approx(there, abs=1e-6)
+
+
 @settings(max_examples=300, deadline=None)
 @given(data=st.data())
 def test_random_and_mutated_datagrams_change_nothing(data):
