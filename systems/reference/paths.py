@@ -68,8 +68,8 @@ def make_path(config: ReferenceConfig) -> CartesianPath:
     if config.timing not in TIMINGS:
         raise ValueError(f"reference: timing must be one of {', '.join(TIMINGS)}, got '{config.timing}'")
     shape = config.path
-    if not isinstance(shape, Shape):
-        kinds = ", ".join(each.__name__ for each in get_args(Shape))
+    if isinstance(shape, type) or not (hasattr(shape, "segments") or isinstance(shape, Planned)):
+        kinds = ", ".join(each.__name__ for each in get_args(Shape))  # or one of one's own
         raise ValueError(f"reference: path must be a {kinds} of systems.reference.shapes, got {shape!r}")
     if isinstance(shape, Planned):
         path: CartesianPath = PlannedPath(shape.motion(), config.settle, config.dwell, config.laps)
