@@ -81,7 +81,7 @@ def _allowed(entry: Field, hint: Any) -> str:
         return ", ".join(name for name in declared.choices() if name)
     limits = str(declared.limits)
     if limits != "finite":
-        return limits
+        return f"group, each {limits}" if get_origin(hint) is dict else limits
     if get_origin(hint) in (Union, UnionType):
         hint = next(each for each in get_args(hint) if each is not NoneType)
     names = {bool: "true or false", str: "text", int: "whole number", float: "number", np.ndarray: "numbers"}
