@@ -14,7 +14,7 @@ from systems.estimation.kernels.plan import follow
 # in that the sign of a measured speed is not known
 _SHARP_WIDTH, _THIRD_WIDTH = 0.02, 0.3
 _STILL = 0.1  # of that width, below which a motor may hang in its friction by plan
-_STUCK = 0.3  # likewise as encoders show, while it should move
+_STUCK = 0.3  # likewise as encoders show, whatever is planned
 _FORGOTTEN = 0.1  # s, in which what it was off by then has fallen to a third
 MATCHED = 0.1  # s, over which variances follow what the model leaves of following errors
 _WINDS = 0.5  # s, longer at rest than that, steps of an encoder may be taken for it

@@ -8,7 +8,7 @@ import math
 import numpy as np
 
 from robots.compiled import compiled
-from robots.kinematics.kernels import robust_solve, solve
+from robots.kinematics.kernels import robust_solve
 from systems.estimation.kernels.poses import error
 
 _SMALLEST_COSINE = math.cos(math.radians(60.0))  # L is singular at 90 degrees
@@ -84,13 +84,21 @@ def follow_path(X_WD, V_WD, X_WE, J):
 @compiled
 def closeness(J):
     """How close to a singularity joints are: from 0, outside `NEARLY_SINGULAR`, to 1 in it."""
-    square = 0.0
+    # All singular values are larger if J J^T - e^2 I is positive definite, as its Cholesky factor says.
+    L, is_outside = np.zeros((6, 6)), True
     for i in range(6):
-        for j in range(6):
-            square += J[i, j] ** 2
-    # The other five singular values are at most equal shares of all squares: mostly that is enough to know.
-    determinant = abs(solve(J.copy(), np.zeros((6, 1))))
-    if determinant > NEARLY_SINGULAR * (0.2 * square) ** 2.5:
+        for j in range(i + 1):
+            total = -(NEARLY_SINGULAR**2) if i == j else 0.0
+            for k in range(6):
+                total += J[i, k] * J[j, k]
+            for k in range(j):
+                total -= L[i, k] * L[j, k]
+            if i == j:
+                is_outside = is_outside and total > 0.0
+                L[i, i] = math.sqrt(max(total, 1e-12))
+            else:
+                L[i, j] = total / L[j, j]
+    if is_outside:
         return 0.0
     return max(0.0, 1.0 - np.linalg.svd(J)[1][5] / NEARLY_SINGULAR)
 

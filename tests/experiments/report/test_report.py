@@ -112,18 +112,20 @@ def test_the_report_is_small_and_asks_the_network_for_nothing(report):
     assert "</script><script>document.title" not in html
 
 
+NUMBERS = {
+    "max_norm_mm": 2.0,
+    "rms_norm_mm": 1.0,
+    "max_angle_deg": 0.5,
+    "settling_s": None,
+    "static_mm": [0.003, 0.004, 0.0],
+    "static_deg": [0.0, 0.0, 0.03],
+}
+
+
 def test_the_verdict_names_the_best_law_and_the_baseline():
-    numbers = {
-        "max_norm_mm": 2.0,
-        "rms_norm_mm": 1.0,
-        "max_angle_deg": 0.5,
-        "settling_s": None,
-        "static_mm": [0.003, 0.004, 0.0],
-        "static_deg": [0.0, 0.0, 0.03],
-    }
-    worse = dict(numbers, max_norm_mm=25.0, static_mm=[0.0, 3.0, 4.0])
+    worse = dict(NUMBERS, max_norm_mm=25.0, static_mm=[0.0, 3.0, 4.0])
     text = verdict(
-        {"runs": {"open_loop": {"true": worse}, "pbvs": {"true": numbers}, "numerical_ik": {"true": worse}}}
+        {"runs": {"open_loop": {"true": worse}, "pbvs": {"true": NUMBERS}, "numerical_ik": {"true": worse}}}
     )
     assert text.startswith("PBVS keeps the true tip within 2.00 mm and 0.50° of the wanted path")
     assert "comes to rest 0.005 mm and 0.03° from it" in text
@@ -132,16 +134,8 @@ def test_the_verdict_names_the_best_law_and_the_baseline():
 
 def test_the_verdict_says_what_was_not_seen():
     """A run on a station that ended early, and one without a camera, had dashes in place of numbers."""
-    whole = {
-        "max_norm_mm": 2.0,
-        "rms_norm_mm": 1.0,
-        "max_angle_deg": 0.5,
-        "settling_s": None,
-        "static_mm": [0.003, 0.004, 0.0],
-        "static_deg": [0.0, 0.0, 0.03],
-    }
-    unseen = dict.fromkeys(whole) | {"static_mm": [None] * 3, "static_deg": [None] * 3}
-    early = whole | {"max_norm_mm": 0.1, "static_mm": [None] * 3, "static_deg": [None] * 3}
+    unseen = dict.fromkeys(NUMBERS) | {"static_mm": [None] * 3, "static_deg": [None] * 3}
+    early = NUMBERS | {"max_norm_mm": 0.1, "static_mm": [None] * 3, "static_deg": [None] * 3}
 
     def said(**measured: dict) -> str:
         return verdict({"runs": {law: {"true": unseen, "measured": run} for law, run in measured.items()}})
@@ -154,7 +148,7 @@ def test_the_verdict_says_what_was_not_seen():
         "seen at rest."
     )
     # Who has not run its path to the end has not kept nearest to it.
-    text = said(open_loop=unseen, pbvs=early, numerical_ik=whole)
+    text = said(open_loop=unseen, pbvs=early, numerical_ik=NUMBERS)
     assert text.startswith("Numerical IK keeps the tip, as the camera sees it, within 2.00 mm")
     assert "–" not in text
 

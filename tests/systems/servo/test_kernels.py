@@ -1,5 +1,6 @@
 """Compiled functions of laws and guard: no tick waits for the compiler."""
 
+import numpy as np
 import pytest
 
 from diagrams.runs.simulation import Experiment
@@ -22,3 +23,14 @@ def test_everything_is_compiled_before_the_first_tick(law: str):
     assert before
     experiment.advance(0.02)
     assert compiled() == before
+
+
+def test_how_close_a_jacobian_is_to_a_singularity_goes_by_its_smallest_singular_value():
+    """With five other values of any size, on both sides of the bound."""
+    rng = np.random.default_rng(0)
+    for smallest in kernels.NEARLY_SINGULAR * np.array([0.0, 0.3, 0.999, 1.001, 3.0]):
+        for _ in range(50):
+            U, _, Vt = np.linalg.svd(rng.normal(size=(6, 6)))
+            J = U @ np.diag([*(smallest + rng.exponential(size=5)), smallest]) @ Vt
+            wanted = max(0.0, 1.0 - smallest / kernels.NEARLY_SINGULAR)
+            assert abs(kernels.closeness(J) - wanted) < 1e-12
