@@ -4,11 +4,14 @@ import hashlib
 import importlib
 import importlib.util
 import sys
+import traceback
 from collections.abc import Iterator, Mapping
 from pathlib import Path
 from types import ModuleType
 
 from robots.configuration.suggestion import did_you_mean
+
+_OWN_FILES: dict[str, str] = {}  # those that were imported here, by their path the name of the module
 
 
 class OwnClassError(RuntimeError):
@@ -65,6 +68,20 @@ class NamedClasses(Mapping[str, type]):
         return found
 
 
+def place_in_own_file(error: BaseException) -> str | None:
+    """Where in a file of one's own an error arose: ``law.py, line 5, in step: KeyError: 'gain'``, one line.
+
+    None if no such file had a part in it: then it is a defect of truetip, and its traceback is wanted.
+    """
+    own = {file for file, name in _OWN_FILES.items() if name in sys.modules}
+    for frame in reversed(traceback.extract_tb(error.__traceback__)):
+        if frame.filename in own:
+            what = f"{type(error).__name__}: {error}".removesuffix(": ")
+            place = f"{Path(frame.filename).name}, line {frame.lineno}, in {frame.name}"
+            return f"{place}: {' '.join(what.split())}"
+    return None
+
+
 def _classes_in(file: str, kind: str) -> list[str]:
     module = _module_of(file, kind)
     return [name for name, each in vars(module).items() if isinstance(each, type)]
@@ -84,6 +101,7 @@ def _module_of(file: str, kind: str) -> ModuleType:
         raise ValueError(f"{kind}: {file} is no Python file")
     module = importlib.util.module_from_spec(spec)
     sys.modules[name] = module
+    _OWN_FILES[str(path)] = name
     try:
         spec.loader.exec_module(module)
     except (Exception, SystemExit) as error:  # whatever the file of somebody else does when it is imported

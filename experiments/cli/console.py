@@ -16,6 +16,7 @@ from rich.table import Table
 from experiments.cli.command_table import option_with, staying
 from experiments.cli.ending import exit_code
 from experiments.cli.workers import SimulationError
+from systems.named_classes import place_in_own_file
 
 BAD_INPUT, BROKEN_OFF = 2, 1  # exit codes
 _NARROWEST = 12  # characters of a text that a line of a table has at least
@@ -35,6 +36,10 @@ def refusing(*refusals: type[Exception]) -> Iterator[None]:
         kept = [str(file) for file in staying()]
         what = f"; kept: {', '.join(kept)}" if kept else ", nothing was written"
         fail(f"interrupted{what}", exit_code(error))
+    except Exception as error:
+        if (place := place_in_own_file(error)) is None:
+            raise
+        fail(place, BAD_INPUT)
 
 
 def _plain(error: Exception) -> str:

@@ -9,6 +9,7 @@ from diagrams.runs.simulation import run
 from diagrams.scenario.scenario import Scenario
 from experiments.cli.workers import Executor, LocalProcesses, Progress, SimulationError, in_order
 from robots.description.model import RobotModel
+from systems.named_classes import OwnClassError, place_in_own_file
 from systems.servo import LAWS
 from systems.servo.contract import law_traits
 
@@ -65,12 +66,18 @@ def simulating(law: str, seed: int) -> Iterator[None]:
     """Says which run it was, if the simulation in this block breaks off.
 
     Raises:
-        SimulationError: in place of Drake's RuntimeError; one line.
+        SimulationError: in place of Drake's RuntimeError, or of whatever a file of one's own raises; one
+            line.
     """
     try:
         yield
-    except RuntimeError as error:
-        raise SimulationError(f"law {law}, seed {seed}: {' '.join(str(error).split())}") from error
+    except OwnClassError as error:
+        raise SimulationError(f"law {law}, seed {seed}: {error}") from error
+    except Exception as error:
+        place = place_in_own_file(error)
+        if place is None and not isinstance(error, RuntimeError):
+            raise
+        raise SimulationError(f"law {law}, seed {seed}: {place or ' '.join(str(error).split())}") from error
 
 
 def run_job(job: RunJob, progress: Progress) -> RunLog:

@@ -46,6 +46,7 @@ class LawInput(NamedTuple):
     measured: tuple[np.ndarray, np.ndarray] | None
     acts_at: float = math.nan  # s, time on the path when the command is believed to act
     exposed_at: float = math.nan  # s, time on the path at that exposure
+    is_new: bool = True  # whether no tick before had that exposure
 
 
 class LawOutput(NamedTuple):
@@ -172,7 +173,8 @@ class ServoLaw(LeafSystem):
         wanted = ahead.moment(time + self._preview)
         acts_at = ahead.path_time(time + self._acts_after)
         exposed_at = math.nan if measured is None else ahead.path_time(sample.time)
-        moment = LawInput(wanted.X_WE, wanted.V_WE, joints.position, measured, acts_at, exposed_at)
+        seen = measured, acts_at, exposed_at, arrived
+        moment = LawInput(wanted.X_WE, wanted.V_WE, joints.position, *seen)
         memory = state.value(_MEMORY).copy()
         if self.memory_size and math.isnan(memory[0]):
             memory = self.initial_state(moment)

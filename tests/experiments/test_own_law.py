@@ -183,6 +183,21 @@ def test_a_result_of_the_wrong_size_is_named(my_law: str, right: str, wrong: str
         Experiment(load_scenario("misaligned"), my_law).advance(until=0.1)
 
 
+@pytest.mark.parametrize("command", ["run", "compare"])
+@pytest.mark.parametrize(("at", "method"), [("shift, rate", "step"), ("here, _", "initial_state")])
+def test_an_exception_of_it_is_one_line_with_its_place(my_law: str, at: str, method: str, command: str):
+    """Its author looks for the line of his own file, not for ours."""
+    path = Path(my_law.rpartition(":")[0])
+    lines = printed().splitlines()
+    number = next(n for n, line in enumerate(lines) if line.strip().startswith(at))
+    lines[number] = "        {}['gain']"
+    path.write_text("\n".join(lines))
+    told = truetip(command, f"--law{'s' if command == 'compare' else ''}={my_law}", *SHORT)
+    assert told.exit_code == 1
+    assert f"{path.name}, line {number + 1}, in {method}: KeyError: 'gain'" in told.stderr
+    assert "Traceback" not in told.stderr
+
+
 @pytest.mark.real_time
 @pytest.mark.slow
 def test_a_wrong_result_is_refused_before_a_station_is_asked_for(my_law: str, tmp_path: Path):
