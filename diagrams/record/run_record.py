@@ -44,17 +44,21 @@ class RunRecord:
         """Opens the file.
 
         Args:
-            path: of the file, which is replaced.
+            path: of the file. One that is there already is replaced with the first message: a run that never
+                begins leaves an earlier record as it is.
             scenario: its text, for the attachment.
             viewer: is told of every message too.
 
         Raises:
             OSError: if the file cannot be written.
         """
-        self.path = Path(path)
+        self.path = Path(path).resolve()
         self.problem = ""  # why nothing is written any more, in words
         self._viewer = viewer
-        self._file = self.path.open("wb")
+        is_file = self.path.is_file() or not self.path.exists()  # and no device
+        # Its name until there is a message.
+        self._begun = self.path.with_name(f".{self.path.name}-begun") if is_file else self.path
+        self._file = self._begun.open("wb")
         self._writer = Writer(self._file, compression=CompressionType.LZ4)
         self._writer.start(profile="", library="truetip")
         self._writer.add_attachment(0, 0, SCENARIO, "application/yaml", scenario.encode())
@@ -69,6 +73,8 @@ class RunRecord:
         if self.problem:
             return
         try:
+            if not self._counts and self._begun != self.path:
+                self._begun.replace(self.path)
             channel = self._channels.get(topic) or self._register(topic)
             self._counts[topic] += 1
             stamp = max(0, round(1e9 * at))
@@ -95,6 +101,9 @@ class RunRecord:
         finally:
             with contextlib.suppress(OSError):  # what is left in the buffer of a full disk
                 self._file.close()
+            with contextlib.suppress(FileNotFoundError):  # where a message has given it its name
+                if self._begun != self.path:
+                    self._begun.unlink() if self.path.exists() else self._begun.replace(self.path)
 
     def _register(self, topic: str) -> int:
         schema = SCHEMAS[topic]

@@ -43,6 +43,15 @@ def test_what_is_read_is_what_was_logged(log: RunLog, tmp_path):
     assert found.topics[EVENT].columns["kind"][0, 0] == log.guard_events[0].kind
 
 
+def test_a_run_that_never_begins_leaves_the_record_of_an_earlier_one(log: RunLog, tmp_path):
+    path = tmp_path / "run.mcap"
+    write_log(path, "", log)
+    earlier = path.read_bytes()
+    RunRecord(path, "").close(ended="nobody answers")
+    assert path.read_bytes() == earlier
+    assert [file.name for file in tmp_path.iterdir()] == ["run.mcap"]
+
+
 def test_other_readers_find_topics_and_schemas(log: RunLog, tmp_path):
     path = tmp_path / "run.mcap"
     write_log(path, "", log)
