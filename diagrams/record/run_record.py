@@ -52,7 +52,7 @@ class RunRecord:
         Raises:
             OSError: if the file cannot be written.
         """
-        self.path = Path(path).resolve()
+        self.path = Path(path)
         self.problem = ""  # why nothing is written any more, in words
         self._viewer = viewer
         is_file = self.path.is_file() or not self.path.exists()  # and no device
