@@ -2,7 +2,7 @@
 
 from pydrake.common import RandomDistribution, RandomGenerator
 from pydrake.multibody.plant import MultibodyPlant
-from pydrake.systems.framework import Context, DiagramBuilder
+from pydrake.systems.framework import Context, DiagramBuilder, OutputPort
 from pydrake.systems.primitives import RandomSource
 
 from systems.cell.inertial_sensors import BLOCK, InertialLoggerConfig, InertialSensors
@@ -10,8 +10,8 @@ from systems.cell.inertial_sensors import BLOCK, InertialLoggerConfig, InertialS
 
 def add_inertial_sensors(
     builder: DiagramBuilder, plant: MultibodyPlant, loggers: list[InertialLoggerConfig]
-) -> list[RandomSource]:
-    """Adds the loggers and exports their samples as ``inertial_sample_1``, ``inertial_sample_2``, ...
+) -> tuple[list[RandomSource], dict[str, OutputPort]]:
+    """Adds the loggers.
 
     Args:
         builder: of the diagram that holds the plant.
@@ -19,12 +19,13 @@ def add_inertial_sensors(
         loggers: in the order of the ports.
 
     Returns:
-        The sources of their noise, to be seeded by `seed_noise`.
+        The sources of their noise, to be seeded by `seed_noise`, and the ports of their samples:
+        ``inertial_sample_1``, ``inertial_sample_2``, ...
 
     Raises:
         ValueError: if a logger refuses its configuration.
     """
-    sources = []
+    sources, samples = [], {}
     for number, config in enumerate(loggers, 1):
         logger = builder.AddNamedSystem(f"inertial_sensors_{number}", InertialSensors(plant, config))
         for name, port in (
@@ -37,9 +38,9 @@ def add_inertial_sensors(
         source = RandomSource(RandomDistribution.kGaussian, noise.size(), BLOCK * config.true_period)
         builder.AddNamedSystem(f"inertial_noise_{number}", source)
         builder.Connect(source.get_output_port(), noise)
-        builder.ExportOutput(logger.GetOutputPort("sample"), f"inertial_sample_{number}")
+        samples[f"inertial_sample_{number}"] = logger.GetOutputPort("sample")
         sources.append(source)
-    return sources
+    return sources, samples
 
 
 def seed_noise(sources: list[RandomSource], root_context: Context, seed: int) -> None:

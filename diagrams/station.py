@@ -1,11 +1,12 @@
 """The robot cell as a diagram with the ports of the contract."""
 
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from pydrake.common import RandomDistribution, RandomGenerator
 from pydrake.multibody.plant import MultibodyPlant
-from pydrake.systems.framework import Context, Diagram, DiagramBuilder, OutputPort
+from pydrake.systems.framework import Context, Diagram, DiagramBuilder, InputPort, OutputPort
 from pydrake.systems.primitives import (
     RandomSource,
 )
@@ -51,10 +52,13 @@ class StationRecord:
     link_position: np.ndarray  # (n, 6) rad, behind the elastic gears
 
 
-class SimulatedStation(Diagram):
-    """An elastic robot with its drives and a camera.
+class Station:
+    """An elastic robot with its drives and a camera, put into a diagram beside what commands it.
 
-    Ports, the same as those of a real cell:
+    In a diagram of its own, see `SimulatedStation`, it would be slower: at every step the integrator goes
+    through all diagrams around it to each number of the state.
+
+    Ports, the same as those of a real cell, in ``inputs`` and ``outputs`` by name:
         in  ``position_command``  vector 6 in rad
         in  ``velocity_command``  vector 6 in rad/s
         out ``joint_sample``      JointSample
@@ -80,6 +84,7 @@ class SimulatedStation(Diagram):
 
     def __init__(
         self,
+        builder: DiagramBuilder,
         robot: RobotModel,
         config: StationConfig,
         drive: str,
@@ -87,9 +92,10 @@ class SimulatedStation(Diagram):
         inertial: list[InertialLoggerConfig] | None = None,
         overview: OverviewCamera | None = None,
     ) -> None:
-        """Builds the cell.
+        """Adds the parts of the cell.
 
         Args:
+            builder: of the diagram that they come into.
             robot: the nominal robot; the true one differs from it by ``config.errors``, ``config.variation``
                 and ``config.payload_centre_mm``.
             config: the station part of a scenario.
@@ -102,8 +108,8 @@ class SimulatedStation(Diagram):
         Raises:
             ValueError: if a part refuses its configuration.
         """
-        super().__init__()
-        builder = DiagramBuilder()
+        self.inputs: dict[str, InputPort] = {}
+        self.outputs: dict[str, OutputPort] = {}
         self._motion = None
         self._config, self._nominal = config, robot
         self._delay = _changing_delay(config)
@@ -128,12 +134,18 @@ class SimulatedStation(Diagram):
         self._add_joint_sensor(builder, _RUNAWAY * float(robot.speed.max()))
         self._noise = self._add_camera(builder, _camera(robot, config), config)
         self._image_noise = self._add_overview(builder, overview) if overview else None
-        self._inertial_noise = add_inertial_sensors(builder, self.plant, inertial or [])
-        builder.ExportOutput(self.plant.get_state_output_port(), "truth.state")
-        builder.ExportOutput(self._driven.motor_state, "truth.motor_state")
-        builder.ExportOutput(self._driven.motor_torque, "truth.motor_torque")
-        builder.BuildInto(self)
-        self.set_name("station")
+        self._inertial_noise, samples = add_inertial_sensors(builder, self.plant, inertial or [])
+        self.outputs |= samples
+        self.outputs |= {
+            "truth.state": self.plant.get_state_output_port(),
+            "truth.motor_state": self._driven.motor_state,
+            "truth.motor_torque": self._driven.motor_torque,
+        }
+
+    def read(self, root_context: Context, name: str) -> Any:
+        """What an output says now."""
+        port = self.outputs[name]
+        return port.Eval(port.get_system().GetMyContextFromRoot(root_context))
 
     @property
     def plant(self) -> MultibodyPlant:
@@ -156,7 +168,7 @@ class SimulatedStation(Diagram):
             if self._delay:
                 builder.Connect(self._delay.GetOutputPort(name), port)
                 port = self._delay.GetInputPort(name)
-            builder.ExportInput(port, name)
+            self.inputs[name] = port
 
     def _add_joint_sensor(self, builder: DiagramBuilder, runaway: float) -> None:
         motor_state = self._driven.measured_state
@@ -168,7 +180,7 @@ class SimulatedStation(Diagram):
         sensor = builder.AddNamedSystem("joint_sensor", JointSensor(runaway))
         builder.Connect(motor_state, sensor.GetInputPort("motor_state"))
         builder.Connect(self._driven.motor_torque, sensor.GetInputPort("motor_torque"))
-        builder.ExportOutput(sensor.GetOutputPort("joint_sample"), "joint_sample")
+        self.outputs["joint_sample"] = sensor.GetOutputPort("joint_sample")
 
     def _add_camera(
         self,
@@ -193,9 +205,9 @@ class SimulatedStation(Diagram):
         noise = RandomSource(RandomDistribution.kGaussian, port.size(), BLOCK * config.camera.period)
         builder.AddNamedSystem("noise", noise)
         builder.Connect(noise.get_output_port(), port)
-        builder.ExportOutput(camera.GetOutputPort("pose_sample"), "pose_sample")
-        builder.ExportOutput(tip.GetOutputPort("X_WE"), "truth.X_WE")
-        builder.ExportOutput(camera.GetOutputPort("exposure"), "truth.exposure")
+        self.outputs["pose_sample"] = camera.GetOutputPort("pose_sample")
+        self.outputs["truth.X_WE"] = tip.GetOutputPort("X_WE")
+        self.outputs["truth.exposure"] = camera.GetOutputPort("exposure")
         return noise
 
     def _add_overview(self, builder: DiagramBuilder, overview: OverviewCamera) -> RandomSource:
@@ -206,7 +218,7 @@ class SimulatedStation(Diagram):
         builder.AddNamedSystem("image_noise", noise)
         builder.Connect(noise.get_output_port(), port)
         builder.Connect(self._driven.motor_state, overview.GetInputPort("motor_state"))
-        builder.ExportOutput(overview.GetOutputPort("image_sample"), "image_sample")
+        self.outputs["image_sample"] = overview.GetOutputPort("image_sample")
         return noise
 
     def set_at_rest(self, root_context: Context, theta: np.ndarray, seed: int) -> None:
@@ -288,6 +300,24 @@ class SimulatedStation(Diagram):
             X_WE_true=X_WE_true,
             link_position=self.robot.link_positions(state),
         )
+
+
+class SimulatedStation(Station, Diagram):
+    """A station as a diagram of its own, which exports the ports."""
+
+    def __init__(self, *args: Any, **options: Any) -> None:
+        """Builds the cell. Arguments and errors are those of `Station`, without its builder."""
+        Diagram.__init__(self)
+        builder = DiagramBuilder()
+        Station.__init__(self, builder, *args, **options)
+        for name, port in self.inputs.items():
+            builder.ExportInput(port, name)
+        for name, port in self.outputs.items():
+            builder.ExportOutput(port, name)
+        builder.BuildInto(self)
+        self.set_name("station")
+        self.inputs = {name: self.GetInputPort(name) for name in self.inputs}
+        self.outputs = {name: self.GetOutputPort(name) for name in self.outputs}
 
 
 def _camera(robot: RobotModel, config: StationConfig) -> PoseCamera | MarkerCamera:

@@ -11,7 +11,7 @@ from scipy.spatial.transform import Rotation
 
 from diagrams.integration import Integration
 from diagrams.scenario.scenario import Scenario
-from diagrams.station import SimulatedStation
+from diagrams.station import Station
 from robots.calibration.measurements import Measurements
 from robots.description.model import RobotModel, load_robot
 from systems.reference.joint_mover import JointMover
@@ -69,11 +69,11 @@ class MeasurementRun:
         self._window = max(self._ticks(self._procedure.window), self._tick_at(needed) + 1)
         robot = plant or load_robot(scenario.robot)
         builder = DiagramBuilder()
-        self._station = builder.AddNamedSystem("station", SimulatedStation(robot, self._config, "cascade"))
+        self._station = Station(builder, robot, self._config, "cascade")
         mover = JointMover(self._procedure.speed_share * robot.speed)
         self._mover = builder.AddNamedSystem("mover", mover)
         for name in ("position_command", "velocity_command"):
-            builder.Connect(self._mover.GetOutputPort(name), self._station.GetInputPort(name))
+            builder.Connect(self._mover.GetOutputPort(name), self._station.inputs[name])
         self._diagram = builder.Build()
         self._start(np.zeros(len(robot.lower)), scenario.seed)
         rate = self._station.fastest_rate(self._context)
@@ -124,8 +124,7 @@ class MeasurementRun:
         )
 
     def _true_pose(self) -> np.ndarray:
-        context = self._station.GetMyContextFromRoot(self._context)
-        return self._station.GetOutputPort("truth.X_WE").Eval(context).GetAsMatrix4()
+        return self._station.read(self._context, "truth.X_WE").GetAsMatrix4()
 
     def _start(self, theta: np.ndarray, seed: int) -> None:
         # A simulator of its own for each run: an integrator remembers the steps that it has made.
@@ -171,9 +170,8 @@ class MeasurementRun:
         earliest = begin * self._config.period - self._config.camera.delay - 1e-9
         for tick in range(begin, begin + self._window):
             self._integration.advance(self._simulator, tick * self._config.period)
-            context = self._station.GetMyContextFromRoot(self._context)
-            joints.append(self._station.GetOutputPort("joint_sample").Eval(context))
-            pose: PoseSample = self._station.GetOutputPort("pose_sample").Eval(context)
+            joints.append(self._station.read(self._context, "joint_sample"))
+            pose: PoseSample = self._station.read(self._context, "pose_sample")
             if pose.valid and pose.time >= earliest:
                 poses[pose.time] = pose
         return joints, list(poses.values())

@@ -18,7 +18,7 @@ from diagrams.runs.measurement import MeasurementRun
 from diagrams.scenario.controller_model import controller_model
 from diagrams.scenario.scenario import Scenario, ScenarioError
 from diagrams.servo import Servo, calibrated, law_name, learnt, predicted_tip
-from diagrams.station import SimulatedStation
+from diagrams.station import SimulatedStation, Station
 from diagrams.watching import Watch, make_watch
 from robots.description.calibration import is_same_robot
 from robots.description.model import RobotModel, load_robot
@@ -74,6 +74,7 @@ class Experiment:
         seed: int | None = None,
         plant: RobotModel | None = None,
         watch: Watch | None = None,
+        is_nested: bool = False,
     ) -> None:
         """Builds the diagram and puts everything at rest at the start. Raises what `run` raises.
 
@@ -81,6 +82,8 @@ class Experiment:
             scenario, robot, seed, plant: as of `run`.
             law: a shipped law by name, ``FILE.py:CLASS``, a class, or any system with the ports of a law.
             watch: what watches for people; None for what the scenario says.
+            is_nested: whether the station is a diagram of its own, as one would draw it. It does the same,
+                but takes longer.
         """
         self.scenario, self.law = scenario, law_name(law)
         end = make_path(scenario.reference).duration
@@ -96,25 +99,21 @@ class Experiment:
         self.watch = watch
         standing = self._standing(robot, drawn)
         servo = Servo(robot, scenario, law, self.watch, standing)
-        self.station = builder.AddNamedSystem(
-            "station",
-            SimulatedStation(
-                drawn,
-                scenario.station,
-                servo.drive,
-                takes_torque=servo.has_torque,
-                overview=self.watch.camera if self.watch else None,
-            ),
+        overview = self.watch.camera if self.watch else None
+        parts = drawn, scenario.station, servo.drive, servo.has_torque, None, overview
+        self.station: Station = (
+            builder.AddNamedSystem("station", SimulatedStation(*parts))
+            if is_nested
+            else Station(builder, *parts)
         )
         self.servo = builder.AddNamedSystem("servo", servo)
-        for name in ("position_command", "velocity_command", "torque_feedforward"):
-            if self.station.HasInputPort(name):
-                builder.Connect(self.servo.GetOutputPort(name), self.station.GetInputPort(name))
+        for name, port in self.station.inputs.items():
+            builder.Connect(servo.GetOutputPort(name), port)
         for name in ("joint_sample", "pose_sample", *(("image_sample",) if self.watch else ())):
-            builder.Connect(self.station.GetOutputPort(name), self.servo.GetInputPort(name))
+            builder.Connect(self.station.outputs[name], servo.GetInputPort(name))
         shown = ("position_command", "velocity_command", "correction", "guard_status")
         ports = {name: self.servo.GetOutputPort(name) for name in shown}
-        ports |= {name: self.station.GetOutputPort(name) for name in self.station.LOGGED}
+        ports |= {name: self.station.outputs[name] for name in self.station.LOGGED}
         if self.servo.reference.is_slowed:
             ports["path_time"] = self.servo.GetOutputPort("path_time")
         if self.watch:

@@ -13,7 +13,7 @@ from diagrams.record.packed_log import PackedLog
 from diagrams.runs.simulation import start_position
 from diagrams.scenario.controller_model import controller_model
 from diagrams.scenario.scenario import Scenario
-from diagrams.station import SimulatedStation
+from diagrams.station import Station
 from robots.description.model import RobotModel
 from systems.link.protocols import VirtualController
 from systems.reference.paths import make_path
@@ -78,19 +78,18 @@ class VirtualCell:
         self.period = config.period
         self._camera, self._faults = config.camera, config.faults
         builder = DiagramBuilder()
-        self._station = builder.AddNamedSystem("station", SimulatedStation(robot, config, "cascade"))
-        ports = {name: self._station.GetOutputPort(name) for name in self._station.LOGGED}
+        self._station = Station(builder, robot, config, "cascade")
+        ports = {name: self._station.outputs[name] for name in self._station.LOGGED}
         self._log = PackedLog(builder, ports, config.period) if with_log else None
         self._simulator = Simulator(builder.Build())
         self._context = self._simulator.get_mutable_context()
-        self._station_context = self._station.GetMyContextFromRoot(self._context)
         start = start_position(controller_model(scenario, robot), scenario, make_path(scenario.reference))
         self._station.set_at_rest(self._context, start, scenario.seed)
         standing = np.full(len(start), np.nan)
-        inputs = self._station.GetMyMutableContextFromRoot(self._context)
+        inputs = (self._station.inputs[name] for name in ("position_command", "velocity_command"))
         self._inputs = [
-            self._station.GetInputPort(name).FixValue(inputs, standing)
-            for name in ("position_command", "velocity_command")
+            port.FixValue(port.get_system().GetMyMutableContextFromRoot(self._context), standing)
+            for port in inputs
         ]
         self._integration = Integration(
             scenario.integrator,
@@ -99,8 +98,6 @@ class VirtualCell:
             self._station.changes(),
         )
         self._integration.initialize(self._simulator)
-        self._joints = self._station.GetOutputPort("joint_sample")
-        self._poses = self._station.GetOutputPort("pose_sample")
         self._cycle = 0
         self._exposure = 0
         self.planned = start
@@ -118,7 +115,7 @@ class VirtualCell:
     @property
     def joints(self) -> JointSample:
         """What the joints say at `time`."""
-        sample: JointSample = self._joints.Eval(self._station_context)
+        sample: JointSample = self._station.read(self._context, "joint_sample")
         return replace(sample, position=sample.position + self._faults.joint_offset(self.time))
 
     def advance(self, controller: VirtualController) -> list[Exposure]:
@@ -130,7 +127,7 @@ class VirtualCell:
         while (published := self._exposure * self._camera.period + self._camera.delay) <= end:
             if published > self._context.get_time():
                 self._integration.advance(self._simulator, published)
-            exposures.append(Exposure(published, self._poses.Eval(self._station_context)))
+            exposures.append(Exposure(published, self._station.read(self._context, "pose_sample")))
             self._exposure += 1
         self._integration.advance(self._simulator, end)
         self.planned = self._station.planned_position(self._context)

@@ -40,7 +40,7 @@ def diagram_command(
     """Draw the diagram that is simulated."""
     with refusing(ValueError, OSError):
         prepared = prepare(scenario, option_settings(settings, law, None), robot)
-        experiment = Experiment(prepared.scenario, prepared.scenario.law, prepared.robot)
+        experiment = Experiment(prepared.scenario, prepared.scenario.law, prepared.robot, is_nested=True)
         with staged_file(out) as path:
             write_diagram(path, experiment.diagram, depth)
     Console().print(f"The diagram: {escape(str(out))}")

@@ -13,7 +13,7 @@ from scipy.integrate import trapezoid
 
 from diagrams.integration import Integration, IntegratorConfig
 from diagrams.scenario.scenario import StationConfig
-from diagrams.station import SimulatedStation
+from diagrams.station import Station
 from experiments.cli.workers import Progress
 from robots.description.model import NUM_JOINTS, RobotModel
 from systems.controller_model import ControllerModel
@@ -27,7 +27,7 @@ _AXES = 3  # that move
 _WRIST = 5  # the origin of this link is the point where axes 4, 5 and 6 meet
 _MAX_STEP = 2e-3  # s; the ringing of the best feedforward is then right to some percent
 
-Note = Callable[[DiagramBuilder, SimulatedStation], None]
+Note = Callable[[DiagramBuilder, Station], None]
 
 
 @dataclass(frozen=True)
@@ -95,7 +95,7 @@ class Trial:
 class WristWatch:
     """Notes how the wrist of a station accelerates at every step of the integrator."""
 
-    def __init__(self, station: SimulatedStation) -> None:
+    def __init__(self, station: Station) -> None:
         """Takes the station that is simulated."""
         self._plant = station.plant
         self._wrist = station.plant.GetBodyByName(f"link_{_WRIST}")
@@ -122,17 +122,17 @@ class WristWatch:
 
 def at_rest(
     robot: RobotModel, config: StationConfig, told: np.ndarray, note: Note | None = None
-) -> tuple[Simulator, SimulatedStation, Integration]:
+) -> tuple[Simulator, Station, Integration]:
     """A station that will be told commands (n, 3, 6), one row a tick, at rest where they begin.
 
     A note adds systems that log the station, before the diagram is built.
     """
     builder = DiagramBuilder()
-    station = builder.AddNamedSystem("station", SimulatedStation(robot, config, "cascade", takes_torque=True))
+    station = Station(builder, robot, config, "cascade", takes_torque=True)
     player = builder.AddNamedSystem("commands", CommandPlayer(told, config.period))
     for index in range(player.num_output_ports()):
         port = player.get_output_port(index)
-        builder.Connect(port, station.GetInputPort(port.get_name()))
+        builder.Connect(port, station.inputs[port.get_name()])
     if note:
         note(builder, station)
     simulator = Simulator(builder.Build())

@@ -11,7 +11,7 @@ import numpy as np
 from pydrake.systems.framework import DiagramBuilder
 from pydrake.systems.primitives import LogVectorOutput, VectorLogSink
 
-from diagrams.station import SimulatedStation
+from diagrams.station import Station
 from experiments.cli.workers import Progress
 from experiments.feedforward.trial import Trial
 from robots.description.model import NUM_JOINTS
@@ -55,9 +55,9 @@ def recorded(trial: Trial, seed: int) -> TorqueRecording:
     """What the drives report of a trial, with noise on their torques."""
     logs: list[VectorLogSink] = []
 
-    def note(builder: DiagramBuilder, station: SimulatedStation) -> None:
+    def note(builder: DiagramBuilder, station: Station) -> None:
         for name in ("truth.motor_state", "truth.motor_torque"):
-            logs.append(LogVectorOutput(station.GetOutputPort(name), builder, _LOG_STEP))
+            logs.append(LogVectorOutput(station.outputs[name], builder, _LOG_STEP))
 
     _, context = trial.simulated(note=note)
     motors, torque = (log.FindLog(context).data().T for log in logs)

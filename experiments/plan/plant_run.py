@@ -112,16 +112,16 @@ class PlantDriver:
         integration.advance(simulator, period * np.floor(begin / period))
         watch, rows, rings = WristWatch(station), [], False
         times = ticks[(ticks > begin - 0.5 * period) & (ticks <= stop + RINGING)]
-        of_plant = station.plant.GetMyContextFromRoot(simulator.get_context())
-        of_station = station.GetMyContextFromRoot(simulator.get_context())
+        context = simulator.get_context()
+        of_plant = station.plant.GetMyContextFromRoot(context)
         for time in times:
             if not rings and time > stop:
                 integration.advance(simulator, stop)
                 watch.begin(simulator)
                 rings = True
             integration.advance(simulator, time)
-            motors = station.GetOutputPort("truth.motor_state").Eval(of_station)[NUM_JOINTS:]
-            torque = station.GetOutputPort("truth.motor_torque").Eval(of_station)
+            motors = station.read(context, "truth.motor_state")[NUM_JOINTS:]
+            torque = station.read(context, "truth.motor_torque")
             gears = station.plant.get_actuation_input_port().Eval(of_plant)
             rows.append(np.array([motors, torque, gears]))
         demand = self._demand(np.array(rows), timing, times - settle)

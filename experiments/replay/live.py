@@ -70,11 +70,10 @@ class LiveView:
     def show(self) -> None:
         """Shows the experiment as it is now; stays there while it is paused."""
         context, station = self._experiment.context, self._experiment.station
-        of_station = station.GetMyContextFromRoot(context)
         now = context.get_time()
-        q = station.robot.link_positions(station.GetOutputPort("truth.state").Eval(of_station))
-        theta = station.GetOutputPort("truth.motor_state").Eval(of_station)[:NUM_JOINTS]
-        X_WE = station.GetOutputPort("truth.X_WE").Eval(of_station)
+        q = station.robot.link_positions(station.read(context, "truth.state"))
+        theta = station.read(context, "truth.motor_state")[:NUM_JOINTS]
+        X_WE = station.read(context, "truth.X_WE")
         X_WD = _rigid(self._experiment.path.sample(self._experiment.servo.path_time(context))[0])
         off = X_WE.translation() - X_WD.translation()
         self._controls.follow(now, 1e3 * float(np.linalg.norm(off)))

@@ -1,5 +1,6 @@
 """The port contract: what a station and a servo are, seen from outside, and what they may not share."""
 
+import numpy as np
 import pytest
 from pydrake.systems.framework import Diagram, InputPortIndex, OutputPortIndex, PortDataType
 
@@ -20,25 +21,30 @@ def outputs(diagram: Diagram) -> set[str]:
     return {diagram.get_output_port(OutputPortIndex(i)).get_name() for i in range(diagram.num_output_ports())}
 
 
+def station(experiment: Experiment) -> Diagram:
+    assert isinstance(experiment.station, Diagram)
+    return experiment.station
+
+
 @pytest.fixture(scope="module", params=["open_loop", *LAWS])
 def experiment(request) -> Experiment:
-    return Experiment(scenario("misaligned"), request.param)
+    return Experiment(scenario("misaligned"), request.param, is_nested=True)
 
 
 def test_a_simulated_station_has_the_ports_of_a_real_one_and_the_truth_beside_them(experiment: Experiment):
-    assert inputs(experiment.station) == COMMANDS
-    assert outputs(experiment.station) == SAMPLES | TRUTH
+    assert inputs(station(experiment)) == COMMANDS
+    assert outputs(station(experiment)) == SAMPLES | TRUTH
 
 
 def test_a_servo_is_the_mirror_image_and_shows_what_one_wants_to_plot(experiment: Experiment):
-    assert inputs(experiment.servo) == outputs(experiment.station) - TRUTH
-    assert outputs(experiment.servo) == inputs(experiment.station) | TO_LOOK_AT
+    assert inputs(experiment.servo) == outputs(station(experiment)) - TRUTH
+    assert outputs(experiment.servo) == inputs(station(experiment)) | TO_LOOK_AT
 
 
 def test_commands_are_six_numbers_on_both_sides(experiment: Experiment):
     for name in COMMANDS:
         port = experiment.servo.GetOutputPort(name)
-        other = experiment.station.GetInputPort(name)
+        other = station(experiment).GetInputPort(name)
         assert (port.get_data_type(), port.size()) == (PortDataType.kVectorValued, 6)
         assert (other.get_data_type(), other.size()) == (PortDataType.kVectorValued, 6)
 
@@ -65,3 +71,24 @@ def test_the_station_is_fed_by_the_servo_alone(experiment: Experiment):
     ]
     assert len(sources) == len(COMMANDS)
     assert all(system is experiment.servo for system in sources)
+
+
+@pytest.mark.parametrize("law", LAWS)
+def test_a_run_is_the_same_with_the_station_in_a_diagram_of_its_own_and_without_one(law: str):
+    """To the last bit: what is wired is the same, the integrator only reaches it sooner."""
+    own, flat = (Experiment(scenario("misaligned"), law, is_nested=is_nested) for is_nested in (True, False))
+    assert own.station.inputs.keys() == flat.station.inputs.keys()
+    assert own.station.outputs.keys() == flat.station.outputs.keys()
+    for each in (own, flat):
+        each.advance(0.4)
+    for name in ("X_WE_true", "position_command", "joint_effort", "X_WE_measured"):
+        np.testing.assert_array_equal(getattr(own.log(), name), getattr(flat.log(), name))
+
+
+def test_between_the_parts_of_a_station_no_truth_leads_to_the_servo_either():
+    experiment = Experiment(scenario("misaligned"), "pbvs")
+    allowed = {id(experiment.station.outputs[name].get_system()) for name in SAMPLES}
+    wires = experiment.diagram.connection_map().items()
+    fed = [source for sink, source in wires if sink[0] is experiment.servo]
+    assert {id(system) for system, _ in fed} == allowed
+    assert {system.get_output_port(port).get_name() for system, port in fed} == SAMPLES

@@ -16,20 +16,15 @@ START = ["reference.settle=0", "station.elasticity=rigid"]
 def test_a_pose_arrives_a_camera_delay_after_its_exposure(delay: float):
     """The stamp says when the tip was there, and the sample is out at stamp + delay, not sooner or later."""
     experiment = Experiment(scenario("nominal", *QUIET, *START, f"station.camera.delay={delay}"), "open_loop")
-    port, tip = (
-        experiment.station.GetOutputPort("pose_sample"),
-        experiment.station.GetOutputPort("truth.X_WE"),
-    )
-    context = experiment.station.GetMyContextFromRoot(experiment.context)
     truth, seen, times = {}, [], np.arange(1, 101) * 1e-3
     for time in times:
         experiment.advance(time)
         tick = round(time / PERIOD)
         if abs(time - tick * PERIOD) < 1e-9:
-            truth[tick] = tip.Eval(context).translation().copy()
+            truth[tick] = experiment.station.read(experiment.context, "truth.X_WE").translation().copy()
         # What a reader just after this instant would find.
         experiment.simulator.AdvanceTo(time + 1e-5)
-        seen.append(port.Eval(context))
+        seen.append(experiment.station.read(experiment.context, "pose_sample"))
     for time, sample in zip(times, seen, strict=True):
         assert isinstance(sample, PoseSample)
         expected = np.floor((time + 1e-5 - delay) / PERIOD) * PERIOD

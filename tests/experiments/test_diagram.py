@@ -20,7 +20,7 @@ TEXT = "{http://www.w3.org/2000/svg}text"
 
 @pytest.fixture(scope="module")
 def diagram() -> Diagram:
-    return Experiment(load_scenario("misaligned"), "pbvs").diagram
+    return Experiment(load_scenario("misaligned"), "pbvs", is_nested=True).diagram
 
 
 def pages(page: Layout) -> list[Layout]:

@@ -132,8 +132,8 @@ def test_torque_has_a_port_on_both_sides_only_where_it_is_fed_forward():
     for kind in ("none", "rigid"):
         scenario = load_scenario("nominal", [*SETTINGS, f"servo.feedforward.kind={kind}"])
         experiment = Experiment(scenario, "open_loop")
-        for diagram, has in ((experiment.servo, "HasOutputPort"), (experiment.station, "HasInputPort")):
-            assert getattr(diagram, has)("torque_feedforward") == (kind != "none")
+        assert experiment.servo.HasOutputPort("torque_feedforward") == (kind != "none")
+        assert ("torque_feedforward" in experiment.station.inputs) == (kind != "none")
 
 
 @pytest.mark.parametrize("dead_time", [pytest.param(0.0, marks=pytest.mark.slow), 0.002, 0.02])

@@ -52,10 +52,10 @@ def test_the_tip_moves_as_under_a_pose_camera_without_noise(kind: str):
 def test_the_arm_hides_markers_of_the_true_station():
     """The camera hears of the motors; without them it would see through the arm."""
     scenario = load_scenario("misaligned", ["station.camera.kind=features"])
-    station = Experiment(scenario, "open_loop").station
-    camera = station.GetSubsystemByName("camera")
-    motors = station.GetSubsystemByName("motor_signals")
-    wires = station.connection_map()
+    diagram = Experiment(scenario, "open_loop").diagram
+    camera = diagram.GetSubsystemByName("camera")
+    motors = diagram.GetSubsystemByName("motor_signals")
+    wires = diagram.connection_map()
     assert wires[camera, camera.GetInputPort("motor_state").get_index()] == (motors, 0)
 
 

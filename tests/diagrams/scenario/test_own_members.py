@@ -57,8 +57,6 @@ def test_a_path_and_a_camera_of_ones_own_are_read_checked_and_run():
     scenario = replace(scenario, station=station, reference=ReferenceConfig(cast(Any, own.path)))
     experiment = Experiment(scenario, "numerical_ik")
     experiment.advance(0.1)
-    sample = experiment.station.GetOutputPort("pose_sample").Eval(
-        experiment.station.GetMyContextFromRoot(experiment.context)
-    )
+    sample = experiment.station.read(experiment.context, "pose_sample")
     assert 0.04 - 1e-9 <= 0.1 - sample.time < 0.048  # the newest exposure that is five periods old
     assert sample.valid

@@ -42,9 +42,8 @@ def samples(
     """Stamps and readings of a turntable that starts at some speed, shape (n, 1 + 3 sensors)."""
     builder = DiagramBuilder()
     plant = builder.AddSystem(turntable(stiffness))
-    sources = add_inertial_sensors(builder, plant, [config])
-    logger = builder.GetSubsystemByName("inertial_sensors_1")
-    log = LogVectorOutput(logger.GetOutputPort("sample"), builder, config.true_period)
+    sources, ports = add_inertial_sensors(builder, plant, [config])
+    log = LogVectorOutput(ports["inertial_sample_1"], builder, config.true_period)
     simulator = Simulator(builder.Build())
     context = simulator.get_mutable_context()
     plant.SetVelocities(plant.GetMyMutableContextFromRoot(context), [speed])
