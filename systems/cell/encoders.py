@@ -1,5 +1,6 @@
 """Encoders that are not perfect: discs off their centres, wrong scales, coupled wrists, whole steps."""
 
+import math
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -50,6 +51,7 @@ class Encoders:
                 f"encoder: eccentricity_deg must be between 0 and 10 deg, got {config.eccentricity_deg}"
             )
         self.turns = np.abs(robot.gear_ratio) if config.side == "motor" else np.ones(NUM_JOINTS)
+        self.has_steps = config.bits > 0  # whether angles come in whole ones
         self.step = 2.0 * np.pi / 2**config.bits / self.turns if config.bits else np.zeros(NUM_JOINTS)
         self.amplitude = np.deg2rad(config.eccentricity_deg) / self.turns
         self.phase = np.deg2rad(np.asarray(config.phase_deg, dtype=float))
@@ -57,11 +59,6 @@ class Encoders:
         for (source, joint), ppm in zip(_COUPLED, config.coupling_ppm, strict=True):
             self._true[joint, source] = 1e-6 * ppm
         self.linear = np.linalg.inv(self._true)  # what discs say of true positions but for the waves
-
-    @property
-    def has_steps(self) -> bool:
-        """Whether angles come in whole steps."""
-        return bool(self.step.any())
 
     @property
     def have_errors(self) -> bool:
@@ -84,7 +81,7 @@ class Encoders:
         """Angles in rad to whole steps."""
         if not self.has_steps:
             return angle
-        return self.step * np.round(angle / self.step)
+        return self.step * np.rint(angle / self.step)
 
 
 def erring_encoders(encoders: Encoders) -> SymbolicVectorSystem:
@@ -147,6 +144,7 @@ class SteppedReading(LeafSystem):
 
     def _calc(self, context: Context, output: BasicVector) -> None:
         now = self._reading(context)
-        before = context.get_discrete_state(self._before).value()
-        rate = (now - before) / self._period
-        output.set_value(np.concatenate([now, np.where(np.isfinite(rate), rate, 0.0)]))
+        reported = output.get_mutable_value()
+        reported[:NUM_JOINTS] = now
+        rate = (now - context.get_discrete_state(self._before).value()) / self._period
+        reported[NUM_JOINTS:] = rate if math.isfinite(sum(rate.tolist())) else 0.0

@@ -131,6 +131,7 @@ class DriveModel:
             config.position if model.takes_torque else config.following,
             _OF_ACCELERATION * robot.acceleration,
         )
+        self._found = self._drives  # kept to save time, see `_as_found`
         self._rings = kind == "position"
         self._gains = config.position, config.integral
         self.finds_gains = kind == "cascade"
@@ -163,7 +164,9 @@ class DriveModel:
             smoothed=(6,),
             misfit=(6,),  # rad^2, mean square of what is left of following errors beyond P, fading
             hung=(2, 6),  # rad, by which motors were off when they were slow, fading, and are if they are
-            deviation=Layout(faster=(6,), last=(6, 6), z=(6, 6, 2), out=(6, 6)),  # of `deviate`
+            deviation=Layout(  # of `deviate`
+                faster=(6,), accelerated=(6,), last=(6, 6), z=(6, 6, 2), out=(6, 6)
+            ),
             wound=(3, 6),  # of what drives wound up meanwhile: integral and error; for how long, s
             aside=(3, 6),  # rad and rad/s, of commands what is beside the plan, see `DriveMemory`
             gains=gains_layout,
@@ -234,24 +237,27 @@ class DriveModel:
         kernels.drives.features(v, a, regressors, Phi)
         return Phi
 
-    def deviate(self, memory: SimpleNamespace, v: np.ndarray, dv: np.ndarray, da: np.ndarray) -> np.ndarray:
+    def deviate(self, memory: SimpleNamespace, v: np.ndarray) -> None:
         """Goes on by a period to an instant at which motors moved otherwise than planned.
 
-        Args:
-            memory: of the layout.
-            v: planned speeds, rad/s, (6,).
-            dv, da: by how much speeds and accelerations were more, rad/s and rad/s^2, (6,).
+        Nothing is made of it for drives that follow positions alone, which ring faster than differences of
+        positions show.
 
-        Returns:
-            Torques in N m that this needed beyond those planned, in the order of `TORQUES`, (9, 6); none of
-            drives that follow positions alone, which ring faster than differences of positions show.
+        Args:
+            memory: of the layout, whose ``deviation`` says by how much motors were ``faster`` and
+                ``accelerated`` more, rad/s and rad/s^2, (6,) each.
+            v: planned speeds, rad/s, (6,).
         """
-        parts, needed = memory.deviation, np.zeros((len(TORQUES), 6))
-        parts.faster[:] = dv
-        if self._rings:
-            return needed
-        kernels.drives.deviate(self._as_found(memory), v, dv, da, parts.last, parts.z, parts.out)
-        needed[_DEVIATING] = parts.last[:4]
+        parts = memory.deviation
+        if not self._rings:
+            of_motion = v, parts.faster, parts.accelerated
+            kernels.drives.deviate(self._as_found(memory), *of_motion, parts.last, parts.z, parts.out)
+
+    @staticmethod
+    def needed_beyond(memory: SimpleNamespace) -> np.ndarray:
+        """The torques in N m that this needed beyond those planned, in the order of `TORQUES`, (9, 6)."""
+        needed = np.zeros((len(TORQUES), 6))
+        needed[_DEVIATING] = memory.deviation.last[:4]
         return needed
 
     def look_back(
@@ -372,11 +378,12 @@ class DriveModel:
         if not self.finds_gains:
             return self._drives
         gains = memory.gains
-        return self._drives._replace(
-            slack=gains.slack, kp=gains.kp, ki=gains.ki, kd=gains.kd, step=gains.step
-        )
+        if self._found.slack is not gains.slack:  # windows of the memory, as good as new in the next tick
+            parts = {"slack": gains.slack, "kp": gains.kp, "ki": gains.ki, "kd": gains.kd, "step": gains.step}
+            self._found = self._drives._replace(**parts)
+        return self._found
 
 
-_DIAGONAL, _SEARCHED = np.arange(SIZE), list(TORQUES)
+_DIAGONAL, _SEARCHED = np.arange(SIZE), np.array(TORQUES)
 # In all, of the rotor, of viscous and of Coulomb friction
 _DEVIATING = [TORQUES.index(w) for w in (at.W_MISSING, at.W_ROTOR, at.W_VISCOUS, at.W_COULOMB)]

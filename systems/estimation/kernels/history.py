@@ -45,6 +45,55 @@ def row_at(count, times, rows, time, out):
 
 
 @compiled
+def address(vector):
+    """Where an array begins in memory."""
+    return vector.ctypes.data
+
+
+@compiled
+def compare(encoders, planned, time, off):
+    """Puts by how much motors were behind a plan at a time behind what is known of the instants before.
+
+    Args:
+        encoders: `Ring` of positions and velocities in rad and rad/s.
+        planned: positions, (6,), or a longer row that begins with them.
+        time: s.
+        off: rows of the last instants, (n, 6) rad, the newest last, which are moved up by one; not a number
+            as long as there are no encoders.
+    """
+    last = len(off) - 1
+    for k in range(last):
+        for i in range(6):
+            off[k, i] = off[k + 1, i]
+    count = int(encoders.count[0])
+    if count > 0:
+        cubic_at(count, encoders.times, encoders.rows, time, off[last])
+    for i in range(6):
+        off[last, i] = planned[i] - off[last, i] if count > 0 else np.nan
+
+
+@compiled
+def otherwise(off, half, span, faster, accelerated):
+    """By how much motors were faster and more accelerated than planned in the middle of the last instants.
+
+    Args:
+        off: rad, by which they were behind, (2 half + 1, 6), the newest last.
+        half: how many instants there are before that in the middle.
+        span: s, that these take.
+        faster, accelerated: rad/s and rad/s^2, (6,), are written; none if encoders are not known.
+    """
+    newest = 2 * half
+    for i in range(6):
+        before, now, behind = off[0, i], off[half, i], off[newest, i]
+        faster[i], accelerated[i] = (
+            (before - behind) / (2.0 * span),
+            (2.0 * now - before - behind) / (span * span),
+        )
+    if np.isnan(accelerated[0]):  # encoders are known of all joints or of none
+        faster[:], accelerated[:] = 0.0, 0.0
+
+
+@inner
 def cubic_at(count, times, rows, time, out):
     """Positions at a time, by the cubic through the rows of positions and velocities beside it."""
     before, behind, s = around(count, times, time)

@@ -165,7 +165,7 @@ class SelfCalibrating(LeafSystem):
             plan = self._planner.step(memory.planner, (model.mean, np.zeros(model.size)), *at)
             motion = plan.theta, plan.velocity, plan.acceleration
             command = self._drives.command(memory.drives, motion, plan.on_motors, self._model.payload)
-        self._drives.deviate(memory.drives, still, still, still)
+        self._drives.deviate(memory.drives, still)
         self._drives.look_back(memory.drives, motion, command.regressors, still, q)
         pair = Pair(q, plan.loads, plan.motion, plan.twist, X_WE)
         self._lead.step(memory.lead, model.mean, memory.columns, self.period)
@@ -177,14 +177,10 @@ class SelfCalibrating(LeafSystem):
         for size in (0.0, 0.1):
             X_WE[0, 3] += size
             self.estimator.add(memory.estimator, pair._replace(X_WE=X_WE))
-        self._motors.steps.hear(memory.steps, q)
         self._learning.delay.search.rehearse(memory.delay.search)
         if self._drives.finds_gains:
             self._drives.search.rehearse(memory.gains.search)
-        for time in (0.0, 1.0):
-            self._motors.encoders.append(memory.encoders, time, np.concatenate((q, still)))
-            self._motors.plan.append(memory.plan, time, memory.passed.all)
-        self._motors.encoders_at(memory, 0.5)
+        self._motors.rehearse(memory, q)
         self._learning.pair(memory, 0.5, X_WE)
 
     def memory(self, context: Context) -> SimpleNamespace:

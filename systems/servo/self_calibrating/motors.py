@@ -15,6 +15,7 @@ from systems.estimation.drives.encoder_steps import EncoderSteps
 from systems.estimation.drives.gain_search import TORQUES
 from systems.estimation.drives.motor_feedback import MotorFeedback
 from systems.estimation.gear_errors import NUM_MODELS, NUM_STATES
+from systems.estimation.kernels.arrays import Ring
 from systems.estimation.memory import History, Layout
 from systems.samples import JointSample
 from systems.servo.self_calibrating.config import SelfCalibratingConfig
@@ -103,29 +104,37 @@ class MotorLearning:
         memory.off[:] = np.nan
         memory.upset_at[0] = memory.paused_until[0] = memory.learn_from[0] = -np.inf
 
-    def encoders_at(self, memory: SimpleNamespace, time: float) -> np.ndarray | None:
-        """Positions between two samples, a cubic through positions and velocities, rad, (6,)."""
+    def rehearse(self, memory: SimpleNamespace, position: np.ndarray) -> None:
+        """Runs what ticks run, on scratch memory, with joints at some position in rad, (6,)."""
+        self.steps.hear(memory.steps, position)
+        for time in (0.0, 1.0):
+            self.encoders.append(memory.encoders, time, np.concatenate((position, np.zeros(NUM_JOINTS))))
+            self.plan.append(memory.plan, time, memory.passed.all)
+        self._hold_against(memory, memory.passed.all, 0.5)
+        self._differ(memory)
+
+    def _hold_against(self, memory: SimpleNamespace, planned: np.ndarray, instant: float) -> None:
+        """Adds by how much motors were behind a plan at an instant."""
         encoders = memory.encoders
-        count = int(encoders.count[0])
-        if not count:
-            return None
-        position = np.empty(NUM_JOINTS)
-        kernels.history.cubic_at(count, encoders.times, encoders.rows, time, position)
-        return position
+        ring = Ring(encoders.count, encoders.times, encoders.rows)
+        kernels.history.compare(ring, planned, instant, memory.off)
+
+    def _differ(self, memory: SimpleNamespace) -> None:
+        """Works out how motors moved otherwise than planned at the instant that has just passed."""
+        parts, span = memory.drives.deviation, self._half * self._period
+        kernels.history.otherwise(memory.off, self._half, span, parts.faster, parts.accelerated)
 
     def compare(self, memory: SimpleNamespace) -> None:
         """Learns from where the motors were at planned instants that have passed."""
         plan, count, off = memory.plan, int(memory.plan.count[0]), memory.off
-        newest = memory.encoders.times[(int(memory.encoders.count[0]) - 1) % self.encoders.length]
+        encoders = memory.encoders
+        newest = encoders.times[(int(encoders.count[0]) - 1) % self.encoders.length]
         for k in range(max(int(memory.compared[0]), count - self.plan.length + self._half), count):
             instant = plan.times[k % self.plan.length]
             if instant > newest + 1e-9:
                 break
             memory.compared[0] = k + 1
-            actual = self.encoders_at(memory, instant)
-            off[:-1], off[-1] = off[1:], np.nan
-            if actual is not None:
-                off[-1] = plan.rows[k % self.plan.length, :NUM_JOINTS] - actual
+            self._hold_against(memory, plan.rows[k % self.plan.length], instant)
             if k >= self._half:  # how motors moved at an instant is known when the next ones have passed
                 then = (k - self._half) % self.plan.length
                 memory.passed.all[:] = plan.rows[then]
@@ -133,14 +142,17 @@ class MotorLearning:
 
     def _learn_instant(self, memory: SimpleNamespace, instant: float, off: np.ndarray) -> None:
         """Learns from the instant that has just passed, at which motors were so far behind, rad, (6,)."""
-        needed = self._deviate(memory)
-        if self._asks_for_gains(memory):
-            self.drives.search.follow(memory.gains.search, memory.passed.torques + needed)
+        asks_for_gains = self._asks_for_gains(memory)
+        self._differ(memory)
+        self.drives.deviate(memory.drives, memory.passed.velocity)
+        if asks_for_gains:
+            needed = memory.passed.torques + self.drives.needed_beyond(memory.drives)
+            self.drives.search.follow(memory.gains.search, needed)
         if not self.is_on_plan(memory, instant) or np.isnan(off[0]):
             memory.drives.deviation.all[:] = 0.0  # that motors were elsewhere then was no friction's doing
             return
         actual = memory.passed.theta - off
-        if self._asks_for_gains(memory):
+        if asks_for_gains:
             self._look_for_gains(memory, instant, actual)
         if instant > memory.learn_from[0]:
             self._learn_drives(memory, instant, actual)
@@ -165,15 +177,6 @@ class MotorLearning:
             return np.zeros(NUM_JOINTS)
         gain = min(self._held_to_plan, _SHARE_OF_DELAY / max(float(memory.delay.delay[0]), self._period))
         return np.nan_to_num(gain * (planned[:NUM_JOINTS] - joints.position))  # none where they are not known
-
-    def _deviate(self, memory: SimpleNamespace) -> np.ndarray:
-        """What motors needed beyond their plan, as they moved otherwise, `DriveModel.deviate`."""
-        before, off, behind = memory.off[[0, self._half, -1]]
-        span = self._half * self._period
-        dv, da = (before - behind) / (2.0 * span), (2.0 * off - before - behind) / span**2
-        if math.isnan(da[0]):  # encoders are known of all joints or of none
-            dv = da = np.zeros(NUM_JOINTS)
-        return self.drives.deviate(memory.drives, memory.passed.velocity, dv, da)
 
     def _look_for_gains(self, memory: SimpleNamespace, instant: float, actual: np.ndarray) -> None:
         """Holds the instant that has just passed against drives with other gains; after a probe, decides."""

@@ -52,7 +52,8 @@ def left_over(friction: float, is_known: bool) -> float:
     for k, time in enumerate(times):
         theta, v, a = planned(time)
         regressors = model.command(memory, (theta, v, a), LOADS, 7.0).regressors
-        model.deviate(memory, v, dv[k], da[k])
+        memory.deviation.faster[:], memory.deviation.accelerated[:] = dv[k], da[k]
+        model.deviate(memory, v)
         beyond, _, _, coulomb, *_ = memory.deviation.out
         left[k] = off[k] - beyond - share * (regressors[_COULOMB] + coulomb)
     return float(left[500:].std() / off[500:].std())
@@ -75,7 +76,8 @@ def test_friction_of_motors_off_their_plan_is_learnt():
     for k, time in enumerate(times):
         theta, v, a = planned(time)
         regressors = model.command(memory, (theta, v, a), LOADS, 7.0).regressors
-        model.deviate(memory, v, dv[k], da[k])
+        memory.deviation.faster[:], memory.deviation.accelerated[:] = dv[k], da[k]
+        model.deviate(memory, v)
         motion = theta, v, a
         left[k] = model.look_back(memory, motion, regressors, np.zeros(6), theta - off[k])
     # It is an eighth: motors that hang are doubted, so that not all of it is learnt within five seconds.
@@ -86,14 +88,16 @@ def test_drives_that_follow_positions_alone_ring_and_nothing_is_made_of_that():
     belief = ControllerModel(load_robot("irb1200"), 7.0, PERIOD)
     model = DriveModel(belief, DriveModelConfig(), "position")
     memory = model.layout.view(np.zeros(model.layout.size))
-    assert not model.deviate(memory, motion(0.3)[1], np.full(6, 0.1), np.full(6, 1.0)).any()
+    memory.deviation.faster[:], memory.deviation.accelerated[:] = 0.1, 1.0
+    model.deviate(memory, motion(0.3)[1])
+    assert not model.needed_beyond(memory).any()
     assert not memory.deviation.out.any()
 
 
 def test_motors_on_their_plan_need_nothing_beyond_it():
     model, memory = drives()
-    needed = model.deviate(memory, motion(0.3)[1], np.zeros(6), np.zeros(6))
-    assert not needed.any()
+    model.deviate(memory, motion(0.3)[1])
+    assert not model.needed_beyond(memory).any()
     assert not memory.deviation.out.any()
 
 
@@ -101,7 +105,9 @@ def test_what_motors_needed_beyond_their_plan_is_friction_of_their_speed_and_ine
     model, memory = drives()
     v, dv, da = motion(0.3)[1], np.full(6, 0.02), np.full(6, 1.0)
     believed = model._drives
-    needed = model.deviate(memory, v, dv, da)
+    memory.deviation.faster[:], memory.deviation.accelerated[:] = dv, da
+    model.deviate(memory, v)
+    needed = model.needed_beyond(memory)
     coulomb = believed.coulomb * (np.tanh((v + dv) / believed.width) - np.tanh(v / believed.width))
     np.testing.assert_allclose(needed[2], coulomb, atol=1e-9)
     np.testing.assert_allclose(needed[1], believed.rotor, atol=1e-9)

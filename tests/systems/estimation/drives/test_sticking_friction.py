@@ -133,7 +133,8 @@ def test_a_motor_hangs_that_encoders_show_at_rest_whatever_is_planned(speed: flo
     theta, _, a = motion(1.0)
     v, off = np.full(6, 0.1), 2e-4
     regressors = model.command(memory, (theta, v, a), LOADS, 7.0).regressors
-    model.deviate(memory, v, speed - v, np.zeros(6))
+    memory.deviation.faster[:] = speed - v
+    model.deviate(memory, v)
     model.look_back(memory, (theta, v, a), regressors, np.zeros(6), theta - off)
     np.testing.assert_allclose(memory.hung[0], off if hangs else 0.0, atol=1e-12)
     assert not memory.hung[1].any()  # nor would a drive that is wound up be told from a late one
