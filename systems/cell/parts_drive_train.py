@@ -4,8 +4,8 @@ import numpy as np
 from pydrake.systems.framework import (
     BasicVector,
     Context,
-    Diagram,
     DiagramBuilder,
+    InputPort,
     LeafSystem,
     OutputPort,
 )
@@ -28,7 +28,7 @@ class PartsDriveTrain:
         trains = robot.drive_trains
         assert trains is not None
         self._trains, self._damping = trains, robot.joint_damping
-        self._parts = DriveTrainParts(trains, robot.joint_viscous_friction)
+        self._viscous, self._parts = robot.joint_viscous_friction, None
         self.friction_unit = np.zeros(trains.size)  # all friction is in the reaction
 
     def add(
@@ -40,20 +40,21 @@ class PartsDriveTrain:
         motor_torque: OutputPort,
     ) -> DriveTrainTorques:
         """See `ElasticDriveTrain.add`."""
-        parts = builder.AddNamedSystem("drive_train_parts", self._parts)
+        self._parts = parts = DriveTrainParts(builder, self._trains, self._viscous)
         none = builder.AddNamedSystem("friction", ConstantVectorSource(self.friction_unit))
         for name, port in (
             ("motor_torque", motor_torque),
             ("motor_state", motor_state),
             ("link_state", link_state),
         ):
-            builder.Connect(port, parts.GetInputPort(name))
+            builder.Connect(port, parts.inputs[name])
         return DriveTrainTorques(
-            parts.GetOutputPort("gear_torque"), parts.GetOutputPort("reaction"), none.get_output_port()
+            parts.outputs["gear_torque"], parts.outputs["reaction"], none.get_output_port()
         )
 
     def set_at_rest(self, root_context: Context, theta: np.ndarray, load: np.ndarray) -> None:
         """Relaxed, with motors that give what they have to already; arguments of shape (6,)."""
+        assert self._parts is not None  # after `add`
         self._parts.set_at_rest(root_context, theta, load)
 
     def wind_up(self, load: np.ndarray, theta: np.ndarray) -> np.ndarray:
@@ -67,10 +68,10 @@ class PartsDriveTrain:
         return LinearGears(friction, stiffness, self._damping)
 
 
-class DriveTrainParts(Diagram):
-    """What stands between n motors and their links.
+class DriveTrainParts:
+    """What stands between n motors and their links, put into a diagram beside them.
 
-    Ports:
+    Ports, in ``inputs`` and ``outputs`` by name:
         in  ``motor_torque``  vector n in N m, joint side: what the motors are told to give
         in  ``motor_state``   vector 2 n, positions of the motors (rad), then velocities (rad/s)
         in  ``link_state``    vector 2 n, link positions behind the gears (rad), then velocities (rad/s)
@@ -81,30 +82,34 @@ class DriveTrainParts(Diagram):
     parts stand in a system of Drake's.
     """
 
-    def __init__(self, trains: DriveTrains, viscous: np.ndarray | None = None) -> None:
-        """Wires the parts.
+    def __init__(
+        self, builder: DiagramBuilder, trains: DriveTrains, viscous: np.ndarray | None = None
+    ) -> None:
+        """Adds and wires the parts.
 
         Args:
+            builder: of the diagram that they come into.
             trains: in the order of the joints.
             viscous: what of the friction is not to be in the reaction because the motors have it already, in
                 N m s / rad, shape (n,).
         """
-        super().__init__()
         self.trains = trains
-        builder, n, states = DiagramBuilder(), trains.size, trains.num_states
-        parts = builder.AddNamedSystem("parts", _Parts(trains, np.zeros(n) if viscous is None else viscous))
-        split = builder.AddNamedSystem("split", Demultiplexer([n, n, states] if states else [n, n]))
+        n, states = trains.size, trains.num_states
+        equations = _Parts(trains, np.zeros(n) if viscous is None else viscous)
+        parts = builder.AddNamedSystem("drive_train_parts", equations)
+        split = builder.AddNamedSystem("gear_torques", Demultiplexer([n, n, states] if states else [n, n]))
         builder.Connect(parts.get_output_port(), split.get_input_port())
         self._memory = None
         if states:
-            self._memory = builder.AddNamedSystem("memory", Integrator(states))
+            self._memory = builder.AddNamedSystem("drive_train_memory", Integrator(states))
             builder.Connect(split.get_output_port(2), self._memory.get_input_port())
             builder.Connect(self._memory.get_output_port(), parts.GetInputPort("memory"))
-        for name in ("motor_torque", "motor_state", "link_state"):
-            builder.ExportInput(parts.GetInputPort(name), name)
-        builder.ExportOutput(split.get_output_port(0), "reaction")
-        builder.ExportOutput(split.get_output_port(1), "gear_torque")
-        builder.BuildInto(self)
+        names = "motor_torque", "motor_state", "link_state"
+        self.inputs: dict[str, InputPort] = {name: parts.GetInputPort(name) for name in names}
+        self.outputs: dict[str, OutputPort] = {
+            "reaction": split.get_output_port(0),
+            "gear_torque": split.get_output_port(1),
+        }
 
     def set_at_rest(self, root_context: Context, theta: np.ndarray, load: np.ndarray) -> None:
         """Puts the parts at rest with motors at theta (rad) under loads of the links (N m), (n,) each."""

@@ -68,21 +68,21 @@ class Rig:
     def __init__(self, parts: DriveTrain, torque: np.ndarray | float = 0.0, load: float = 0.0) -> None:
         """A torque of the motor in N m, held for 10 ms each if there are many; a load of the link in N m."""
         builder = DiagramBuilder()
-        self.train = builder.AddSystem(DriveTrainParts(DriveTrains([parts.parts()])))
+        self.train = DriveTrainParts(builder, DriveTrains([parts.parts()]))
         self.motor, self.link = (builder.AddSystem(turning(inertia)) for inertia in (ROTOR, LINK))
         samples = np.append(torque, 0.0)[None]
         held = PiecewisePolynomial.ZeroOrderHold([*np.arange(samples.size - 1) * 0.01, 1e3], samples)
         source = builder.AddSystem(TrajectorySource(held))
         loads, total = builder.AddSystem(ConstantVectorSource([load])), builder.AddSystem(Adder(2, 1))
         rest = builder.AddSystem(Adder(2, 1)), builder.AddSystem(Gain(-1.0, 1))
-        builder.Connect(self.train.GetOutputPort("reaction"), rest[1].get_input_port())
+        builder.Connect(self.train.outputs["reaction"], rest[1].get_input_port())
         builder.Connect(source.get_output_port(), rest[0].get_input_port(0))
         builder.Connect(rest[1].get_output_port(), rest[0].get_input_port(1))
         builder.Connect(rest[0].get_output_port(), self.motor.get_input_port())
-        builder.Connect(source.get_output_port(), self.train.GetInputPort("motor_torque"))
-        builder.Connect(self.motor.get_output_port(), self.train.GetInputPort("motor_state"))
-        builder.Connect(self.link.get_output_port(), self.train.GetInputPort("link_state"))
-        builder.Connect(self.train.GetOutputPort("gear_torque"), total.get_input_port(0))
+        builder.Connect(source.get_output_port(), self.train.inputs["motor_torque"])
+        builder.Connect(self.motor.get_output_port(), self.train.inputs["motor_state"])
+        builder.Connect(self.link.get_output_port(), self.train.inputs["link_state"])
+        builder.Connect(self.train.outputs["gear_torque"], total.get_input_port(0))
         builder.Connect(loads.get_output_port(), total.get_input_port(1))
         builder.Connect(total.get_output_port(), self.link.get_input_port())
         # Both states, and the power of the motor.
