@@ -6,6 +6,7 @@ law wants another folder. All rows take an hour and a half on two cores.
 """
 
 import argparse
+import shlex
 import subprocess
 import sys
 from pathlib import Path
@@ -22,7 +23,7 @@ def measure(row: Row, file: Path, jobs: int | None) -> None:
         RuntimeError: if it fails.
     """
     limited = ["--jobs", str(jobs)] if jobs else []
-    words = [*COMMAND.split(), *row.options.split(), *limited, "--json", str(file)]
+    words = [*COMMAND.split(), *shlex.split(row.options), *limited, "--json", str(file)]
     done = subprocess.run(
         [sys.executable, "-m", "experiments.main", *words], capture_output=True, text=True, check=False
     )

@@ -134,6 +134,12 @@ SECTIONS: dict[str, tuple[Row, ...]] = {
             f"{_REALISTIC} --set station.variation.backlash=0.2 --cases plain --seeds 20 --first-seed 3000",
             "backlash of 0.1'",
         ),
+        Row(
+            "realistic-slower",
+            f'{_REALISTIC} --set "reference.override=[{{at: 0, share: 0.7}}]" --cases plain --seeds 20 '
+            "--first-seed 3000",
+            "at 0.7 of the planned speed",
+        ),
         Row("realistic-140ms", f"{_REALISTIC} --cases 140ms --seeds 20 --first-seed 3000"),
         Row(
             "realistic-kr16",
