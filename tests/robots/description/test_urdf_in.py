@@ -12,9 +12,9 @@ from pydrake.multibody.plant import MultibodyPlant
 from pydrake.systems.framework import DiagramBuilder
 
 from robots.configuration.nodes import ConfigurationError
-from robots.description.foreign_sources import foreign_sources_note
 from robots.description.model import RobotFileError, RobotModel, load_robot, robot_of, shipped_robots
 from robots.description.robot_file import robot_text
+from robots.description.source_notes import foreign_sources_note
 from robots.description.urdf import urdf_text
 from robots.description.urdf_in.masses import SHARES
 from robots.description.urdf_in.reader import read_urdf
