@@ -17,6 +17,7 @@ from experiments.metrics.single_figures import FIGURES, single_figures
 from experiments.study.designs import Value, design_points
 from experiments.study.study_file import Study
 from robots.description.model import RobotModel
+from systems.named_classes import place_in_own_file
 
 
 @dataclass(frozen=True)
@@ -100,7 +101,8 @@ def run_row(row: StudyRow, progress: Progress) -> dict[str, Any]:
         return line | {"failure": " ".join(str(error).split())}
     # What else a class of one's own raises, and what Drake's own checks do.
     except (Exception, SystemExit) as error:
-        return line | {"failure": f"{type(error).__name__}: {' '.join(str(error).split())}"}
+        told = place_in_own_file(error) or f"{type(error).__name__}: {' '.join(str(error).split())}"
+        return line | {"failure": told}
 
 
 def first_run(rows: Sequence[StudyRow]) -> dict[str, Any]:

@@ -229,7 +229,7 @@ def test_a_law_that_has_failed_is_not_the_best_for_what_it_leaves_out():
     ("error", "reason"),
     [
         (ZeroDivisionError("by zero"), "ZeroDivisionError: by zero"),
-        (SystemExit("condition 'AllFinite(q)' failed."), "SystemExit: condition 'AllFinite(q)' failed."),
+        (SystemExit("'AllFinite(q)' failed."), "law open_loop, seed 0: SystemExit: 'AllFinite(q)' failed."),
     ],
 )
 def test_a_class_of_ones_own_that_raises_fails_its_row_and_no_other(
