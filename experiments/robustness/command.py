@@ -10,7 +10,7 @@ from rich.markup import escape
 from rich.table import Table
 
 from experiments.cli.cluster import executor
-from experiments.cli.console import count, print_note, print_table, progress_bar, refusing
+from experiments.cli.console import BROKEN_OFF, count, fail, print_note, print_table, progress_bar, refusing
 from experiments.cli.json_output import human_console, json_output
 from experiments.cli.option_limits import at_least
 from experiments.cli.options import JobsOption, JsonOption, RobotOption, SchedulerOption, SetOption
@@ -87,6 +87,8 @@ def robustness_command(
             numbers = {"scenario": scenario, "robot": robot, "results": results, "runs": rows}
             output.write(numbers | ({"assumed": assumed} if assumed else {}))
     _print(human, scenario, results, {contender.text: contender.title for contender in compared})
+    if all(row["failure"] for row in rows):
+        fail("no run came to its end", BROKEN_OFF)
 
 
 def _case(name: str, settings: list[str]) -> Case:

@@ -15,7 +15,16 @@ from rich.markup import escape
 from rich.table import Table
 
 from experiments.cli.cluster import executor
-from experiments.cli.console import count, fail, print_files, print_note, print_table, progress_bar, refusing
+from experiments.cli.console import (
+    BROKEN_OFF,
+    count,
+    fail,
+    print_files,
+    print_note,
+    print_table,
+    progress_bar,
+    refusing,
+)
 from experiments.cli.ending import exit_code
 from experiments.cli.json_output import human_console, json_output
 from experiments.cli.option_limits import at_least
@@ -86,6 +95,8 @@ def study_command(
         output.write(numbers | {"seconds": time.perf_counter() - start})
     _print(human, study, found)
     print_files(human, folder / _PAGE, folder / TABLE)
+    if (found["failure"] != "").all():
+        fail("no run came to its end", BROKEN_OFF)
 
 
 def _run(store: StudyStore, where: Executor, todo: Sequence[StudyRow], total: int) -> None:
