@@ -57,10 +57,11 @@ def robustness_command(
     with refusing(ValueError):
         for name, value in (("--seeds", seeds), ("--laps", laps), ("--jobs", jobs)):
             at_least(name, 1, value)
-        chosen = [_case(name, settings or []) for name in (CASES if cases == "all" else cases.split(","))]
+        names = list(CASES) if cases == "all" else _each_once("--cases", cases)
+        chosen = [_case(name, settings or []) for name in names]
         compared = contenders(laws)
         drawn = range(first_seed, first_seed + seeds)
-        todo = trials(scenario, chosen, compared, drawn, paths.split(","), laps, robot)
+        todo = trials(scenario, chosen, compared, drawn, _each_once("--paths", paths), laps, robot)
         for trial in todo:
             if trial.seed == first_seed:  # what cannot run is refused before anything does
                 make_path(trial.load().reference)
@@ -89,6 +90,15 @@ def robustness_command(
     _print(human, scenario, results, {contender.text: contender.title for contender in compared})
     if all(row["failure"] for row in rows):
         fail("no run came to its end", BROKEN_OFF)
+
+
+def _each_once(option: str, text: str) -> list[str]:
+    """The names in a list; twice the same would count double. Raises ValueError."""
+    names = [name.strip() for name in text.split(",")]
+    for name in names:
+        if names.count(name) > 1:
+            raise ValueError(f"{option}: '{name}' is there twice")
+    return names
 
 
 def _case(name: str, settings: list[str]) -> Case:

@@ -186,6 +186,8 @@ def test_a_command_of_which_nothing_came_to_its_end_has_failed(
         (["--laws", "nothing"], "nothing"),
         (["--laws", "pbvs+elastic"], "'pbvs+elastic': behind + stands one of"),
         (["--laws", "pbvs@calibrated,pbvs@calibrated"], "'pbvs@calibrated' is there twice"),
+        (["--cases", "plain,plain"], "--cases: 'plain' is there twice"),
+        (["--paths", "circle,circle"], "--paths: 'circle' is there twice"),
         (["--seeds", 0], "--seeds"),
         (["--paths", "spiral"], "spiral"),
         (
