@@ -73,13 +73,34 @@ def place_in_own_file(error: BaseException) -> str | None:
 
     None if no such file had a part in it: then it is a defect of truetip, and its traceback is wanted.
     """
+    frame = _own_frame(error)
+    return None if frame is None else f"{Path(frame.filename).name}, {_line(frame)}: {_told(error)}"
+
+
+def _own_frame(error: BaseException) -> traceback.FrameSummary | None:
+    """The innermost call in a file of one's own through which an error came."""
     own = {file for file, name in _OWN_FILES.items() if name in sys.modules}
-    for frame in reversed(traceback.extract_tb(error.__traceback__)):
-        if frame.filename in own:
-            what = f"{type(error).__name__}: {error}".removesuffix(": ")
-            place = f"{Path(frame.filename).name}, line {frame.lineno}, in {frame.name}"
-            return f"{place}: {' '.join(what.split())}"
-    return None
+    frames = reversed(traceback.extract_tb(error.__traceback__))
+    return next((frame for frame in frames if frame.filename in own), None)
+
+
+def _line(frame: traceback.FrameSummary) -> str:
+    return f"line {frame.lineno}" + ("" if frame.name == "<module>" else f", in {frame.name}")
+
+
+def _told(error: BaseException) -> str:
+    """Kind and message of an error in one line."""
+    message = error.msg if isinstance(error, SyntaxError) else error
+    return " ".join(f"{type(error).__name__}: {message}".removesuffix(": ").split())
+
+
+def _import_problem(file: str, error: BaseException) -> str:
+    """Why a file of one's own cannot be imported, with the line; one line."""
+    if isinstance(error, SyntaxError) and error.filename and error.lineno:  # there, or in what it imports
+        is_itself = Path(error.filename).resolve() == Path(file).resolve()
+        return f"{file if is_itself else error.filename}, line {error.lineno}: {_told(error)}"
+    frame = _own_frame(error)
+    return f"{file}, {_line(frame)}: {_told(error)}" if frame else f"{file}: {_told(error)}"
 
 
 def _classes_in(file: str, kind: str) -> list[str]:
@@ -105,6 +126,7 @@ def _module_of(file: str, kind: str) -> ModuleType:
     try:
         spec.loader.exec_module(module)
     except (Exception, SystemExit) as error:  # whatever the file of somebody else does when it is imported
+        problem = _import_problem(file, error)
         del sys.modules[name]
-        raise ValueError(f"{kind}: {file}: {type(error).__name__}: {' '.join(str(error).split())}") from error
+        raise ValueError(f"{kind}: {problem}") from error
     return module

@@ -25,7 +25,7 @@ from experiments.accept.robot_cycle import (
     visits,
 )
 from experiments.accept.robot_page import Row, table_rows, verdict, write_acceptance_page
-from experiments.cli.console import print_files, print_table, progress_bar, refusing
+from experiments.cli.console import print_files, print_note, print_table, progress_bar, refusing
 from experiments.cli.json_output import human_console, json_output
 from experiments.cli.option_limits import at_least, positive
 from experiments.cli.options import (
@@ -39,11 +39,12 @@ from experiments.cli.options import (
     WithCellOption,
     YesOption,
 )
-from experiments.cli.prepare import Prepared, prepare
+from experiments.cli.prepare import Prepared, prepare, with_assumed
 from experiments.cli.staging import PAGE, staged_file
 from experiments.comparison.compare import RunJob, run_job
 from experiments.report.style import law_title
 from experiments.station.guided_command import ask_before_moving, check_measures_alone, on_station
+from robots.description.source_notes import assumed_note
 from robots.dynamics.newton_inverse import inverse_kinematics
 from systems.link.udp_channel import ChannelError
 
@@ -93,6 +94,7 @@ def accept_robot_command(
         if not is_simulated:
             _refuse_on_station(prepared, masses)
             ask_before_moving(human, prepared, with_cell or yes)
+        print_note(human, assumed_note(prepared.robot))
         page = stack.enter_context(staged_file(out, *PAGE))
         stack.enter_context(output.staged())
         rows: list[Row] = []
@@ -108,9 +110,8 @@ def accept_robot_command(
         title = f"ISO 9283, {prepared.robot.name}, {law_title(chosen)}"
         told = verdict(rows, law_title(chosen), cycles, cube)
         write_acceptance_page(page, title, told, prepared.title, rows)
-        output.write(
-            {"law": chosen, "cycles": cycles, "cube_mm": cube, "rows": [row.results for row in rows]}
-        )
+        numbers = {"law": chosen, "cycles": cycles, "cube_mm": cube, "rows": [row.results for row in rows]}
+        output.write(with_assumed(numbers, prepared.robot))
     shown = Table(title=escape(title), box=box.SIMPLE)
     for number, name in enumerate(("criterion", *(row.name for row in rows))):
         shown.add_column(name, justify="left" if number == 0 else "right")

@@ -41,9 +41,9 @@ from experiments.report.files import write_text
 from robots.calibration.identification import identify
 from robots.calibration.instruments.observation_file import names_targets
 from robots.calibration.measurement_file import RowProblem, measurement_text, read_measurements
-from robots.description.foreign_sources import foreign_sources_note
 from robots.description.joint_errors import names_of
 from robots.description.robot_file import robot_text
+from robots.description.source_notes import foreign_sources_note
 from robots.description.urdf import urdf_text
 from robots.measurement_design.constraints import AdmissibleConfigurations
 from robots.measurement_design.criteria import NAMES

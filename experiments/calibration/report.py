@@ -62,6 +62,8 @@ def calibration_json(
         "condition": found.condition,
         "residuals": residual_rows(found),
         "noise": noise_dict(found),
+        "gravity": found.gravity
+        and {"explained_mm": 1e3 * found.gravity.explained, "chance": found.gravity.chance},
         "frame": frame,
         "repeatability": repeated and asdict(repeated),
         "completeness_of_48": asdict(source_set),
@@ -239,17 +241,23 @@ def _size(noise: float) -> str:
 def unexplained_sentence(found: Identified) -> str:
     """That the rows agree on something that the parameters cannot describe; empty if they do not.
 
-    Where no row is told apart by it, it is taken for noise of the joints, larger than encoders have.
+    Springs move a tip as noise of the joints does, and on a long arm little noise of joints hides much sag;
+    but sag follows the weight. What else there is shows where it is more than encoders have.
     """
+    gravity = found.gravity
+    if gravity is not None and gravity.is_clear:
+        return (
+            f" Of what these parameters leave, {1e3 * gravity.explained:.2g} mm (rms) follow the weight of "
+            "arm and load, as where joints yield; identify that, too (--compliance)."
+        )
     joint_deg = 0.0 if found.is_noise_known else float(np.rad2deg(found.noise.joint_sigma))
     if not found.lacks_something and joint_deg < _ENCODERS_DEG:
         return ""
     has_springs = len(found.parameters) > len(found.model)
-    cause = (
-        "do bearings yield, or joints err (--joint-errors)"
-        if has_springs
-        else "do joints yield (--compliance)"
-    )
+    if has_springs:
+        cause = "do bearings yield, or joints err (--joint-errors)"
+    else:
+        cause = "do joints yield (--compliance)" if gravity is None else "do joints err (--joint-errors)"
     if not found.lacks_something:
         return (
             f" Noise of {joint_deg:.2g} degrees of the joints is far more than encoders have: most of it "

@@ -36,7 +36,7 @@ def refusing(*refusals: type[Exception]) -> Iterator[None]:
         kept = [str(file) for file in staying()]
         what = f"; kept: {', '.join(kept)}" if kept else ", nothing was written"
         fail(f"interrupted{what}", exit_code(error))
-    except Exception as error:  # a file of one's own may raise anything
+    except (Exception, SystemExit) as error:  # a file of one's own may raise anything
         if (place := place_in_own_file(error)) is None:
             raise
         fail(place, BAD_INPUT)

@@ -3,6 +3,7 @@
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Any
 
 from rich.console import Console
 
@@ -13,9 +14,9 @@ from diagrams.scenario.scenario import Scenario, ScenarioError, load_scenario
 from diagrams.scenario.scenario_file import OptionSetting, read_scenario_nodes, stated_keys
 from experiments.cli.console import print_note
 from robots.description.calibration import is_same_robot
-from robots.description.foreign_sources import foreign_sources_note
 from robots.description.model import RobotFileError, RobotModel, load_robot
 from robots.description.placement import long_tool_note
+from robots.description.source_notes import assumed_note, foreign_sources_note
 from robots.dynamics.compliant_kinematics import controller_kinematics
 from robots.kinematics.error_kinematics import ErrorKinematics
 from systems.cell.events.station_events import check_events
@@ -52,12 +53,13 @@ class Prepared:
     def note(self) -> str:
         """What a person should know before it runs, in a line; empty if there is nothing."""
         model, true = self.scenario.servo.feedforward.kind, self.scenario.station.elasticity
+        stiffer = ""
         if model == "elastic_structure" and true != "structure":
-            return (
-                f"the feedforward compensates an elastic structure that the robot does not have with "
+            stiffer = (
+                "the feedforward compensates an elastic structure that the robot does not have with "
                 f"station.elasticity={true}"
             )
-        return "; ".join(filter(None, (self.carried, _file_note(self.robot))))
+        return "; ".join(filter(None, (stiffer, self.carried, _file_note(self.robot))))
 
     @property
     def kept(self) -> str:
@@ -83,7 +85,15 @@ def noted_robot(console: Console, name: str) -> RobotModel:
 
 def _file_note(robot: RobotModel) -> str:
     """What in the file of a robot may be wrong, in a line; empty if nothing."""
-    return "; ".join(filter(None, (foreign_sources_note(robot), long_tool_note(robot.tool))))
+    return "; ".join(
+        filter(None, (foreign_sources_note(robot), long_tool_note(robot.tool), assumed_note(robot)))
+    )
+
+
+def with_assumed(result: dict[str, Any], robot: RobotModel) -> dict[str, Any]:
+    """The numbers of a command with what is ``assumed`` of its robot, where that is all of its springs."""
+    note = assumed_note(robot)
+    return result | ({"assumed": note} if note else {})
 
 
 def prepare(

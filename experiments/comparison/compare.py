@@ -71,11 +71,13 @@ def simulating(law: str, seed: int) -> Iterator[None]:
     """
     try:
         yield
-    except Exception as error:  # a law of one's own may raise anything
-        place = place_in_own_file(error)
-        if place is None and not isinstance(error, RuntimeError):
+    except (Exception, SystemExit) as error:  # a law of one's own may raise anything
+        told = place_in_own_file(error)
+        if told is None and isinstance(error, SystemExit):  # Drake's own checks raise it
+            told = f"SystemExit: {error}"
+        if told is None and not isinstance(error, RuntimeError):
             raise
-        raise SimulationError(f"law {law}, seed {seed}: {place or ' '.join(str(error).split())}") from error
+        raise SimulationError(f"law {law}, seed {seed}: {' '.join((told or str(error)).split())}") from error
 
 
 def run_job(job: RunJob, progress: Progress) -> RunLog:

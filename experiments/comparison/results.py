@@ -5,7 +5,7 @@ from pathlib import Path
 from typing import Any
 
 from diagrams.record.log import RunLog
-from experiments.cli.prepare import Prepared
+from experiments.cli.prepare import Prepared, with_assumed
 from experiments.cli.versions import versions_in, versions_line
 from experiments.comparison.errors_table import ERRORS, write_errors
 from experiments.comparison.figure import write_figure
@@ -50,7 +50,7 @@ def write_results(folder: Path, prepared: Prepared, logs: Mapping[str, Sequence[
     Raises:
         OSError: if the folder cannot be written.
     """
-    result, times = summary(prepared.title, logs), timing(logs)
+    result, times = with_assumed(summary(prepared.title, logs), prepared.robot), timing(logs)
     first_cycles = {law: cycles[0] for law, cycles in logs.items()}
     write_json(folder / "summary.json", result)
     write_json(folder / "timing.json", times)

@@ -20,7 +20,7 @@ from experiments.cli.options import (
     PictureOption,
     StudiedRobotOption,
 )
-from experiments.cli.prepare import noted_robot
+from experiments.cli.prepare import noted_robot, with_assumed
 from experiments.cli.staging import PAGE, staged_file
 from experiments.cli.workers import usable_cores
 from experiments.feedforward.plots import TABLE_HEAD, study_verdict, table_rows, write_study_page
@@ -82,7 +82,7 @@ def feedforward_command(
             timing = "polynomial" if smooth else "sine_squared"
             study = study_feedforward(model, mass, config, grid, processes, progress, realistic, timing)
         write_study_page(page, study)
-        output.write(study_json(study))
+        output.write(with_assumed(study_json(study), model))
     print_table(human, _table(study))
     human.print(escape(study_verdict(study)))
     print_files(human, report)

@@ -21,7 +21,7 @@ from experiments.cli.options import (
     SchedulerOption,
     StudiedRobotOption,
 )
-from experiments.cli.prepare import noted_robot
+from experiments.cli.prepare import noted_robot, with_assumed
 from experiments.cli.staging import PAGE, TABLE, YAML, refuse_replaced, staged_file
 from experiments.cli.workers import Executor
 from experiments.feedforward.command import realistic_robot, variant_name
@@ -273,7 +273,8 @@ def identify_command(
         write_identify_page(page, study, searches)
         if robot_file and write:
             write_text(robot_file, robot_text(study.final, beside=Path(write)))
-        output.write(identify_json(study) | ({"searches": search_json(searches)} if searches else {}))
+        numbers = identify_json(study) | ({"searches": search_json(searches)} if searches else {})
+        output.write(with_assumed(numbers, model))
     _print(human, study)
     if study.verdict is not None:
         print_table(human, _table(SUMMARY_HEAD, judge_summary(study.verdict)))

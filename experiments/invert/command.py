@@ -19,7 +19,7 @@ from experiments.cli.options import (
     PictureOption,
     StudiedRobotOption,
 )
-from experiments.cli.prepare import noted_robot
+from experiments.cli.prepare import noted_robot, with_assumed
 from experiments.cli.staging import PAGE, staged_file
 from experiments.cli.workers import usable_cores
 from experiments.invert.plots import TABLE_HEAD, refusals, table_rows, verdict, write_invert_page
@@ -68,7 +68,7 @@ def invert_command(
                 model, mass, angle, grid, spring_error, seeds, processes, progress, rehearse
             )
         write_invert_page(page, study)
-        output.write(invert_json(study))
+        output.write(with_assumed(invert_json(study), model))
     print_table(human, _table(study))
     for line in [verdict(study), *refusals(study)]:
         human.print(escape(line))

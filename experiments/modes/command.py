@@ -20,7 +20,7 @@ from experiments.cli.options import (
     PictureOption,
     StudiedRobotOption,
 )
-from experiments.cli.prepare import noted_robot
+from experiments.cli.prepare import noted_robot, with_assumed
 from experiments.cli.staging import PAGE, staged_file
 from experiments.modes.study import SHOWN_MODES, ModalStudy, modes_json, spread, study_modes
 from experiments.modes.view import frequency_figure, show_mode, write_animation
@@ -67,7 +67,7 @@ def modes_command(
         title = f"mode {mode} of {model.name}, {study.stretched.frequency_hz[mode - 1]:.2f} Hz"
         write_animation(motion, server, title)
         write_modes_page(page, study)
-        output.write(modes_json(study))
+        output.write(with_assumed(modes_json(study), model))
     title = f"{model.name}, {mass:g} kg, motors held, stretched"
     print_table(human, _table(title, STRETCHED_HEAD, stretched_rows(study, joints=3)))
     title = f"over {grid} x {grid} positions of axes 2 and 3"

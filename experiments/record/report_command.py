@@ -12,10 +12,10 @@ from diagrams.record.log import RunLog
 from diagrams.record.read_record import read_record
 from diagrams.record.restored import restored
 from diagrams.scenario.differences import scenario_differences
-from experiments.cli.console import print_files, progress_bar, refusing
+from experiments.cli.console import print_files, print_note, progress_bar, refusing
 from experiments.cli.json_output import human_console, json_output
 from experiments.cli.options import JsonOption, PictureOption
-from experiments.cli.prepare import prepare
+from experiments.cli.prepare import prepare, with_assumed
 from experiments.cli.staging import PAGE, staged_file
 from experiments.cli.tables import print_summary
 from experiments.metrics.run_metrics import summary
@@ -40,9 +40,13 @@ def report_command(
         stack.enter_context(output.staged())
         with progress_bar("reading") as progress:
             text, logs = _read(records, progress)
-        result = summary(_title(text, records), logs)
-        write_report(page, text, result, _times(logs), logs, _true_robot(text))
+        result, true = summary(_title(text, records), logs), None
+        if (robots := _robots(text)) is not None:
+            known, true = robots
+            result = with_assumed(result, known)
+        write_report(page, text, result, _times(logs), logs, true)
         output.write(result)
+    print_note(human, result.get("assumed", ""))
     print_summary(human, result)
     human.print(escape(verdict(result)))
     print_files(human, report)
@@ -79,13 +83,14 @@ def _refuse_another(file: Path, text: str, first: Path, of_first: str) -> None:
         raise ValueError(f"{file}: a run of another scenario than {first}: {differing[0]}{more}")
 
 
-def _true_robot(text: str) -> RobotModel | None:
-    """The robot of a scenario with its true geometry; None if its files are not there any more."""
+def _robots(text: str) -> tuple[RobotModel, RobotModel] | None:
+    """The robot of a scenario as its controller knows it and as it truly is; None if its files are gone."""
     with TemporaryDirectory() as folder:
         file = Path(folder) / "scenario.yaml"
         file.write_text(text, encoding="utf-8")
         try:
-            return prepare(str(file)).true_robot
+            prepared = prepare(str(file))
+            return prepared.robot, prepared.true_robot
         except ValueError:
             return None
 

@@ -41,7 +41,7 @@ def write_report(
     Args:
         path: where to.
         scenario_text: the scenario as YAML, shown as it is.
-        summary: `metrics.summary` of the logs.
+        summary: `metrics.summary` of the logs, and what is ``assumed`` of the robot if anything is.
         timing: `metrics.timing` of the logs.
         logs: law -> one log per cycle; the first cycle is drawn.
         robot: with the geometry that it truly has, for its picture and the limits of its joints; None where
@@ -62,6 +62,7 @@ def write_report(
         scenario=summary["scenario"],
         scenario_text=scenario_text,
         verdict=verdict(summary),
+        assumed=summary.get("assumed", ""),
         laws={law: {"title": law_title(law), "color": colors[law]} for law in logs},
         facts=[_fact(law, run[source]) for law, run in runs.items()],
         axes=list(AXES),

@@ -10,7 +10,7 @@ from rich.markup import escape
 from rich.table import Table
 
 from experiments.cli.cluster import executor
-from experiments.cli.console import count, print_table, progress_bar, refusing
+from experiments.cli.console import BROKEN_OFF, count, fail, print_note, print_table, progress_bar, refusing
 from experiments.cli.json_output import human_console, json_output
 from experiments.cli.option_limits import at_least
 from experiments.cli.options import JobsOption, JsonOption, RobotOption, SchedulerOption, SetOption
@@ -18,6 +18,8 @@ from experiments.robustness.cases import CASES
 from experiments.robustness.contenders import contenders
 from experiments.robustness.study import Case, judged, run_trials, trials, with_calibrated_robots
 from robots.configuration.suggestion import did_you_mean
+from robots.description.model import load_robot
+from robots.description.source_notes import assumed_note
 from systems.reference.paths import make_path
 
 PATHS = ("rectangle", "circle", "figure_eight")
@@ -55,13 +57,18 @@ def robustness_command(
     with refusing(ValueError):
         for name, value in (("--seeds", seeds), ("--laps", laps), ("--jobs", jobs)):
             at_least(name, 1, value)
-        chosen = [_case(name, settings or []) for name in (CASES if cases == "all" else cases.split(","))]
+        names = list(CASES) if cases == "all" else _each_once("--cases", cases)
+        chosen = [_case(name, settings or []) for name in names]
         compared = contenders(laws)
         drawn = range(first_seed, first_seed + seeds)
-        todo = trials(scenario, chosen, compared, drawn, paths.split(","), laps, robot)
+        todo = trials(scenario, chosen, compared, drawn, _each_once("--paths", paths), laps, robot)
         for trial in todo:
             if trial.seed == first_seed:  # what cannot run is refused before anything does
                 make_path(trial.load().reference)
+        # Robots that seeds draw are many; the one that all runs share is spoken of.
+        shared = next((trial.load().robot for trial in todo if robot or trial.case.draw is None), None)
+        assumed = assumed_note(load_robot(shared)) if shared else ""
+        print_note(human, assumed)
         where = executor(scheduler, jobs)
         with (
             json_output(json_file) as output,
@@ -78,8 +85,20 @@ def robustness_command(
                 for law in (contender.text for contender in compared)
                 if (matching := [row for row in rows if (row["case"], row["law"]) == (case.name, law)])
             ]
-            output.write({"scenario": scenario, "robot": robot, "results": results, "runs": rows})
+            numbers = {"scenario": scenario, "robot": robot, "results": results, "runs": rows}
+            output.write(numbers | ({"assumed": assumed} if assumed else {}))
     _print(human, scenario, results, {contender.text: contender.title for contender in compared})
+    if all(row["failure"] for row in rows):
+        fail("no run came to its end", BROKEN_OFF)
+
+
+def _each_once(option: str, text: str) -> list[str]:
+    """The names in a list; twice the same would count double. Raises ValueError."""
+    names = [name.strip() for name in text.split(",")]
+    for name in names:
+        if names.count(name) > 1:
+            raise ValueError(f"{option}: '{name}' is there twice")
+    return names
 
 
 def _case(name: str, settings: list[str]) -> Case:

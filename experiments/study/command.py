@@ -15,7 +15,16 @@ from rich.markup import escape
 from rich.table import Table
 
 from experiments.cli.cluster import executor
-from experiments.cli.console import count, fail, print_files, print_table, progress_bar, refusing
+from experiments.cli.console import (
+    BROKEN_OFF,
+    count,
+    fail,
+    print_files,
+    print_note,
+    print_table,
+    progress_bar,
+    refusing,
+)
 from experiments.cli.ending import exit_code
 from experiments.cli.json_output import human_console, json_output
 from experiments.cli.option_limits import at_least
@@ -33,9 +42,10 @@ from experiments.study.figures import (
     metric_unit,
     spread_figure,
 )
-from experiments.study.rows import StudyRow, first_run, run_row, study_rows
+from experiments.study.rows import StudyRow, first_run, robots_of, run_row, study_rows
 from experiments.study.store import TABLE, StudyStore, alone_in, columns_of
 from experiments.study.study_file import Study, load_study
+from robots.description.source_notes import assumed_note
 
 _PAGE = "study.html"
 _SHOWN_FAILURES = 20
@@ -63,6 +73,8 @@ def study_command(
         study = load_study(file)
         rows = study_rows(study)
         plan = {"study": asdict(study), **first_run(rows)}
+        assumed = [note for robot in robots_of(rows) if (note := assumed_note(robot))]
+        print_note(human, "; ".join(assumed))
         where = executor(scheduler, jobs)
         factors = {
             name: [dict(row.factors)[name] for row in rows[:: len(study.laws)]] for name in study.factors
@@ -79,9 +91,12 @@ def study_command(
             numbers = study_json(study, found, [row.command for row in rows])
             with staged_file(folder / _PAGE) as page:
                 _write_page(page, study, found, rows)
+        numbers |= {"assumed": assumed} if assumed else {}
         output.write(numbers | {"seconds": time.perf_counter() - start})
     _print(human, study, found)
     print_files(human, folder / _PAGE, folder / TABLE)
+    if (found["failure"] != "").all():
+        fail("no run came to its end", BROKEN_OFF)
 
 
 def _run(store: StudyStore, where: Executor, todo: Sequence[StudyRow], total: int) -> None:

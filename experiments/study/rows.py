@@ -2,6 +2,7 @@
 
 import shlex
 from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from hashlib import sha256
 from typing import Any
@@ -15,6 +16,8 @@ from experiments.comparison.compare import simulating
 from experiments.metrics.single_figures import FIGURES, single_figures
 from experiments.study.designs import Value, design_points
 from experiments.study.study_file import Study
+from robots.description.model import RobotModel
+from systems.named_classes import place_in_own_file
 
 
 @dataclass(frozen=True)
@@ -98,7 +101,8 @@ def run_row(row: StudyRow, progress: Progress) -> dict[str, Any]:
         return line | {"failure": " ".join(str(error).split())}
     # What else a class of one's own raises, and what Drake's own checks do.
     except (Exception, SystemExit) as error:
-        return line | {"failure": f"{type(error).__name__}: {' '.join(str(error).split())}"}
+        told = place_in_own_file(error) or f"{type(error).__name__}: {' '.join(str(error).split())}"
+        return line | {"failure": told}
 
 
 def first_run(rows: Sequence[StudyRow]) -> dict[str, Any]:
@@ -124,3 +128,13 @@ def first_run(rows: Sequence[StudyRow]) -> dict[str, Any]:
     said: dict[str, Any] = {"first_scenario": f"# {prepared.title}\n{scenario_text(prepared.scenario)}"}
     marks = {str(file): sha256(file.read_bytes()).hexdigest() for file in sorted(filter(None, files))}
     return said | ({"files": marks} if marks else {})
+
+
+def robots_of(rows: Sequence[StudyRow]) -> list[RobotModel]:
+    """The robots that the controllers of the rows know, each once; a row that is refused has none."""
+    first = {dict(row.factors).get("robot"): row for row in reversed(rows)}
+    robots = []
+    for row in reversed(first.values()):
+        with suppress(ValueError):
+            robots.append(prepare(row.scenario, row.all_settings, is_quick=row.is_quick).robot)
+    return robots

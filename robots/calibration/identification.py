@@ -17,10 +17,11 @@ from robots.calibration.loads import Loads
 from robots.calibration.measurements import MeasurementNoise, Measurements
 from robots.calibration.prior import CENTRE_OF_MASS, MASS, not_to_be_believed, parameter_sizes
 from robots.calibration.reduction import ReducibleModel
+from robots.calibration.solver.left_over import gravity_test, misfit, spring_columns
 from robots.calibration.solver.levenberg_marquardt import Fit, minimise
 from robots.calibration.solver.noise_belief import BELIEVED, ENOUGH, WEIGHT, taken
 from robots.calibration.solver.noise_model import FLOOR, JOINT, POSITION, ROTATION, NoiseModel, row_sigmas
-from robots.calibration.solver.problem import Linearised, Problem
+from robots.calibration.solver.problem import Problem
 from robots.calibration.solver.robust import CleanRows, lacks_something, least_distances
 from robots.calibration.solver.variance_components import (
     VarianceComponents,
@@ -199,6 +200,9 @@ class _Search:
         if clean.all() or self._config.leave_out_outliers:
             self._refuse_the_implausible(fit.at.residuals[kept], fit.u)
         at, rows, belief = fit.at.select(kept), noise.select(kept), self._belief(kept)
+        gravity = None
+        if self._yielding is not None:
+            gravity = gravity_test(at, fit.u, spring_columns(self._yielding, fit.u)[kept], rows)
         factor = parameter_factor(at, rows, self._estimated(kept), found)
         self._refuse_what_is_hidden(fit, kept, reducible)
         return Identified(
@@ -213,7 +217,8 @@ class _Search:
             noise=noise.as_noise(),
             is_noise_known=self._is_known,
             noise_belief=None if belief is None else NoiseModel(belief, self._shape).as_noise(),
-            misfit=_misfit(at, rows),
+            misfit=misfit(at, rows),
+            gravity=gravity,
             lacks_something=self._lacks_something,
             design=at.triangle(rows),
             outliers=tuple(map(int, problem.measurements.rows[~clean])),
@@ -290,10 +295,7 @@ class _Search:
         if self._yielding is None:
             return None
         problem = self._yielding
-        u = np.zeros(len(problem.columns))
-        u[: len(rows.u)] = rows.u
-        springs = problem.linearise(u).A[:, -3:, len(rows.u) : len(rows.u) + NUM_JOINTS]
-        reach = _SPRING_SIGMAS * np.linalg.norm(springs, axis=(1, 2))
+        reach = _SPRING_SIGMAS * np.linalg.norm(spring_columns(problem, rows.u)[:, -3:], axis=(1, 2))
         missed = np.linalg.norm(self._problem.residuals(rows.u)[:, -3:], axis=1)
         if np.mean((missed < reach)[~rows.kept]) <= _MOST:
             return None
@@ -392,8 +394,3 @@ class _Search:
                 f"{int(kept.sum())} measurements do not determine {', '.join(hidden)}; "
                 f"measure at more, and at more different configurations, or fix these parameters"
             )
-
-
-def _misfit(at: Linearised, noise: NoiseModel) -> float:
-    whitened = np.einsum("nij,nj->ni", noise.whitening(at.J), at.residuals)
-    return float(np.sqrt(np.sum(whitened**2) / max(whitened.size - taken(at, noise), 1.0)))

@@ -8,6 +8,7 @@ import numpy as np
 from robots.calibration.error_model import ErrorModel
 from robots.calibration.measurements import MeasurementNoise, Measurements
 from robots.calibration.reduction import ReducibleModel, Reduction
+from robots.calibration.solver.left_over import GravityTest
 from robots.calibration.yielding_joints import COMPLIANCE_NAMES
 from robots.description.calibration import Calibration
 from robots.description.model import NUM_JOINTS, RobotModel
@@ -36,6 +37,7 @@ class Identified:
     is_noise_known: bool
     noise_belief: MeasurementNoise | None  # what estimated noise leans on, where the rows hardly tell it
     misfit: float  # size of the residuals in units of the noise: about one where the noise explains them
+    gravity: GravityTest | None  # of springs; None where they are parameters, or the rows cannot tell them
     lacks_something: bool  # whether rows that fit together are not explained by these parameters
     design: np.ndarray  # triangle of the whitened derivatives by the free parameters in units of the prior
     outliers: tuple[int, ...]  # the numbers of rows with gross errors

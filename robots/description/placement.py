@@ -6,6 +6,7 @@ import numpy as np
 from pydrake.math import RigidTransform, RotationMatrix
 
 from robots.configuration.quantity import vector
+from robots.configuration.shortest import all_shortest
 from robots.pose import rotation_from_zyx, zyx_from_rotation
 
 LONGEST_TOOL = 5.0  # m, from the flange to the tip
@@ -45,9 +46,8 @@ def long_tool_note(tool: Placement) -> str:
 def placement_entry(X: RigidTransform, source: str) -> dict:
     """What a robot file says of a transform, child in parent."""
     angles = np.rad2deg(zyx_from_rotation(X.rotation().matrix()))
-    # Rounded to what the arithmetic has: zeros come out as such.
     return {
-        "translation": (np.round(X.translation(), 15) + 0.0).tolist(),
-        "zyx_deg": (np.round(angles, 13) + 0.0).tolist(),
+        "translation": all_shortest(X.translation(), 1e-15),
+        "zyx_deg": all_shortest(angles, 1e-13),
         "source": source,
     }

@@ -184,17 +184,26 @@ def test_a_result_of_the_wrong_size_is_named(my_law: str, right: str, wrong: str
 
 
 @pytest.mark.parametrize("command", ["run", "compare"])
-@pytest.mark.parametrize(("at", "method"), [("shift, rate", "step"), ("here, _", "initial_state")])
-def test_an_exception_of_it_is_one_line_with_its_place(my_law: str, at: str, method: str, command: str):
+@pytest.mark.parametrize(
+    ("at", "method", "raises", "what"),
+    [
+        ("shift, rate", "step", "{}['gain']", "KeyError: 'gain'"),
+        ("here, _", "initial_state", "{}['gain']", "KeyError: 'gain'"),
+        ("shift, rate", "step", "raise SystemExit(0)", "SystemExit: 0"),
+    ],
+)
+def test_an_exception_of_it_is_one_line_with_its_place(
+    my_law: str, at: str, method: str, raises: str, what: str, command: str
+):
     """Its author looks for the line of his own file, not for ours."""
     path = Path(my_law.rpartition(":")[0])
     lines = printed().splitlines()
     number = next(n for n, line in enumerate(lines) if line.strip().startswith(at))
-    lines[number] = "        {}['gain']"
+    lines[number] = f"        {raises}"
     path.write_text("\n".join(lines))
     told = truetip(command, f"--law{'s' if command == 'compare' else ''}={my_law}", *SHORT)
     assert told.exit_code == 1
-    assert f"{path.name}, line {number + 1}, in {method}: KeyError: 'gain'" in told.stderr
+    assert f"{path.name}, line {number + 1}, in {method}: {what}" in told.stderr
     assert "Traceback" not in told.stderr
 
 
@@ -220,8 +229,16 @@ def test_what_is_no_law_is_refused_in_one_line(tmp_path: Path):
 @pytest.mark.parametrize(
     ("text", "why"),
     [
-        ("def broken(:\n", "SyntaxError"),
-        ("import nothing_of_that_name\n", "ModuleNotFoundError: No module named 'nothing_of_that_name'"),
+        ("\ndef broken(:\n", "mine.py, line 2: SyntaxError: invalid syntax\n"),
+        (
+            "import nothing_of_that_name\n",
+            "mine.py, line 1: ModuleNotFoundError: No module named 'nothing_of_that_name'",
+        ),
+        ("def gain():\n    return {}['gain']\ngain()\n", "mine.py, line 2, in gain: KeyError: 'gain'"),
+        (
+            "class Mine:\n    def __init__(self, *_):\n        raise SystemExit('no licence')\n",
+            "mine.py, line 3, in __init__: SystemExit: no licence",
+        ),
         (
             "from pydrake.systems.primitives import Adder\n"
             "class Mine(Adder):\n    def __init__(self, *_): super().__init__(2, 6)\n",
@@ -252,7 +269,7 @@ def test_what_is_no_law_is_refused_in_one_line(tmp_path: Path):
             "from systems.servo.open_loop import OpenLoop\nclass Mine(OpenLoop):\n    colour = 'mauvish'\n",
             "colour must look like #7a5195",
         ),
-        ("import sys\nsys.exit(3)\n", "SystemExit: 3"),
+        ("import sys\nsys.exit(3)\n", "mine.py, line 2: SystemExit: 3"),
         ("class Mine:\n    pass\n", "Mine"),
         (
             "from systems.servo.law import ServoLaw\nclass Mine(ServoLaw):\n    pass\n",
@@ -260,7 +277,18 @@ def test_what_is_no_law_is_refused_in_one_line(tmp_path: Path):
         ),
     ],
     ids=[
-        *("syntax", "import", "missing port", "unknown port", "config", "no dataclass", "title", "colour"),
+        *(
+            "syntax",
+            "import",
+            "raises",
+            "exit of the class",
+            "missing port",
+            "unknown port",
+            "config",
+            "no dataclass",
+            "title",
+            "colour",
+        ),
         *("exit", "no system", "no step"),
     ],
 )

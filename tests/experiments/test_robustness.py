@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from diagrams.scenario.scenario import load_scenario
+from experiments.robustness import command
 from experiments.robustness.cases import CASES
 from experiments.robustness.contenders import contenders
 from experiments.robustness.mixed import ROBOTS
@@ -162,6 +163,22 @@ def test_what_is_left_after_an_event_is_told(tmp_path: Path):
     assert judged_case["recovered_mm"][0] > 5.0
 
 
+@pytest.mark.parametrize(("failing", "code"), [("all", 1), ("one", 0)])
+def test_a_command_of_which_nothing_came_to_its_end_has_failed(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, failing: str, code: int
+):
+    """As a comparison has that lacks a law; among many robots one may fail, and is named."""
+    file = tmp_path / "numbers.json"
+    done = row(1000, [1.0]) | {"case": "plain", "law": "open_loop"}
+    failed = row(1001, [], "ran away") | {"case": "plain", "law": "open_loop"}
+    rows = [failed, failed] if failing == "all" else [done, failed]
+    monkeypatch.setattr(command, "run_trials", lambda *_: rows)
+    result = truetip("robustness", "--laws", "open_loop", "--seeds", 2, "--json", file)
+    assert result.exit_code == code
+    assert json.loads(file.read_text())["results"][0]["failures"][-1].endswith("ran away")
+    assert ("truetip: no run came to its end" in result.stderr) == (code == 1)
+
+
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
@@ -169,6 +186,8 @@ def test_what_is_left_after_an_event_is_told(tmp_path: Path):
         (["--laws", "nothing"], "nothing"),
         (["--laws", "pbvs+elastic"], "'pbvs+elastic': behind + stands one of"),
         (["--laws", "pbvs@calibrated,pbvs@calibrated"], "'pbvs@calibrated' is there twice"),
+        (["--cases", "plain,plain"], "--cases: 'plain' is there twice"),
+        (["--paths", "circle,circle"], "--paths: 'circle' is there twice"),
         (["--seeds", 0], "--seeds"),
         (["--paths", "spiral"], "spiral"),
         (

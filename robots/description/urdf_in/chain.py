@@ -209,7 +209,7 @@ class UrdfText:
             names = ", ".join(joint.name for joint in joints) or "none"
             raise ConfigurationError(
                 f"{self.label}: needs six revolute joints in a row, got {len(joints)}: {names}; a part of "
-                "them is chosen with --base-link LINK and --tip-link LINK"
+                "them is chosen with truetip robots import --base-link LINK --tip-link LINK"
             )
 
     def _tip_behind(self, joint: UrdfJoint) -> str:

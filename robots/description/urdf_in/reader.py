@@ -22,6 +22,7 @@ from pydrake.multibody.tree import JacobianWrtVariable, RevoluteJoint, RigidBody
 from pydrake.systems.framework import Context
 
 from robots.configuration.nodes import ConfigurationError, Node
+from robots.configuration.shortest import all_shortest, shortest
 from robots.description.placement import placement_entry
 from robots.description.urdf_in.assumed import (
     assumed_drive_trains,
@@ -40,6 +41,7 @@ _SAMPLES = 200  # configurations among which the largest inertia is looked for
 _FULL_TURN = 360.0  # deg, either way, of a joint without limits
 _SPEED = 180.0  # deg/s, of a joint that does not say it
 _NO_MASS = 1e-9  # kg
+_ROUNDING = 1e-14  # of sums over bodies: what is smaller beside the largest is zero
 _LARGEST = 100.0  # m, that an arm reaches
 
 
@@ -209,7 +211,7 @@ class _Arm:
         return self._plant.CalcRelativeTransform(self._context, a.body_frame(), b.body_frame())
 
     def _limits(self, joint: RevoluteJoint, source: str) -> dict:
-        limits = [float(np.rad2deg(v)) for v in (joint.position_lower_limit(), joint.position_upper_limit())]
+        limits = all_shortest(np.rad2deg([joint.position_lower_limit(), joint.position_upper_limit()]))
         assumed = []
         if not all(map(math.isfinite, limits)):
             limits = [-_FULL_TURN, _FULL_TURN]
@@ -219,7 +221,7 @@ class _Arm:
                 f"joint '{joint.name()}': has no range, its limits are {limits[0]:g} and {limits[1]:g} deg",
                 joint.name(),
             )
-        speed = float(np.rad2deg(joint.velocity_upper_limit()))
+        speed = shortest(np.rad2deg(joint.velocity_upper_limit()))
         if not (math.isfinite(speed) and speed > 0.0):
             speed = _SPEED
             assumed.append("speed")
@@ -257,11 +259,11 @@ class _Arm:
         if not principal.min() > 0.0:
             raise self._text.refuse(f"link '{body.name()}' has a mass and no inertia", body.name())
         return {
-            "mass": M.get_mass(),
-            "inertia": moments.tolist(),
-            "products": products.tolist(),
+            "mass": shortest(M.get_mass()),
+            "inertia": all_shortest(moments),
+            "products": all_shortest(products, _ROUNDING * moments.max()),
             "source": f"{source}; inertia made the nearest that a body can have" if is_corrected else source,
-            "center_of_mass": p.tolist(),
+            "center_of_mass": all_shortest(p, _ROUNDING * reach),
             "center_of_mass_source": source,
             "radius": assumed_radius(M.get_mass(), principal, reach),
             "radius_source": "assumed: a solid cylinder of this inertia",

@@ -82,7 +82,7 @@ REFUSED = {
     "compare --laws pbvss": "got 'pbvss'; did you mean pbvs?",
     "compare --laws law.py:Mine": "law: law.py has no class 'Mine'",
     "compare --laws law.py:Other": "law Other: Other() takes no arguments",
-    "compare --laws raises.py:Mine": "law: raises.py: ZeroDivisionError: division by zero",
+    "compare --laws raises.py:Mine": "law: raises.py, line 1: ZeroDivisionError: division by zero",
     "compare --laws nofile.py:Mine": "there is no file nofile.py",
     "compare --feedforward rigidd": "got 'rigidd'; did you mean rigid?",
     "compare --feedforward law.py:Mine": "--feedforward law.py:Mine: feedforward: law.py",

@@ -20,9 +20,10 @@ from experiments.cli.cluster import DaskCluster
 from experiments.cli.workers import in_order
 from experiments.study import rows
 from experiments.study.command import study_verdict
-from experiments.study.rows import first_run, run_row, study_rows
+from experiments.study.rows import first_run, robots_of, run_row, study_rows
 from experiments.study.store import TABLE, alone_in
-from experiments.study.study_file import Levels, Study, load_study
+from experiments.study.study_file import Factor, Levels, Names, Study, load_study
+from robots.description.model import load_robot
 from tests.experiments.commands import refusal, truetip
 
 pytestmark = pytest.mark.real_time
@@ -54,6 +55,15 @@ def test_every_point_has_its_row_and_a_failure_its_reason(study):
     assert [row["station.payload"] for row in rows] == [0.0, 2000.0]
     assert rows[0]["max_norm_mm"] > 1.0
     assert "station.payload must be between 0 and 1000 kg" in rows[1]["failure"]
+
+
+def test_the_robots_of_a_study_are_known_before_it_runs_each_once():
+    levels: dict[str, Factor] = {
+        "robot": Names(["kr16", "crx10ial"]),
+        "station.payload": Levels([0, 1]),
+    }
+    found = robots_of(study_rows(Study(laws=["open_loop", "pbvs"], factors=levels)))
+    assert [robot.name for robot in found] == [load_robot(name).name for name in ("kr16", "crx10ial")]
 
 
 @pytest.mark.slow
@@ -219,7 +229,7 @@ def test_a_law_that_has_failed_is_not_the_best_for_what_it_leaves_out():
     ("error", "reason"),
     [
         (ZeroDivisionError("by zero"), "ZeroDivisionError: by zero"),
-        (SystemExit("condition 'AllFinite(q)' failed."), "SystemExit: condition 'AllFinite(q)' failed."),
+        (SystemExit("'AllFinite(q)' failed."), "law open_loop, seed 0: SystemExit: 'AllFinite(q)' failed."),
     ],
 )
 def test_a_class_of_ones_own_that_raises_fails_its_row_and_no_other(

@@ -12,9 +12,10 @@ from pydrake.multibody.plant import MultibodyPlant
 from pydrake.systems.framework import DiagramBuilder
 
 from robots.configuration.nodes import ConfigurationError
-from robots.description.foreign_sources import foreign_sources_note
+from robots.configuration.shortest import shortest
 from robots.description.model import RobotFileError, RobotModel, load_robot, robot_of, shipped_robots
 from robots.description.robot_file import robot_text
+from robots.description.source_notes import foreign_sources_note
 from robots.description.urdf import urdf_text
 from robots.description.urdf_in.masses import SHARES
 from robots.description.urdf_in.reader import read_urdf
@@ -86,6 +87,17 @@ def test_what_is_written_is_read_again(name: str, tmp_path: Path):
     )
     for attribute in ("lower", "upper", "speed"):
         np.testing.assert_allclose(getattr(read, attribute), getattr(robot, attribute), rtol=1e-12)
+
+
+def test_numbers_are_those_that_somebody_would_have_written(tmp_path: Path):
+    """Degrees of radians with twelve digits, and sums of bodies in turned frames, leave rounding."""
+    (tmp_path / "arm.urdf").write_text(arm().replace('lower="-2"', 'lower="-6.28318530718"'))
+    robot = load_robot(str(tmp_path / "arm.urdf"))
+    assert [joint.limits.lower_deg for joint in robot.joints] == [-360.0] * 6
+    assert [link.center_of_mass.tolist() for link in robot.links] == [[0.01, 0.0, 0.1]] * 6
+    assert all(len(repr(float(x))) <= 18 for link in robot.links for x in (*link.inertia, *link.products))
+    values = np.random.default_rng(0).normal(size=1000) * 10.0 ** np.arange(-10, 10).repeat(50)
+    np.testing.assert_allclose([shortest(value) for value in values], values, rtol=1e-13)
 
 
 def test_a_robot_file_may_extend_a_urdf_and_hold_one(tmp_path: Path):

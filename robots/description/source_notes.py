@@ -1,4 +1,4 @@
-"""Robot files that were copied from another robot's, with its sources still in them."""
+"""What sources in a robot file say against its numbers: those of another robot, or springs all assumed."""
 
 import re
 from collections.abc import Iterator
@@ -8,6 +8,7 @@ from importlib.resources import files
 from typing import Any
 
 from robots.description.model import RobotModel, shipped_robots
+from robots.description.urdf_in.assumed import SOURCE
 
 _ASSUMED = "assumed"
 
@@ -41,6 +42,22 @@ def foreign_sources_note(robot: RobotModel) -> str:
         return ""
     parts = ", ".join(f"{count} of {name}" for name, count in found.items())
     return f"sources in the file of {robot.name} are those of another robot: {parts}; are its numbers, too?"
+
+
+def assumed_note(robot: RobotModel) -> str:
+    """What the import of a URDF has assumed of a robot, and where real numbers belong, in a sentence.
+
+    Empty where the springs of one joint at least are from elsewhere: somebody has looked after them then.
+    """
+    if any(joint.drive_train.source != SOURCE for joint in robot.joints):
+        return ""
+    has_bearings = all(joint.tilting is not None and joint.tilting.source == SOURCE for joint in robot.joints)
+    parts = "gear springs, motors, friction" + (" and bearings" if has_bearings else "")
+    return (
+        f"{parts} of {robot.name} are assumed from the inertia that each joint moves, and millimetres that "
+        "are simulated rest on them; real ones belong in drive_train and tilting of its robot file (of a "
+        "URDF: truetip robots import --write), truetip identify finds them"
+    )
 
 
 @cache
