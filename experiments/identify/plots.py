@@ -29,23 +29,28 @@ def table_head(study: IdentifyStudy) -> list[str]:
 
 
 def table_rows(study: IdentifyStudy) -> list[list[str]]:
-    """Parameters with their uncertainty, and the truth of a simulated robot."""
+    """Parameters with their uncertainty, and the truth of a simulated robot.
+
+    A share of a value that may as well be zero, such as the play of a gear without any, says nothing: there
+    the standard deviation, and the error of what truly is zero, stand in the parameter's unit.
+    """
     rows = []
     for each in study.parameters:
         row = [
             each.name,
             f"{each.value:.4g}",
-            f"{each.sigma / abs(each.value):.2%}" if each.value else "-",
+            f"{each.sigma / abs(each.value):.2%}" if each.sigma < abs(each.value) else f"± {each.sigma:.2g}",
             each.unit,
             "yes" if each.identifiable else "no",
         ]
         if study.plant is not None:
-            row += [
-                "-" if each.true is None else f"{each.true:.4g}",
-                f"{each.value / each.true - 1.0:+.2%}" if each.true else "-",
-            ]
+            row += ["-", "-"] if each.true is None else [f"{each.true:.4g}", _error(each.value, each.true)]
         rows.append(row)
     return rows
+
+
+def _error(value: float, true: float) -> str:
+    return f"{value / true - 1.0:+.2%}" if true else f"{value:+.2g}"
 
 
 def verdict(study: IdentifyStudy) -> str:
@@ -194,9 +199,9 @@ def write_identify_page(path: Path, study: IdentifyStudy, searches: SearchCompar
     """All of it as a page that opens offline."""
     parameters = Section(
         "Parameters",
-        "Dampers as retardation times, damper over spring. Sigma contains what cases and sensors "
-        "disagree about; known is what is sure to 3 % (springs), 25 % (dampers), 5 % (gains of drives), 10 % "
-        "(friction) or 0.2 ms (delays).",
+        "Dampers as retardation times, damper over spring. Sigma contains what cases and sensors disagree "
+        "about, as a share of the value or, where it is larger than that, in its unit; known is what is sure "
+        "to 3 % (springs), 25 % (dampers), 5 % (gains of drives), 10 % (friction) or 0.2 ms (delays).",
         html_table(table_head(study), table_rows(study)),
     )
     spectra = Section(
