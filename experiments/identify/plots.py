@@ -13,6 +13,7 @@ from experiments.identify.judge.report import judge_section, judged
 from experiments.identify.search import SEARCH_HEAD, SearchComparison, search_rows
 from experiments.identify.study import IdentifyStudy
 from experiments.report.plot_page import Section, html_table, sortable_table, write_plot_page
+from robots.identification.identified_robot import STIFFNESS_KNOWN
 
 _MEASURED, _BEFORE, _AFTER = "#7a8696", "#e0a43a", "#2f7fd0"
 _UNITS = {"gyro": "rad/s", "accelerometer": "m/s<sup>2</sup>"}
@@ -71,6 +72,8 @@ def verdict(study: IdentifyStudy) -> str:
         said.append(f"{len(study.weak)} springs and dampers are not identifiable; the table marks them.")
     elif study.weak:
         said.append(f"Not identifiable: {', '.join(study.weak)}.")
+    if known < len(springs):
+        said.append(_reason(study, len(springs) - known))
     if study.rectangle_ratio is not None:
         said.append(
             f"On a rectangle the inverse model leaves {study.rectangle_ratio['identified']:.2f} of the "
@@ -83,6 +86,20 @@ def verdict(study: IdentifyStudy) -> str:
     if study.advice is not None:
         said.append(advised(study.advice))
     return " ".join(said)
+
+
+def _reason(study: IdentifyStudy, weak: int) -> str:
+    """Why so many springs are not known: what noise alone makes of them, and what disagrees beside."""
+    fit = study.found.fit
+    noise = np.sqrt(np.diagonal(fit.noise_covariance))
+    names = {
+        name for name, sigma in zip(fit.parameters.names, noise, strict=True) if sigma >= STIFFNESS_KNOWN
+    }
+    hidden = len(names.intersection(study.weak))
+    return (
+        f"Of {count(weak, 'spring')} noise alone hides {hidden}: larger or heavier motions or quieter sensors "
+        f"would show more. Of {weak - hidden} motions and sensors disagree by more than 3 %; sigma has it."
+    )
 
 
 def signals_figure(study: IdentifyStudy, case: int) -> go.Figure:
