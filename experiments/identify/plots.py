@@ -97,8 +97,9 @@ def _reason(study: IdentifyStudy, weak: int) -> str:
     }
     hidden = len(names.intersection(study.weak))
     return (
-        f"Of {count(weak, 'spring')} noise alone hides {hidden}: larger or heavier motions or quieter sensors "
-        f"would show more. Of {weak - hidden} motions and sensors disagree by more than 3 %; sigma has it."
+        f"Of {count(weak, 'spring')} noise alone hides {hidden}: larger or heavier motions or quieter "
+        f"sensors would show more. Of {weak - hidden} motions and sensors disagree by more than 3 %; sigma "
+        "has it."
     )
 
 
