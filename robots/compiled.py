@@ -4,16 +4,12 @@ numba takes a third of a second to import. Only who computes in every tick impor
 is made.
 """
 
-from collections.abc import Callable, Iterable
-from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any
 
 from numba import njit
 
 _FLOORS = "robots", "systems"
-
-Result = TypeVar("Result")
 
 
 def drop_outdated(root: Path) -> None:
@@ -37,17 +33,6 @@ def drop_outdated(root: Path) -> None:
 
 
 drop_outdated(Path(__file__).parents[1])
-
-
-def side_by_side(work: Callable[..., Result], *cases: Iterable[Any]) -> list[Result]:
-    """What `map` gives, on all cores: compiled loops and numpy let other threads go on meanwhile.
-
-    Args:
-        work: spends its time in these, and changes nothing that another case reads.
-        cases: its arguments.
-    """
-    with ThreadPoolExecutor() as threads:
-        return list(threads.map(work, *cases))
 
 
 # The way into C is not needed; numba takes the last options without declaring them. A division by zero gives

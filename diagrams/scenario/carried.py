@@ -3,11 +3,13 @@
 Path, load and home position of a scenario fit one robot. Another one gets the same path at its own size:
 turned and moved so that the middle of the path, with the tool's orientation there, is a place where this
 robot moves freely, smaller where it would not reach all of it, and slower where its joints are slow. Its load
-is the same share of what it may carry. What is said explicitly, as by ``--set``, stays.
+is the same share of what it may carry, and its motors are controlled as quickly. What is said explicitly, as
+by ``--set``, stays.
 """
 
 import math
 from collections.abc import Collection, Iterator, Sequence
+from copy import copy
 from dataclasses import dataclass, replace
 from itertools import pairwise, product
 from typing import Any
@@ -22,11 +24,15 @@ from robots.kinematics.workspace import arm_length, dexterity, front, working_po
 from robots.measurement_design.constraints import AdmissibleConfigurations
 from robots.pose import rotation_from_zyx, zyx_from_rotation
 from systems.cell.events.station_events import PayloadChange
+from systems.estimation.drives.drive_gains import straight_inertia
 from systems.reference.paths import ReferenceConfig, make_path
 from systems.reference.shapes import Circle, Planned, Points, Rectangle, Shape, Waypoint
+from systems.servo.self_calibrating.config import SelfCalibratingConfig
 
 # What is carried over
 PATH, SPEED, HOME, PAYLOAD = "reference.path", "reference.acceleration", "home_deg", "station.payload"
+GAINS = tuple(f"station.drive.{name}" for name in ("position", "velocity", "motor_factors"))
+_LEARNING = "self_calibrating"  # the law that believes something of the drives
 _SAME = 0.05  # m, and of direction cosines: robots that are one machine with errors differ by less
 _PLACES = (12, 96)  # for its middle, the best first; the others where none of the first will do
 # Sizes of the path, over what the lengths of the arms say: rather slower than very small
@@ -70,7 +76,7 @@ def carried_over(
         scenario: as it was written.
         before: the robot for which it was written.
         robot: the one that is to run it.
-        stated: which of `PATH`, `HOME`, `PAYLOAD`, or fields of them, are said for this very robot.
+        stated: which of `PATH`, `HOME`, `PAYLOAD`, `GAINS`, or fields of them, are said for this very robot.
 
     Returns:
         The scenario, and what has changed in words; the same scenario and nothing if the robots are alike.
@@ -84,6 +90,10 @@ def carried_over(
     if not _is_stated(PAYLOAD, stated):
         scenario = _with_load(scenario, before, robot)
         notes.append(f"payload {scenario.station.payload:g} kg")
+    if not any(_is_stated(key, stated) for key in GAINS):
+        scenario = _with_gains(scenario, before, robot)
+        factors = scenario.station.drive.motor_factors
+        notes.append(f"gains of its motors {min(factors):g} to {max(factors):g} times as large")
     if not _is_stated(PATH, stated):
         placed = _place(scenario, before, robot, not _is_stated(SPEED, stated))
         usual = scenario.reference.acceleration
@@ -136,6 +146,25 @@ def _with_load(scenario: Scenario, before: RobotModel, robot: RobotModel) -> Sce
     )
     model = replace(model, payload=carried(model.payload), payload_centre_mm=beside(model.payload_centre_mm))
     return replace(scenario, station=station, servo=replace(scenario.servo, model=model))
+
+
+def _with_gains(scenario: Scenario, before: RobotModel, robot: RobotModel) -> Scenario:
+    """With as quick motors, though they turn more or less; also in what the controller believes.
+
+    The gains of drives without a cascade are torques of a motor. Left as they are, the speed loops of an
+    IRB 1200 are a hundred times as slow on a KR 210, and its weight moves it a hundred times as far.
+    """
+    now, then = (
+        straight_inertia(each, each.payload.largest_mass) / np.abs(each.gear_ratio)
+        for each in (robot, before)
+    )
+    station, laws = scenario.station, copy(scenario.servo.laws)  # as it is, with laws of one's own
+    factors = [float(f"{each:.3g}") for each in now / then * station.drive.motor_factors]
+    own = laws[_LEARNING]
+    assert isinstance(own, SelfCalibratingConfig)
+    setattr(laws, _LEARNING, replace(own, drives=replace(own.drives, motor_factors=factors)))
+    station = replace(station, drive=replace(station.drive, motor_factors=factors))
+    return replace(scenario, station=station, servo=replace(scenario.servo, laws=laws))
 
 
 @dataclass(frozen=True)

@@ -4,6 +4,7 @@ import re
 import resource
 import sys
 import time
+from collections.abc import Sequence
 from contextlib import ExitStack
 from pathlib import Path
 from typing import Annotated
@@ -13,6 +14,7 @@ import typer
 from rich.markup import escape
 
 from experiments.calibration.design_program import ProgramFiles
+from experiments.cli.console import count as counted
 from experiments.cli.console import print_files, progress_bar, refusing
 from experiments.cli.json_output import human_console, json_output
 from experiments.cli.option_limits import at_least, one_of, without_effect
@@ -22,6 +24,7 @@ from experiments.cli.staging import PAGE, TABLE, staged_file
 from experiments.report.files import write_text
 from experiments.report.plot_page import Section, write_plot_page
 from experiments.report.robot_plot import joints_figure, tips_figure
+from robots.calibration.reduction import shown_by_errors
 from robots.description.model import RobotModel
 from robots.measurement_design.candidate_grid import AxisRange, own_ranges
 from robots.measurement_design.clear_ways import ClearWays
@@ -137,11 +140,12 @@ def design_command(
                 progress,
                 is_complete=complete or None,
             )
-        seconds = time.perf_counter() - started
+        seconds, further = time.perf_counter() - started, shown_by_errors(model, position_only)
         result = {
             "criterion": criterion,
             "count": count,
             "parameters": design.num_parameters,
+            "shown_by_errors": further,
             "complete": design.is_complete,
             "b3": design.b3,
             "bound": design.bound,
@@ -159,7 +163,7 @@ def design_command(
         written = run.write(run_stage, design.configurations, position_only, vias)
         output.write(result)
         write_design_page(page, model, design)
-    human.print(escape(design_verdict(design)))
+    human.print(escape(design_verdict(design) + _further(further)))
     human.print(f"{seconds:.1f} s, {result['peak_mb']:.0f} MB beside the program itself")
     print_files(human, report, out, *written)
 
@@ -243,6 +247,15 @@ def design_verdict(design: MeasurementDesign) -> str:
         f"{design.num_parameters} parameters of {model}."
     )
     return text if design.criterion == "b3" else f"{text} B3 = {design.b3:.4g}."
+
+
+def _further(names: Sequence[str]) -> str:
+    if not names:
+        return ""
+    return (
+        f" These show on the robot as drawn; on one whose errors move its tool off its axis "
+        f"{counted(len(names), 'parameter')} more will: {', '.join(names)}."
+    )
 
 
 def configuration_text(design: MeasurementDesign) -> str:

@@ -162,7 +162,12 @@ def print_calibration(
 def calibration_verdict(study: CalibrationStudy, path: Mapping[str, Any] | None) -> str:
     """What was reached, in words."""
     identified = study.identified
-    text = f"{len(identified.names)} parameters from {len(identified.residuals)} measurements"
+    text = f"{len(identified.names)} parameters"
+    shown = [name for name in identified.reducible.shown_by_errors if name in identified.names]
+    if shown:
+        drawn = len(identified.names) - len(shown)
+        text += f" ({drawn} of the robot as drawn; {', '.join(shown)} show as its tool is off its axis)"
+    text += f" from {len(identified.residuals)} measurements"
     text += f" in {identified.iterations} iterations."
     text += noise_sentence(identified) + unexplained_sentence(identified)
     if identified.frame is not None:

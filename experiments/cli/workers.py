@@ -13,6 +13,7 @@ from multiprocessing.connection import wait as wait_for
 from typing import Any, Protocol, TypeVar
 
 from experiments.cli.one_thread import ONE_THREAD
+from robots.threads import take_one_thread
 
 _POLL = 0.1  # s between two looks at the progress
 _AHEAD = 4  # jobs per process that wait in its queue: enough that none is idle, few enough to hold in memory
@@ -171,6 +172,7 @@ _worker: dict[str, Any] = {}  # what a worker process shares with its parent
 
 def _start_worker(shares: Any, stop: Any) -> None:
     _worker.update(shares=shares, stop=stop)
+    take_one_thread()  # the cores are full of processes
     threading.Thread(target=_end_with_parent, daemon=True).start()
 
 

@@ -69,6 +69,7 @@ from experiments.identify.study import (
 from experiments.report.files import write_text
 from robots.description.model import RobotFileError, RobotModel, load_robot
 from robots.description.robot_file import robot_text
+from robots.threads import at_most
 from systems.cell.drive import DriveConfig
 
 # Options that say how to identify.
@@ -229,6 +230,7 @@ def identify_command(
             return
         truth = _plant(robot, plant, recording is not None)
         where = executor(scheduler, jobs)
+        stack.enter_context(at_most(jobs))  # what this process itself computes in threads
         if search is not None:
             check_pymoo()
         page = stack.enter_context(staged_file(report, *PAGE))

@@ -13,6 +13,7 @@ from experiments.identify.judge.report import judge_section, judged
 from experiments.identify.search import SEARCH_HEAD, SearchComparison, search_rows
 from experiments.identify.study import IdentifyStudy
 from experiments.report.plot_page import Section, html_table, sortable_table, write_plot_page
+from robots.identification.identified_robot import STIFFNESS_KNOWN
 
 _MEASURED, _BEFORE, _AFTER = "#7a8696", "#e0a43a", "#2f7fd0"
 _UNITS = {"gyro": "rad/s", "accelerometer": "m/s<sup>2</sup>"}
@@ -29,23 +30,28 @@ def table_head(study: IdentifyStudy) -> list[str]:
 
 
 def table_rows(study: IdentifyStudy) -> list[list[str]]:
-    """Parameters with their uncertainty, and the truth of a simulated robot."""
+    """Parameters with their uncertainty, and the truth of a simulated robot.
+
+    A share of a value that may as well be zero, such as the play of a gear without any, says nothing: there
+    the standard deviation, and the error of what truly is zero, stand in the parameter's unit.
+    """
     rows = []
     for each in study.parameters:
         row = [
             each.name,
             f"{each.value:.4g}",
-            f"{each.sigma / abs(each.value):.2%}" if each.value else "-",
+            f"{each.sigma / abs(each.value):.2%}" if each.sigma < abs(each.value) else f"± {each.sigma:.2g}",
             each.unit,
             "yes" if each.identifiable else "no",
         ]
         if study.plant is not None:
-            row += [
-                "-" if each.true is None else f"{each.true:.4g}",
-                f"{each.value / each.true - 1.0:+.2%}" if each.true else "-",
-            ]
+            row += ["-", "-"] if each.true is None else [f"{each.true:.4g}", _error(each.value, each.true)]
         rows.append(row)
     return rows
+
+
+def _error(value: float, true: float) -> str:
+    return f"{value / true - 1.0:+.2%}" if true else f"{value:+.2g}"
 
 
 def verdict(study: IdentifyStudy) -> str:
@@ -66,6 +72,8 @@ def verdict(study: IdentifyStudy) -> str:
         said.append(f"{len(study.weak)} springs and dampers are not identifiable; the table marks them.")
     elif study.weak:
         said.append(f"Not identifiable: {', '.join(study.weak)}.")
+    if known < len(springs):
+        said.append(_reason(study, len(springs) - known))
     if study.rectangle_ratio is not None:
         said.append(
             f"On a rectangle the inverse model leaves {study.rectangle_ratio['identified']:.2f} of the "
@@ -78,6 +86,21 @@ def verdict(study: IdentifyStudy) -> str:
     if study.advice is not None:
         said.append(advised(study.advice))
     return " ".join(said)
+
+
+def _reason(study: IdentifyStudy, weak: int) -> str:
+    """Why so many springs are not known: what noise alone makes of them, and what disagrees beside."""
+    fit = study.found.fit
+    noise = np.sqrt(np.diagonal(fit.noise_covariance))
+    names = {
+        name for name, sigma in zip(fit.parameters.names, noise, strict=True) if sigma >= STIFFNESS_KNOWN
+    }
+    hidden = len(names.intersection(study.weak))
+    return (
+        f"Of {count(weak, 'spring')} noise alone hides {hidden}: larger or heavier motions or quieter "
+        f"sensors would show more. Of {weak - hidden} motions and sensors disagree by more than 3 %; sigma "
+        "has it."
+    )
 
 
 def signals_figure(study: IdentifyStudy, case: int) -> go.Figure:
@@ -194,9 +217,9 @@ def write_identify_page(path: Path, study: IdentifyStudy, searches: SearchCompar
     """All of it as a page that opens offline."""
     parameters = Section(
         "Parameters",
-        "Dampers as retardation times, damper over spring. Sigma contains what cases and sensors "
-        "disagree about; known is what is sure to 3 % (springs), 25 % (dampers), 5 % (gains of drives), 10 % "
-        "(friction) or 0.2 ms (delays).",
+        "Dampers as retardation times, damper over spring. Sigma contains what cases and sensors disagree "
+        "about, as a share of the value or, where it is larger than that, in its unit; known is what is sure "
+        "to 3 % (springs), 25 % (dampers), 5 % (gains of drives), 10 % (friction) or 0.2 ms (delays).",
         html_table(table_head(study), table_rows(study)),
     )
     spectra = Section(

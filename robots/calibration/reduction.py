@@ -14,6 +14,7 @@ from scipy.linalg import qr
 
 from robots.calibration.error_model import ZEROS, ErrorModel
 from robots.calibration.prior import parameter_sizes
+from robots.description.model import RobotModel
 from robots.pose import pose_error
 
 TOLERANCE = 1e-8  # of the largest singular value; below it a direction is not there
@@ -67,6 +68,16 @@ class ReducibleModel:
     def independent(self, x: np.ndarray) -> np.ndarray:
         """Rising indices, (k,), of the parameters independent at x: the nominal robot's, and what x adds."""
         return np.sort(independent_columns(self.regressor(x), self._drawn))
+
+    @cached_property
+    def shown_by_errors(self) -> list[str]:
+        """Names of what does not show on the robot as drawn, but on one with errors as large as expected.
+
+        Positions of a tool that is drawn on the last axis say nothing of that joint; an error that moves the
+        tool off it brings its zero and its place to light.
+        """
+        x = self._sizes * np.random.default_rng(0).choice([-1.0, 1.0], size=len(self._sizes))
+        return [self._model.names[i] for i in np.setdiff1d(self.independent(x), self._drawn)]
 
     def reduce(self, x: np.ndarray, independent: np.ndarray | None = None) -> Reduction:
         """Describes the robot with parameters x, (m,), by independent ones alone."""
@@ -135,6 +146,11 @@ class ReducibleModel:
         if self._position_only:
             return wanted[:, :3, 3] - X[:, :3, 3]
         return pose_error(wanted, X)
+
+
+def shown_by_errors(robot: RobotModel, position_only: bool) -> list[str]:
+    """As the attribute of `ReducibleModel`, of a nominal robot."""
+    return ReducibleModel(ErrorModel(robot), position_only).shown_by_errors
 
 
 def independent_columns(

@@ -28,10 +28,10 @@ _MOVING = 0.05  # of the largest speed of a case: slower motors stand still for 
 
 @dataclass(frozen=True)
 class ArmAlongMotion:
-    """One case; e sprung joints, c channels (three of a sensor), k knots, n samples, b of them base samples.
+    """One case; e sprung joints, c channels (three of a sensor), k knots, n samples.
 
     What changes with the posture is known at knots, to be interpolated linearly; what changes with the
-    acceleration at base samples.
+    acceleration at all samples: motors of light robots start and stop from one sample to the next.
     """
 
     knots: np.ndarray  # (k,) samples
@@ -112,13 +112,12 @@ class ElasticArm:
             shown[i] = at_body.Shift(p_BS_W, shown[i]).translational() - self._gravity
         return torques, (shown[:, None] @ R_WB @ self._rotations).ravel()
 
-    def along(self, case: MotionCase, knot_time: float = 0.02, base_step: int = 2) -> ArmAlongMotion:
+    def along(self, case: MotionCase, knot_time: float = 0.02) -> ArmAlongMotion:
         """Linearises about a case.
 
         Args:
             case: whose motors move.
             knot_time: between knots in s while they do.
-            base_step: samples between base samples.
         """
         theta, rate, acceleration = case.theta, case.rate, case.acceleration
         knots = _knots(case, knot_time)
@@ -128,9 +127,8 @@ class ElasticArm:
         )
         samples = np.arange(len(theta))
         x_0 = np.stack([np.interp(samples, knots, column) for column in rest.T], axis=1)
-        base = np.unique(np.append(samples[::base_step], samples[-1]))
-        at_base = [self._at(theta[k], rate[k], acceleration[k], x_0[k]) for k in base]
-        load, readings = (interpolated(base, np.array(each), samples) for each in zip(*at_base, strict=True))
+        at_samples = [self._at(theta[k], rate[k], acceleration[k], x_0[k]) for k in samples]
+        load, readings = (np.array(each) for each in zip(*at_samples, strict=True))
         return ArmAlongMotion(
             knots, mass, coriolis, stiffness, rest, by_turn, by_speed, by_acceleration, load, readings
         )

@@ -13,6 +13,7 @@ from robots.identification.arm_response import Grid
 from robots.identification.elastic_parameters import ElasticParameters
 from robots.identification.first_stage import (
     COARSE,
+    CONVERGED,
     NEAR,
     arm_problem,
     few,
@@ -32,7 +33,7 @@ from robots.identification.recording import (
 
 # Whether few motions alone, and how many steps; between rounds times, rests and equations become better.
 _ROUNDS = ((True, 8), (False, 5), (False, 5))
-_LAST_STEPS = 10
+_LAST_STEPS = 30
 _PHASES = 4  # of a motion
 _PHASE = 0.1  # s, of the ringing
 _PLACES = (-1.0, -0.5, 0.0, 0.5, 1.0)  # within the play of a gear, tried
@@ -283,7 +284,7 @@ def identify_arm(
         data.bring_near(parameters, robot.gear_ratio, found, everything)
         tell(0.7 if is_few else 0.85)
     problem = data.problem(parameters, robot.gear_ratio, everything, _FINE)
-    found, shift = problem.solve(found, problem.spread(found, floor), _LAST_STEPS, NEAR)
+    found, shift = problem.solve(found, problem.spread(found, floor), _LAST_STEPS, CONVERGED)
     tell(0.95)
     before = problem.readings(parameters.start)
     phases = _phases(data.cases, problem.response.kept)

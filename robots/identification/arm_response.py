@@ -23,6 +23,7 @@ from robots.identification.elastic_parameters import (
     ElasticParameters,
 )
 from robots.identification.motion import BETA, GAMMA, MotionCase, SensorPlace
+from robots.threads import side_by_side
 
 _G = slice(0, NUM_JOINTS)  # gears among the sprung joints
 _CLOSE = 2  # samples
@@ -101,7 +102,6 @@ class ArmResponse:
 
     def __call__(self, p: np.ndarray, sensitivity: bool = True) -> Response:
         """Goes through all cases with unknowns p, shape (n,)."""
-        from robots.compiled import side_by_side
         from robots.identification import response_kernels  # imports numba
 
         numbers = self._parameters.numbers(p)

@@ -17,6 +17,9 @@ from robots.identification.elastic_parameters import ElasticParameters
 from robots.identification.motion import MotionCase, SensorPlace
 
 NEAR = 1e-3  # relative, at which a stage is left for the next one
+# At which the last one ends: far below what noise leaves open, so that no part of the data still pulls the
+# unknowns, which would count as if it disagreed with the others.
+CONVERGED = 1e-5
 COARSE = Grid(1, 2, 4)
 _FEW = 6  # cases
 # s after the motions up to which readings count, and the largest number of steps.

@@ -16,7 +16,7 @@ from pydrake.systems.primitives import (
     ZeroOrderHold,
 )
 
-from robots.configuration.quantity import positive, quantity
+from robots.configuration.quantity import numbers, positive, quantity
 from robots.description.model import NUM_JOINTS, RobotModel
 from robots.dynamics.plant import add_robot
 from systems.cell.command_interpolator import CommandInterpolator
@@ -53,6 +53,9 @@ class DriveConfig:
 
     position: PiGains = field(default_factory=lambda: PiGains(80.0, 1.0))
     velocity: PiGains = field(default_factory=lambda: PiGains(100.0, 1.0))
+    # Of each joint, times the gains of `position` and `velocity`: those are torques of the motors of one
+    # robot, and the motors of another one have to turn more or less. A cascade knows what it turns.
+    motor_factors: list[float] = numbers((1.0,) * NUM_JOINTS, (NUM_JOINTS,), 0.0, is_open=True)
     cascade: CascadeGains = field(default_factory=CascadeGains)
     # Transport, from the issue of a command to the instant the drive is at it
     command_delay: float = quantity(4e-3, 0.0, 1.0, "s")
@@ -143,7 +146,7 @@ class Drive(Diagram):
 
 def _pid_gains(robot: RobotModel, kind: str, config: DriveConfig, rigid_plant: MultibodyPlant) -> PidGains:
     """Joint-side gains of the PID law that the drive amounts to."""
-    ratio = robot.gear_ratio
+    ratio = robot.gear_ratio * np.asarray(config.motor_factors)
     if kind == "position":
         return PidGains(config.position.proportional * ratio, config.position.integral * ratio, 0.0 * ratio)
     if kind == "velocity":

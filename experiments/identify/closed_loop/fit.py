@@ -18,6 +18,7 @@ from robots.identification.arm_fit import ArmFit, part_of, scatter
 from robots.identification.closed_loop.driven_arm import DrivenArm, DrivenCase, DriveTorques
 from robots.identification.identified_robot import identified_robot
 from robots.identification.motion import MotionCase
+from robots.threads import side_by_side
 from systems.cell.drive import CascadeGains, DriveConfig
 
 GAINS = ("position", "velocity", "integral")
@@ -176,8 +177,6 @@ class ClosedLoopProblem:
     def residuals(self, p: np.ndarray, brings_near: bool = False) -> list[np.ndarray]:
         """Of each case (m, 12): modelled less measured, speeds in rad/s and torques in N m between ticks."""
         self.evaluations += 1
-        from robots.compiled import side_by_side  # imports numba
-
         unknowns = self._unknowns
         arm = unknowns.arm(p)
         numbers = arm.parameters.numbers(arm.values)

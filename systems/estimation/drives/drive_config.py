@@ -2,7 +2,8 @@
 
 from dataclasses import dataclass
 
-from robots.configuration.quantity import positive, quantity
+from robots.configuration.quantity import numbers, positive, quantity
+from robots.description.model import NUM_JOINTS
 
 
 @dataclass
@@ -19,6 +20,8 @@ class DriveModelConfig:
     # to the plan, less where commands are late
     braking: float = positive(100.0, "N m s/rad")
     held_to_plan: float = positive(7.0, "1/s")
+    # Of each joint, times stiffness, restoring and braking: what its motor turns over what the first one did
+    motor_factors: list[float] = numbers((1.0,) * NUM_JOINTS, (NUM_JOINTS,), 0.0, is_open=True)
     feedback: float = quantity(20.0, 0.0, unit="1/s")  # of what a cascade leaves, at most; 0: none
     # With which the planner of a robot's controller follows references, as of EGM
     following: float = positive(20.0, "1/s")

@@ -71,7 +71,7 @@ def _gains(
     robot: RobotModel, payload: float, config: DriveModelConfig, kind: str, period: float
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Of a following error, its integral and its rate, joint side, (6,) each."""
-    ratio = np.abs(robot.gear_ratio)
+    ratio = np.abs(robot.gear_ratio) * np.asarray(config.motor_factors)
     if kind == "position":
         kp, ki = config.stiffness * ratio, config.restoring * ratio
         return kp, ki, _AT_ONCE * period * kp

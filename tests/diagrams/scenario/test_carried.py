@@ -13,8 +13,11 @@ from robots.kinematics.error_kinematics import ErrorKinematics
 from robots.kinematics.forward import Kinematics
 from robots.kinematics.workspace import arm_length, dexterity
 from robots.pose import rotation_vector
+from systems.cell.drive import Drive
 from systems.cell.events.station_events import PayloadChange
+from systems.estimation.drives.drive_gains import straight_inertia
 from systems.reference.paths import make_path
+from systems.servo.self_calibrating.config import SelfCalibratingConfig
 from tests.robots.urdfs import published
 
 IRB1200 = load_robot("irb1200")
@@ -101,9 +104,8 @@ def test_every_shape_is_carried_and_can_be_written(path: str, tmp_path: Path):
 
 def test_what_is_stated_stays():
     scenario = load_scenario("misaligned")
-    kept, note = carried_over(
-        scenario, IRB1200, load_robot("kr16"), {"reference.path.waypoints", "home_deg", "station.payload"}
-    )
+    stated = {"reference.path.waypoints", "home_deg", "station.payload", "station.drive.motor_factors"}
+    kept, note = carried_over(scenario, IRB1200, load_robot("kr16"), stated)
     assert (kept, note) == (scenario, "")
 
 
@@ -171,3 +173,26 @@ def test_the_drawing_of_a_file_is_found_beside_it(tmp_path: Path):
     (tmp_path / "true.yaml").write_text("extends: drawn.yaml\n")
     changed = with_robot(load_scenario("everything-realistic"), str(tmp_path / "true.yaml"))
     assert load_robot(changed.servo.model.robot).name == load_robot("kr16").name
+
+
+def test_drives_turn_their_motors_as_quickly_as_those_of_the_robot_before():
+    """Gains of a motor that turns 260 times as much leave 260 times as much of what it should."""
+    before, robot = load_scenario("misaligned"), load_robot("kr210")
+    scenario, note = carried_over(before, IRB1200, robot)
+    assert "gains of its motors 100 to 260 times as large" in note
+
+    def quickness(scenario: Scenario, robot: RobotModel) -> np.ndarray:
+        drive = Drive(robot, "velocity", scenario.station.drive, 0.004, scenario.station.payload)
+        return drive.gains.derivative / straight_inertia(robot, scenario.station.payload)
+
+    np.testing.assert_allclose(quickness(scenario, robot), quickness(before, IRB1200), rtol=0.01)
+    believed = scenario.servo.laws["self_calibrating"]
+    assert isinstance(believed, SelfCalibratingConfig)
+    assert believed.drives.motor_factors == scenario.station.drive.motor_factors
+
+
+def test_gains_that_are_stated_stay():
+    stated = "station.drive.velocity.proportional"
+    before = load_scenario("misaligned", [f"{stated}=500"])
+    scenario, _ = carried_over(before, IRB1200, load_robot("kr16"), {stated})
+    assert scenario.station.drive.motor_factors == [1.0] * 6

@@ -50,6 +50,19 @@ def test_a_design_is_written_with_its_bound_and_its_picture(tmp_path: Path):
     assert "plotly" in page.read_text()
 
 
+@pytest.mark.slow
+def test_design_and_calibration_count_the_same_parameters_of_positions(tmp_path: Path):
+    """A tool that is drawn on axis 6 says nothing of joint 6; one that is 10 mm beside it does."""
+    design = truetip("design", "--position-only", "--count=12", f"--report={tmp_path / 'design.html'}")
+    assert "It determines 25 parameters" in " ".join(design.output.split())
+    assert "2 parameters more will: joint6_x, joint6_rx" in " ".join(design.output.split())
+    options = ["--position-only", "--count=20", "--out", str(tmp_path)]
+    result = truetip("calibrate", *SMALL, *QUIET, *options)
+    assert "27 parameters (25 of the robot as drawn; joint6_x, joint6_rx show" in " ".join(
+        result.output.split()
+    )
+
+
 def test_a_calibration_tells_what_it_is_worth(calibrated: Path):
     result = json.loads((calibrated / "result.json").read_text())
     assert result["identifiable"] == 30

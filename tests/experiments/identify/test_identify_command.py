@@ -17,6 +17,7 @@ from robots.description.model import load_robot
 from robots.identification.identified_robot import STIFFNESS_KNOWN
 from robots.identification.motion import SensorPlace
 from robots.identification.recording import RecordedCase, RecordingError
+from robots.threads import allowed
 from tests.experiments.browser import open_page
 from tests.experiments.commands import files, refusal, truetip
 from tests.robots.identification.test_slow_motion import (
@@ -115,6 +116,16 @@ def test_motions_in_one_mcap_file_keep_their_own_times_and_clocks(tmp_path: Path
         np.testing.assert_allclose(found.commands, written.commands)
         # Velocities are not in the file; a spline through the positions has them but for its ends.
         np.testing.assert_allclose(found.rate[5:-5], written.rate[5:-5], atol=1e-5)
+
+
+@pytest.mark.parametrize("jobs", [1, 3])
+def test_the_identification_takes_as_many_threads_as_jobs_are_allowed(tmp_path: Path, monkeypatch, jobs: int):
+    def tell(*_: object) -> None:
+        raise ValueError(f"{allowed()} threads")
+
+    monkeypatch.setattr("experiments.identify.command.study_recording", tell)
+    message = refusal(run(tmp_path, f"--recording={resting(tmp_path)}", f"--jobs={jobs}"))
+    assert f"{jobs} threads" in message
 
 
 def test_drives_without_commands_are_refused_before_anything_is_identified(tmp_path: Path):

@@ -13,6 +13,7 @@ from robots.calibration.identifiability import (
     identifiable_parameters,
     unseen_parameters,
 )
+from robots.calibration.reduction import shown_by_errors
 from robots.description.calibration import Calibration
 from robots.description.error_parameters import NUM_PARAMETERS, error_parameters, parameter_names
 from robots.description.model import Placement, RobotModel, load_robot
@@ -173,3 +174,10 @@ def test_a_calibrated_robot_has_no_parameters_of_its_own():
     robot.calibration = Calibration("irb1200", source="a measurement")
     with pytest.raises(ValueError, match="start from the nominal robot, irb1200"):
         identifiable_parameters(robot)
+
+
+@pytest.mark.parametrize("robot", ["irb1200", "kr16", "ur10"])
+def test_errors_bring_to_light_what_positions_of_a_tool_on_the_last_axis_hide(robot: str):
+    """Its zero and its place; poses show as much of the robot as drawn."""
+    assert shown_by_errors(load_robot(robot), position_only=True) == ["joint6_x", "joint6_rx"]
+    assert shown_by_errors(load_robot(robot), position_only=False) == []

@@ -52,6 +52,20 @@ def test_at_rest_an_accelerometer_shows_gravity_and_a_gyro_nothing(arm: ElasticA
     np.testing.assert_allclose(np.linalg.norm(shown[:, 3:], axis=1), 9.81, rtol=1e-3)
 
 
+def test_motors_that_speed_up_from_one_sample_to_the_next_load_the_springs_as_much(arm: ElasticArm):
+    """Those of a light robot do, at the ticks of its drives; between two samples nothing is made up."""
+    jerky = case(0.02, 40)
+    jerky = replace(jerky, rate=jerky.rate + 1e-3 * np.random.default_rng(0).normal(size=jerky.rate.shape))
+    along = arm.along(jerky, knot_time=1e-3)
+    q, v, vdot = np.zeros((3, len(jerky.theta), arm.size))
+    q[:, arm.motors], v[:, arm.motors], vdot[:, arm.motors] = jerky.theta, jerky.rate, jerky.acceleration
+    at_knots = [int(np.searchsorted(along.knots, k)) for k in range(12, 30)]
+    q[12:30, arm.sprung] = along.rest[at_knots]
+    for k in range(12, 30):
+        load, _ = arm.evaluate(q[k], v[k], vdot[k])
+        np.testing.assert_allclose(along.load[k], load, rtol=1e-6, atol=1e-3)
+
+
 @pytest.mark.parametrize("gear_parts", [False, True], ids=["linear gears", "play and hysteresis"])
 def test_sensitivities_are_differences_of_the_model(arm: ElasticArm, gear_parts: bool):
     model, parameters = response(arm, case(0.01, 120), gear_parts)
