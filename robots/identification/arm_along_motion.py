@@ -31,7 +31,8 @@ class ArmAlongMotion:
     """One case; e sprung joints, c channels (three of a sensor), k knots, n samples.
 
     What changes with the posture is known at knots, to be interpolated linearly; what changes with the
-    acceleration at all samples: motors of light robots start and stop from one sample to the next.
+    acceleration at all samples, or at some of them: motors of light robots start and stop from one sample to
+    the next.
     """
 
     knots: np.ndarray  # (k,) samples
@@ -112,12 +113,14 @@ class ElasticArm:
             shown[i] = at_body.Shift(p_BS_W, shown[i]).translational() - self._gravity
         return torques, (shown[:, None] @ R_WB @ self._rotations).ravel()
 
-    def along(self, case: MotionCase, knot_time: float = 0.02) -> ArmAlongMotion:
+    def along(self, case: MotionCase, knot_time: float = 0.02, base_step: int = 1) -> ArmAlongMotion:
         """Linearises about a case.
 
         Args:
             case: whose motors move.
             knot_time: between knots in s while they do.
+            base_step: samples from one at which the acceleration counts to the next; what is between them is
+                interpolated.
         """
         theta, rate, acceleration = case.theta, case.rate, case.acceleration
         knots = _knots(case, knot_time)
@@ -127,8 +130,9 @@ class ElasticArm:
         )
         samples = np.arange(len(theta))
         x_0 = np.stack([np.interp(samples, knots, column) for column in rest.T], axis=1)
-        at_samples = [self._at(theta[k], rate[k], acceleration[k], x_0[k]) for k in samples]
-        load, readings = (np.array(each) for each in zip(*at_samples, strict=True))
+        base = np.unique(np.append(samples[::base_step], samples[-1]))
+        at_base = [self._at(theta[k], rate[k], acceleration[k], x_0[k]) for k in base]
+        load, readings = (interpolated(base, np.array(each), samples) for each in zip(*at_base, strict=True))
         return ArmAlongMotion(
             knots, mass, coriolis, stiffness, rest, by_turn, by_speed, by_acceleration, load, readings
         )

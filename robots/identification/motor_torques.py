@@ -83,7 +83,7 @@ def springs_from_torques(
     channels = [
         SensorPlace(name, "motor torque", "", np.zeros(3), np.eye(3), _FAST, 0.0) for name in ("arm", "wrist")
     ]
-    motion = arm.along(case, base_step=1)
+    motion = arm.along(case)
     response = ArmResponse([motion], [case], channels, parameters, robot.gear_ratio)
     problem = ArmProblem(response, shown[response.kept][:, None], parameters, has_own_clock=False)
     floor = np.maximum(_FLOOR * np.abs(shown).max(axis=0), 1e-9)

@@ -44,7 +44,8 @@ class Views:
     _MOST = 8
 
     def __init__(self, layout: Layout) -> None:
-        """Has none yet."""
+        """Has none yet; what finds them is compiled before the first is asked for."""
+        kernels.history.address(np.empty(1))
         self._layout = layout
         self._views: dict[int, SimpleNamespace] = {}
 

@@ -1,6 +1,7 @@
 """The tables of accuracy: every row is a command that runs, and a page gets them where it has a place."""
 
 import json
+import shlex
 from pathlib import Path
 
 import pytest
@@ -32,7 +33,7 @@ def test_every_row_is_a_command_whose_runs_are_possible(row: Row, monkeypatch):
 
     monkeypatch.setattr(command, "run_trials", run_trials)
     monkeypatch.setattr(command, "with_calibrated_robots", lambda todo, *_: todo)
-    answer = truetip(*COMMAND.split(), *row.options.split(), "--jobs", "1")
+    answer = truetip(*COMMAND.split(), *shlex.split(row.options), "--jobs", "1")
     assert "far enough" in answer.output
     assert len(begun) >= 2
     assert all(trial.laps == 2 and trial.contender.law == "self_calibrating" for trial in begun)

@@ -29,7 +29,7 @@ def recording(robot: RobotModel) -> TorqueRecording:
     case = MotionCase("true", STEP, theta, rate, np.zeros((SAMPLES, 0, 3)))
     channels = [SensorPlace(name, "", "", np.zeros(3), np.eye(3), 1e5, 0.0) for name in ("arm", "wrist")]
     parameters = ElasticParameters(arm, gear_parts=False)
-    model = ArmResponse([arm.along(case, base_step=1)], [case], channels, parameters, robot.gear_ratio)
+    model = ArmResponse([arm.along(case)], [case], channels, parameters, robot.gear_ratio)
     shown = model(parameters.start, sensitivity=False).readings[:, 0]
     even = slice(0, None, 2)  # samples of the response
     friction = robot.joint_coulomb_friction * np.tanh(rate[even] / robot.coulomb_velocity)
