@@ -264,6 +264,13 @@ class TipModel:
         kernels.tip.predict(constants, self.unknowns(x), theta, loads, seen, *out)
         return Prediction(*out)
 
+    def play(self, x: np.ndarray) -> np.ndarray:
+        """How far gears are known to turn freely, rad, (6,)."""
+        if not self.has_gear_errors:
+            return np.zeros(NUM_JOINTS)
+        open_and_held = x[self.E].reshape(NUM_SHAPES, NUM_JOINTS)[-2:]  # half of it each
+        return np.maximum(2.0 * open_and_held.sum(axis=0), 0.0)
+
     def innovation(
         self,
         constants: Constants,
