@@ -37,7 +37,10 @@ def diagram_command(
     ] = Path("diagram.svg"),
     depth: Annotated[int, typer.Option(metavar="N", help="Depth to which nested diagrams are expanded.")] = 2,
 ) -> None:
-    """Draw the diagram that is simulated."""
+    """Draw the diagram that is simulated.
+
+    The station is drawn as a diagram of its own; in a run its parts stand beside the servo, which is quicker.
+    """
     with refusing(ValueError, OSError):
         prepared = prepare(scenario, option_settings(settings, law, None), robot)
         experiment = Experiment(prepared.scenario, prepared.scenario.law, prepared.robot, is_nested=True)
