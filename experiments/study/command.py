@@ -206,7 +206,8 @@ def study_verdict(study: Study, rows: Rows) -> str:
     )
     failed = int((rows["failure"] != "").sum())
     if not ranked:
-        return f"All {count(len(rows['row']), 'run')} failed."
+        runs = len(rows["row"])
+        return "The only run failed." if runs == 1 else f"All {runs} runs failed."
     best = ranked[0]
     strongest = strongest_factor(study, of_law(rows, best), metric)
     return (
