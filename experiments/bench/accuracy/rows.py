@@ -145,7 +145,7 @@ SECTIONS: dict[str, tuple[Row, ...]] = {
             f"{_REALISTIC} {_FULL_SPEED} --cases plain --seeds 10 --first-seed 7000",
             "likewise, robots on which nothing was tuned",
         ),
-        Row("realistic-140ms", f"{_REALISTIC} {_FULL_SPEED} --cases 140ms --seeds 20 --first-seed 3000"),
+        Row("realistic-140ms", f"{_REALISTIC} --cases 140ms --seeds 20 --first-seed 3000"),
         Row(
             "realistic-kr16",
             f"{_REALISTIC} --robot kr16-realistic --seeds 4 --first-seed 3000",
