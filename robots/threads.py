@@ -29,7 +29,7 @@ def take_one_thread() -> None:
 
 def allowed() -> int:
     """How many threads `side_by_side` takes here."""
-    return _AT_MOST.get() or _cores()
+    return _AT_MOST.get() or usable_cores()
 
 
 def side_by_side(work: Callable[..., Result], *cases: Iterable[Any]) -> list[Result]:
@@ -45,5 +45,6 @@ def side_by_side(work: Callable[..., Result], *cases: Iterable[Any]) -> list[Res
         return list(threads.map(work, *cases))
 
 
-def _cores() -> int:
+def usable_cores() -> int:
+    """The number of cores that this process may use."""
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1

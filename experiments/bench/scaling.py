@@ -18,9 +18,10 @@ from rich.console import Console
 from rich.table import Table
 
 from experiments.cli.cluster import DaskCluster
-from experiments.cli.workers import Executor, LocalProcesses, Progress, in_order, usable_cores
+from experiments.cli.workers import Executor, LocalProcesses, Progress, in_order
 from experiments.study.rows import run_row, study_rows
 from experiments.study.study_file import Levels, Study
+from robots.threads import usable_cores
 
 EMPTY_JOBS = 2_000
 WORKERS = (10, 100, 1_000, 10_000)

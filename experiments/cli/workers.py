@@ -13,7 +13,7 @@ from multiprocessing.connection import wait as wait_for
 from typing import Any, Protocol, TypeVar
 
 from experiments.cli.one_thread import ONE_THREAD
-from robots.threads import take_one_thread
+from robots.threads import take_one_thread, usable_cores
 
 _POLL = 0.1  # s between two looks at the progress
 _AHEAD = 4  # jobs per process that wait in its queue: enough that none is idle, few enough to hold in memory
@@ -129,11 +129,6 @@ def in_processes(
 ) -> list[Result]:
     """The same in processes of this machine, one per core unless their number is given."""
     return in_order(LocalProcesses(processes), work, jobs, progress)
-
-
-def usable_cores() -> int:
-    """The number of cores that this process may use."""
-    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
 @contextmanager

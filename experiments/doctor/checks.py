@@ -13,7 +13,7 @@ from importlib.metadata import PackageNotFoundError, requires, version
 from importlib.util import find_spec
 
 from diagrams.scenario.scenario import load_scenario
-from experiments.cli.workers import usable_cores
+from robots.threads import usable_cores
 from systems.link.qualisys.messages import PORT as CAMERA_PORT
 
 GOOD, OPTIONAL, BAD = "ok", "optional", "missing"

@@ -22,7 +22,6 @@ from experiments.cli.options import (
 )
 from experiments.cli.prepare import noted_robot, with_assumed
 from experiments.cli.staging import PAGE, staged_file
-from experiments.cli.workers import usable_cores
 from experiments.feedforward.plots import TABLE_HEAD, study_verdict, table_rows, write_study_page
 from experiments.feedforward.study import (
     ANGLES_DEG,
@@ -33,6 +32,7 @@ from experiments.feedforward.study import (
     study_json,
 )
 from robots.description.model import RobotFileError, RobotModel, load_robot, shipped_robots
+from robots.threads import usable_cores
 from systems.feedforward import FeedforwardConfig
 
 

@@ -21,9 +21,9 @@ from experiments.cli.options import (
 )
 from experiments.cli.prepare import noted_robot, with_assumed
 from experiments.cli.staging import PAGE, staged_file
-from experiments.cli.workers import usable_cores
 from experiments.invert.plots import TABLE_HEAD, refusals, table_rows, verdict, write_invert_page
 from experiments.invert.study import KINDS, InvertStudy, invert_json, study_inverses
+from robots.threads import usable_cores
 
 
 def invert_command(
