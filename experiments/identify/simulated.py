@@ -10,7 +10,7 @@ from pydrake.systems.primitives import LogVectorOutput
 
 from diagrams.integration import Integration, IntegratorConfig
 from diagrams.scenario.scenario import StationConfig
-from diagrams.station import SimulatedStation
+from diagrams.station import Station
 from experiments.cli.workers import Executor, LocalProcesses, Progress, SimulationError, in_order
 from experiments.feedforward.trial import CommandPlayer, Trial, commands
 from experiments.identify.cases import MotionCases
@@ -99,14 +99,12 @@ def driven(
         SimulationError: if the integration breaks off.
     """
     builder = DiagramBuilder()
-    station = builder.AddNamedSystem(
-        "station", SimulatedStation(plant, config, "cascade", takes_torque=True, inertial=[logger])
-    )
+    station = Station(builder, plant, config, "cascade", takes_torque=True, inertial=[logger])
     player = builder.AddNamedSystem("commands", CommandPlayer(told, config.period))
     for port in ("position_command", "velocity_command", "torque_feedforward"):
-        builder.Connect(player.GetOutputPort(port), station.GetInputPort(port))
+        builder.Connect(player.GetOutputPort(port), station.inputs[port])
     logs = [
-        LogVectorOutput(station.GetOutputPort(port), builder, step)
+        LogVectorOutput(station.outputs[port], builder, step)
         for port, step in (
             ("truth.motor_state", _STEP),
             ("truth.motor_torque", _STEP),
