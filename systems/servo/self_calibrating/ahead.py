@@ -139,7 +139,7 @@ class Pace:
         nth of its speed. Without a camera that shows anything nothing is gained by going slowly.
 
         Nor is the whole speed taken where play moves the tip far. When teeth cross it no camera shows
-        beforehand, for the load with which they do bends a gear by some microradians; with smaller
+        beforehand, for the load with which they do bends a gear by less than is seen of it; with smaller
         accelerations fewer do.
 
         Args:
