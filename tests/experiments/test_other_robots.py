@@ -32,8 +32,10 @@ def test_a_scenario_is_carried_over_unless_it_says_otherwise(tmp_path: Path, mon
     own = prepare("misaligned", ["reference.path=circle", "station.payload=1"], robot=robot)
     assert own.scenario.station.payload == 1.0
     assert own.scenario.reference.path.kind == "circle"
-    assert "carried over" not in own.note
     assert "carried over from ABB IRB 1200" in named.note
+    assert "path 0.87 times as large" in named.note
+    assert "path" not in own.note
+    assert "payload" not in own.note
     free = prepare("misaligned", robot=robot, needs_path=False)
     assert free.scenario.reference.path.kind == "rectangle"
 
