@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 
 from robots.description.model import NUM_JOINTS, RobotModel
-from systems.estimation.gear_errors import SHAPE_NAMES
+from systems.estimation.gears.gear_errors import SHAPE_NAMES
 from systems.estimation.learnt_robot import BEARING_NAMES, GEAR_NAMES, learnt_robot
 from systems.estimation.probing.path_needs import Standing
 from systems.estimation.tip_estimator import TipEstimator

@@ -8,7 +8,7 @@ from scipy.linalg import get_lapack_funcs
 
 from systems.estimation import kernels
 from systems.estimation.arm_geometry import Constants
-from systems.estimation.gear_errors import NUM_SHAPES
+from systems.estimation.gears.gear_errors import NUM_SHAPES
 from systems.estimation.kernels.arrays import SHAPES, OpenKeyframe
 from systems.estimation.memory import Layout
 from systems.estimation.tip_model import TipModel

@@ -9,7 +9,7 @@ from robots.pose import pose_error
 from systems.estimation import kernels
 from systems.estimation.arm_geometry import Arm, Constants
 from systems.estimation.arm_loads import NUM_SETS
-from systems.estimation.gear_errors import BEFORE, NUM_MODELS, NUM_STATES
+from systems.estimation.gears.gear_errors import BEFORE, NUM_MODELS, NUM_STATES
 from systems.estimation.kernels.arrays import FollowerState, PathInstant, Planned
 from systems.estimation.memory import Layout
 from systems.estimation.tip_model import TipModel

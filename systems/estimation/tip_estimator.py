@@ -20,7 +20,8 @@ from systems.estimation.events import (
     Event,
     Innovations,
 )
-from systems.estimation.gear_errors import NUM_MODELS, NUM_SHAPES
+from systems.estimation.gears.gear_errors import NUM_MODELS, NUM_SHAPES
+from systems.estimation.gears.gear_feedback import GearFeedback
 from systems.estimation.keyframes import Keyframes, forget_open, open_keyframe
 from systems.estimation.memory import Layout
 from systems.estimation.suppositions import Suppositions
@@ -58,6 +59,7 @@ class TipEstimator:
         self._noise, self._innovations = CameraNoise(variances), Innovations(variances)
         self._unmodelled = Unmodelled(joints=6 if model.has_gear_errors else 0)
         self._displacement = Displacement(model.size, model.M)
+        self.gear_feedback = GearFeedback(config.gear_feedback if model.has_gear_errors else 0.0)
         n = model.size
         self.layout = Layout(
             xi=(n,),
@@ -88,6 +90,7 @@ class TipEstimator:
             camera=self._camera.layout,
             after_step=self._displacement.layout,
             against=(NUM_MODELS, 6),  # models of each gear, see `GearErrors.weigh`
+            loose=self.gear_feedback.layout,
         )
         self._constants: Constants | None = None
 
@@ -162,15 +165,9 @@ class TipEstimator:
         """The tip of one pair at the estimate, as a camera sees it that was not moved."""
         x = self.x_robot(memory)
         shapes = self.model.gear_shapes(pair.theta, pair.states)
-        return self.model.predict(
-            self._constants_at(memory, x),
-            x,
-            pair.theta[None],
-            pair.loads[None],
-            pair.twist[None],
-            None if shapes is None else shapes[None],
-            self._since_first(memory, pair.time),
-        )
+        constants, since_first = self._constants_at(memory, x), self._since_first(memory, pair.time)
+        rows = pair.theta[None], pair.loads[None], pair.twist[None], None if shapes is None else shapes[None]
+        return self.model.predict(constants, x, *rows, since_first)
 
     def tip_covariance(self, memory: SimpleNamespace, pair: Pair) -> np.ndarray:
         """Covariance of the predicted tip, rotation (rad^2) first, shape (6, 6).
@@ -243,7 +240,10 @@ class TipEstimator:
                     size = self._displacement.size(memory.after_step, found, pair.X_WE[:3, 3])
                     event = Event(found, size, size)
         if model.has_gear_errors and weight > _CALM_WEIGHT:
-            model.gear_errors.weigh(memory.against, J, r, memory.noise.weights, pair.others)
+            seen = J, r, memory.noise.weights
+            model.gear_errors.weigh(memory.against, *seen, pair.others)
+            by_gears = model.gear_variances(x, pair.loads, pair.states)
+            self.gear_feedback.hear(memory.loose, *seen, by_gears, pair.time)
         if self._noise.hear(memory.noise, r, H, memory.xi, pair):
             self._weigh_anew(memory)
         self._take(memory, (r, gears, H), pair, shapes, weight)

@@ -13,7 +13,14 @@ from systems.controller_model import ControllerModel
 from systems.estimation import kernels
 from systems.estimation.arm_geometry import Arm, ArmGeometry, Constants
 from systems.estimation.arm_loads import ArmLoads
-from systems.estimation.gear_errors import NUM_MODELS, NUM_SHAPES, NUM_STATES, OPEN, SHAPE_NAMES, GearErrors
+from systems.estimation.gears.gear_errors import (
+    NUM_MODELS,
+    NUM_SHAPES,
+    NUM_STATES,
+    OPEN,
+    SHAPE_NAMES,
+    GearErrors,
+)
 from systems.estimation.kernels.arrays import Seen, SeenOnce, Unknowns
 from systems.estimation.learnt_robot import known_before
 
@@ -263,13 +270,6 @@ class TipModel:
         seen = self._seen(n, twist, shapes, time)
         kernels.tip.predict(constants, self.unknowns(x), theta, loads, seen, *out)
         return Prediction(*out)
-
-    def play(self, x: np.ndarray) -> np.ndarray:
-        """How far gears are known to turn freely, rad, (6,)."""
-        if not self.has_gear_errors:
-            return np.zeros(NUM_JOINTS)
-        open_and_held = x[self.E].reshape(NUM_SHAPES, NUM_JOINTS)[-2:]  # half of it each
-        return np.maximum(2.0 * open_and_held.sum(axis=0), 0.0)
 
     def innovation(
         self,

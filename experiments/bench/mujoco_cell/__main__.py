@@ -54,9 +54,6 @@ def main() -> None:
         metavar="ARC_MINUTES",
         help="of gears that have hysteresis, uneven ratios and a hump of friction, too; else none of these",
     )
-    parser.add_argument(
-        "--full-speed", action="store_true", help="the path as it is planned, however far play moves the tip"
-    )
     parser.add_argument("--jobs", type=int, default=None, help="parallel processes; one per core")
     parser.add_argument("--json", metavar="FILE", default="")
     options = parser.parse_args()
@@ -70,7 +67,7 @@ def main() -> None:
     drives = Drives(*options.gains, planner=20.0 if options.egm else 0.0)
     wear = None if options.play is None else Wear(play=options.play)
     jobs = [
-        CellRun(robot, seed, path, wrong, drives, wear=wear, is_at_full_speed=options.full_speed)
+        CellRun(robot, seed, path, wrong, drives, wear=wear)
         for robot in options.robots.split(",")
         for path in options.paths.split(",")
         for seed in range(options.first_seed, options.first_seed + options.seeds)

@@ -22,7 +22,6 @@ from robots.pose import rotation_vector
 LAW = "self_calibrating"
 LAPS = 2
 _GEARS_ERR = "servo.laws.self_calibrating.estimator.spread.gear_error"  # rad
-_FULL_SPEED = "servo.laws.self_calibrating.play_on_path=1"  # m: play may move the tip by whatever it does
 _SETTLED = 0.5  # s of the dwell, after which the tip is at rest
 _LONGEST = 5.0  # times the planned duration, after which a run is over
 
@@ -38,17 +37,12 @@ class CellRun:
     drives: Drives = field(default_factory=Drives)
     camera: Camera = field(default_factory=Camera)
     wear: Wear | None = None  # of the gears, which are springs and dampers else
-    is_at_full_speed: bool = False  # whatever the play of the gears
 
     @property
     def settings(self) -> tuple[str, ...]:
         """Of the scenario: what is believed of the interface is right, and that gears err is known."""
-        told = {
-            "station.interface=egm": self.drives.planner,
-            f"{_GEARS_ERR}=5e-5": self.wear is not None,
-            _FULL_SPEED: self.is_at_full_speed,
-        }
-        return tuple(setting for setting, holds in told.items() if holds)
+        interface = ("station.interface=egm",) if self.drives.planner else ()
+        return interface if self.wear is None else (*interface, f"{_GEARS_ERR}=5e-5")
 
 
 def run(job: CellRun, progress: Progress) -> dict[str, Any]:

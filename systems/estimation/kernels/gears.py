@@ -6,6 +6,8 @@ import numpy as np
 
 from robots.compiled import compiled
 
+_LEAST_TORQUE = 1e-6  # N m, so that a gear which nothing holds has a side
+
 
 @compiled
 def springs(compliance, gap, factors, sizes):
@@ -124,6 +126,62 @@ def believe(before, against, likely):
             total += likely[m, j]
         for m in range(len(against)):
             likely[m, j] /= total
+
+
+@compiled
+def variances(compliance, gap, sizes, states, torque, least, out):
+    """What the shapes may be off by, rad^2, (n,); see `GearErrors.variances`.
+
+    Args:
+        compliance: rad per N m, (n,).
+        gap: `Gap`.
+        sizes, states, torque: as there.
+        least: rad^2, that they are off by in any case.
+        out: is written.
+    """
+    n = len(out)
+    for j in range(n):
+        half, spring = sizes[5, j] + sizes[6, j], gap.held / compliance[j]
+        carried = spring * gap.widths[0] * states[j]
+        unsure = max(math.hypot(carried, 2.0 * spring * half), _LEAST_TORQUE)
+        expected = -math.erf((torque[j] + 0.5 * carried) / (math.sqrt(2.0) * unsure))
+        position = sizes[5, j] * states[n + j] + sizes[6, j] * states[2 * n + j]  # times the gap
+        off = (position - half * expected) ** 2 + half**2 * (1.0 - expected**2)
+        out[j] = off + least
+
+
+@compiled
+def follow(J, r, weights, usual, variances, kept, off, P):
+    """Takes one sample into what joints are off by; see `GearFeedback.hear`.
+
+    Args:
+        J, r, weights, variances: as there.
+        usual: standard deviations of the camera beyond which a sample says nothing.
+        kept: of what joints are off by, since the last sample.
+        off: rad, (n,); is renewed, as is its covariance ``P`` (n, n).
+    """
+    n = len(off)
+    for j in range(n):
+        off[j] *= kept
+        for k in range(n):
+            P[j, k] *= kept**2
+        P[j, j] += (1.0 - kept**2) * variances[j]
+    for i in range(6):
+        if r[i] ** 2 * weights[i] > usual**2:
+            return
+    gain = np.empty(n)
+    for i in range(6):  # errors of a camera are independent of each other, so one after the other
+        left, variance = r[i], 1.0 / weights[i]
+        for j in range(n):
+            gain[j] = 0.0
+            for k in range(n):
+                gain[j] += P[j, k] * J[i, k]
+            left -= J[i, j] * off[j]
+            variance += J[i, j] * gain[j]
+        for j in range(n):
+            off[j] += gain[j] * left / variance
+            for k in range(n):
+                P[j, k] -= gain[j] * gain[k] / variance
 
 
 @compiled

@@ -6,7 +6,6 @@ from typing import NamedTuple
 import numpy as np
 from scipy.linalg import solve_triangular
 
-from robots.description.model import NUM_JOINTS
 from robots.dynamics.newton_inverse import inverse_kinematics
 from systems.estimation.tip_model import TipModel
 from systems.reference.cartesian_path import CartesianPath
@@ -62,8 +61,6 @@ class PathNeeds:
         self.times, self.q = times[chosen], q[chosen]
         self._constants = model.constants(model.mean)
         self.H = self.columns(self.q, velocity[chosen], acceleration[chosen])
-        turns = model.forward(self._constants, model.mean, self.q)[1].columns[:, :, :NUM_JOINTS]
-        self._levers = np.linalg.norm(SCALE[:, None] * turns, axis=1)  # (n, 6), m
         self._seconds = length / max(1, len(chosen) - 1)
         self._blind = math.ceil(late / self._seconds)
         self._informations = np.array([self.information(H[None]) for H in self.H])
@@ -132,20 +129,13 @@ class PathNeeds:
         Returns:
             In units of the spreads, (n, 6, size), all in m: turns counted at an arm of 0.25 m.
         """
-        return SCALE[:, None] * self.H[self._between(begin, end)]
-
-    def levers_between(self, begin: float, end: float) -> np.ndarray:
-        """How far each joint moves the tip at most between two times, likewise, m/rad, (6,)."""
-        return self._levers[self._between(begin, end)].max(axis=0)
-
-    def _between(self, begin: float, end: float) -> np.ndarray:
-        """Which instants are between two times on the path, (n,)."""
         first, last = (self._nearest(t) for t in (begin, end))
         # Where a lap ends between the two, what is left of it and what has begun of the next one.
         chosen = np.arange(len(self.H))
-        if first <= last:
-            return (chosen >= first) & (chosen <= last)
-        return (chosen >= first) | (chosen <= last)
+        inside = (
+            (chosen >= first) & (chosen <= last) if first <= last else (chosen >= first) | (chosen <= last)
+        )
+        return SCALE[:, None] * self.H[inside]
 
     def _nearest(self, t: float) -> int:
         """Which instant is nearest to a time on the path in s, on whatever lap."""

@@ -18,7 +18,6 @@ _MISSED = 5.0  # samples one after the other that no camera loses by chance: it 
 _LOOK_EVERY = 0.2  # s, between two looks at how well the path ahead is known
 _STEP = 0.85  # from one speed to the next slower one; larger ones make the arm ring
 _CLEARLY = 0.8  # of what a speed allows, before it is gone back to
-_SLOWEST_BY_PLAY, _ABOUT = 0.7, 1.05  # of the planned speed; times what play allows, between two steps
 _BEGIN = 0.5  # s of the path that have to be known well enough for it to begin
 _PLENTY = 150.0  # samples a second without more noise than believed: what they leave is not for want of more
 _NEXT = 0.3  # s of the path that are looked at while it is; about what is still run while it is slowed
@@ -36,6 +35,7 @@ def _renewed(memory: SimpleNamespace) -> list[np.ndarray]:
         memory.waited,
         memory.by_knowledge,
         memory.repeats.all,
+        memory.estimator.loose.aside.ravel(),
         drives.started,
         drives.z.ravel(),
         drives.w.ravel(),
@@ -138,10 +138,6 @@ class Pace:
         and more of it. Where the tip is known n times less well than it should be, the path goes on at one
         nth of its speed. Without a camera that shows anything nothing is gained by going slowly.
 
-        Nor is the whole speed taken where play moves the tip far. When teeth cross it no camera shows
-        beforehand, for the load with which they do bends a gear by less than is seen of it; with smaller
-        accelerations fewer do.
-
         Args:
             memory: of the law, whose ``by_knowledge`` is renewed.
             reference: the path.
@@ -162,19 +158,11 @@ class Pace:
         if is_shown:
             rows = self.needs.rows_between(path_time, path_time + _NEXT)
             beyond = self._learning.estimator.sigma(memory.estimator, rows) / self._config.known_on_path
-        share, faster = memory.by_knowledge, min(1.0, memory.by_knowledge[0] / _STEP)
-        most = _ABOUT * self._most_with_play(memory, self.needs, path_time)
-        if share[0] > most or (beyond * share[0] > 1.0 and share[0] > _CAREFUL):
+        share, faster = memory.by_knowledge, memory.by_knowledge[0] / _STEP
+        if beyond * share[0] > 1.0 and share[0] > _CAREFUL:
             share[0] *= _STEP
-        elif beyond * faster < _CLEARLY and faster <= most:
-            share[0] = faster
-
-    def _most_with_play(self, memory: SimpleNamespace, needs: PathNeeds, path_time: float) -> float:
-        """The share of the planned speed that play of gears allows on the next part of the path."""
-        play = self._learning.tip_model.play(memory.lead.x)
-        way = float((needs.levers_between(path_time, path_time + _NEXT) * play).max())
-        times = way / self._config.play_on_path
-        return max(_SLOWEST_BY_PLAY, 1.0 / np.sqrt(times)) if times > 1.0 else 1.0
+        elif beyond * faster < _CLEARLY:
+            share[0] = min(1.0, faster)
 
     def _look_at_begin(self, memory: SimpleNamespace, needs: PathNeeds, path_start: float) -> None:
         """Once after each probe: whether the first part of the path is known well enough, or it is repeated.

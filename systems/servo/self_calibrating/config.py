@@ -26,7 +26,4 @@ class SelfCalibratingConfig(LawConfig):
     known_ahead: float = positive(2e-5, "m")
     # Likewise: where it is known n times less well, the path goes on at one nth of its speed, or a quarter
     known_on_path: float = positive(3e-5, "m")
-    # By play of a gear: where it moves the tip n times as far, the path goes on at 1 / sqrt(n) of its speed,
-    # with accelerations an nth as large, but not below 0.7 of it
-    play_on_path: float = positive(5e-5, "m")
     longest_wait: float = quantity(2.0, 0.0, unit="s")  # that it waits

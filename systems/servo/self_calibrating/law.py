@@ -355,6 +355,8 @@ class SelfCalibrating(LeafSystem):
         first, last = memory.first[0], memory.planned[0]
         waited = self._learning.wait(memory, instant, self._probe, path_start)
         aside = self._probe.at(instant - first, path_start - first, memory.amplitude, waited)
+        is_on_path = reference.path_time(instant) >= path_start
+        aside += self._learning.led_aside(memory, instant, instant - float(last), is_on_path)
         wanted = Wanted(moment.X_WE, moment.V_WE, aside)
         at = wanted, since_start, instant - last, self.tip_model.gear_errors.likely(memory.estimator.against)
         plan = self._planner.step(memory.planner, (lead.x, lead.rate), *at)

@@ -184,6 +184,26 @@ class Learning:
         gears = then.states, then.others
         return Pair(at.theta, then.loads, then.motion, now.twist, at.X_WE, unrest, *gears, stamp)
 
+    def led_aside(self, memory: SimpleNamespace, instant: float, step: float, is_on_path: bool) -> np.ndarray:
+        """Where joints are led beside the path, since their gears' teeth are not where they were expected.
+
+        Args:
+            memory: of the law.
+            instant: that is planned, s.
+            step: s since the last instant that was planned.
+            is_on_path: before the path it does not matter where the tip is, and the robot is little known.
+
+        Returns:
+            rad, and its two derivatives, (3, 6).
+        """
+        feedback, loose = self.estimator.gear_feedback, memory.estimator.loose
+        if not (feedback.acts and is_on_path):
+            feedback.rest(loose)
+            return np.zeros((3, 6))
+        stamp = float(loose.exposure[0])
+        exposure = stamp + self.estimator.clock_offset(memory.estimator, stamp)
+        return feedback.lead(loose, instant - exposure, step)
+
     def _watch_delay(self, memory: SimpleNamespace, time: float) -> None:
         """Searches for the dead time until it is known, and again while the motors do what no drive does."""
         since_start = time - memory.start_time[0]

@@ -14,7 +14,7 @@ from systems.estimation.drives.drive_model import LATE, REGRESSORS, DriveCommand
 from systems.estimation.drives.encoder_steps import EncoderSteps
 from systems.estimation.drives.gain_search import TORQUES
 from systems.estimation.drives.motor_feedback import MotorFeedback
-from systems.estimation.gear_errors import NUM_MODELS, NUM_STATES
+from systems.estimation.gears.gear_errors import NUM_MODELS, NUM_STATES
 from systems.estimation.kernels.arrays import Ring
 from systems.estimation.memory import History, Layout
 from systems.samples import JointSample

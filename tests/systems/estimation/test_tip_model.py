@@ -94,20 +94,3 @@ def test_an_estimate_that_is_no_robot_is_kept_within_what_robots_are():
     assert bounded[model.M][0] >= -21.0
     assert bounded[model.K].max() <= 8.0
     np.testing.assert_array_equal(bounded[model.G], x[model.G])
-
-
-def test_play_is_by_how_far_a_tip_lies_elsewhere_with_teeth_on_their_other_sides():
-    """A gear turns from one side of its play to the other, open and held alike, as its motor stands still."""
-    model = tip_model(gear_error=5e-5)
-    x = model.mean.copy()
-    sizes = x[model.E].reshape(7, 6)  # a window of x
-    sizes[-2:] = np.array([[5e-6], [6e-5]])
-    pair = MovingArm(model, x).pair(0.7, noise=0.0)
-    sides = np.zeros((2, 1, 7, 6))
-    sides[:, 0, -2:] = np.array([-1.0, 1.0])[:, None, None]
-    rows = pair.theta[None], pair.loads[None], pair.twist[None]
-    one, other = (model.predict(model.constants(x), x, *rows, side).X_WE for side in sides)
-    J = model.jacobian(model.constants(x), x, pair.theta)
-    # Play turns joints one after the other, by a thousandth of what these turns turn each other.
-    np.testing.assert_allclose(pose_error(other, one)[0], J @ model.play(x), rtol=2e-3, atol=2e-7)
-    assert not tip_model().play(tip_model().mean).any()

@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 
 from robots.description.model import load_robot
-from robots.pose import pose_error
 from systems.estimation.probing.path_needs import PathNeeds
 from systems.estimation.probing.probe import USUAL, Probe, ProbeConfig
 from systems.estimation.probing.probe_design import designed
@@ -38,21 +37,6 @@ def test_columns_are_how_the_tip_moves():
     before, after = (MODEL.predict(MODEL.constants(y), y, q, loads, still).X_WE for y in (MODEL.mean, x))
     step = (after - before)[0, :3, 3] / 1e-3
     np.testing.assert_allclose(of.columns(q, still, still)[0, 3:, i], step, rtol=1e-3, atol=1e-7)
-
-
-def test_levers_are_the_longest_by_which_joints_move_the_tip():
-    of, step = needs(Circle()), 1e-6
-    begin, end = of.times[2], of.times[5]
-    longest = np.zeros(6)
-    for q in of.q[2:6]:
-        for joint in range(6):
-            turned = q + step * (np.arange(6) == joint)
-            X = MODEL.forward(MODEL.constants(MODEL.mean), MODEL.mean, np.array([q, turned]))[0]
-            moved = (
-                pose_error(X[1:], X[:1])[0] / step * np.repeat([0.25, 1.0], 3)
-            )  # turns at an arm of 0.25 m
-            longest[joint] = max(longest[joint], float(np.linalg.norm(moved)))
-    np.testing.assert_allclose(of.levers_between(begin, end), longest, rtol=1e-4)
 
 
 def test_a_path_again_and_again_needs_what_it_needs_once():

@@ -21,20 +21,14 @@ class Known:
         estimator = SimpleNamespace(
             sigma=lambda memory, rows: self.sigma, variance_factor=lambda memory: self.noise
         )
-        self.play = np.zeros(6)  # rad
-        tip_model = SimpleNamespace(play=lambda x: self.play)
-        learning: Any = SimpleNamespace(estimator=estimator, tip_model=tip_model)
+        learning: Any = SimpleNamespace(estimator=estimator)
         self.pace, self.time = Pace(model, SelfCalibratingConfig(known_on_path=3e-5), learning), PATH_START
-        needs: Any = SimpleNamespace(
-            rows_between=lambda begin, end: np.zeros((1, 6, 1)),
-            levers_between=lambda begin, end: np.full(6, 0.5),  # m/rad
-        )
+        needs: Any = SimpleNamespace(rows_between=lambda begin, end: np.zeros((1, 6, 1)))
         self.pace.needs = needs
         self.foreign, self.seen = np.zeros(1), np.zeros(1)
         self.is_seeing = True
         self.memory = SimpleNamespace(
             by_knowledge=np.ones(1),
-            lead=SimpleNamespace(x=None),
             planned=np.zeros(1),
             shown_at=np.array([PATH_START]),
             waited=np.zeros(1),
@@ -59,19 +53,6 @@ class Known:
 
 def test_a_path_that_is_known_is_run_as_it_is_planned():
     assert set(Known(3e-5).after(4.0)) == {1.0}
-
-
-@pytest.mark.parametrize("times", [0.8, 1.1, 1.5, 2.0, 20.0])
-def test_play_that_moves_the_tip_n_times_as_far_makes_accelerations_an_nth_as_large(times: float):
-    """That is, to within a step of the speed, and no slower than seven tenths."""
-    law = Known(1e-6)
-    law.play[0] = times * 5e-5 / 0.5
-    slowest = max(0.7, 1.0 / np.sqrt(max(1.0, times)))
-    shares = law.after(4.0)
-    assert slowest / 1.2 < shares[-1] <= 1.05 * slowest
-    assert (np.diff(shares[1:]) <= 0.0).all()  # once, not to and fro
-    law.play[0] = 0.0
-    assert law.after(4.0)[-1] == 1.0
 
 
 @pytest.mark.parametrize("times", [1.2, 2.0, 3.0, 10.0])

@@ -8,7 +8,7 @@ from robots.drivetrain.dahl import DahlHysteresis
 from robots.drivetrain.stiffness import CubicSpring
 from robots.drivetrain.train import DriveTrains, JointTrain
 from robots.pose import pose_error
-from systems.estimation.gear_errors import BEFORE, GearErrors
+from systems.estimation.gears.gear_errors import BEFORE, GearErrors
 from systems.estimation.tip_estimator import TipEstimator
 from systems.estimation.tip_estimator_config import TipEstimatorConfig
 from tests.systems.estimation.arms import PERIOD, MovingArm, tip_model

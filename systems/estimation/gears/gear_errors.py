@@ -1,10 +1,8 @@
 """What gears add to the angle of a joint beyond their springs, as linear columns: waves, gap, hysteresis."""
 
-import math
 from types import SimpleNamespace
 
 import numpy as np
-from scipy.special import erf
 
 from robots.description.model import NUM_JOINTS, RobotModel
 from systems.estimation import kernels
@@ -34,13 +32,12 @@ NUM_MODELS = len(_GAP.widths)
 BEFORE = np.outer([4.0, 2.0, 2.0, 2.0, 1.0, 1.0], np.full(NUM_JOINTS, 1.0 / 12.0))
 # Of what a sample says about models: those of a crossing, some dozens, are off together when it comes early.
 _ONE_IN = 10.0
-_USUAL = 4.0  # standard deviations of the camera; where it shows more, that is no gear's doing
+USUAL = 4.0  # standard deviations of the camera; where it shows more, that is no gear's doing
 _KEPT = 1.0 - 1.0 / 5000.0  # of what speaks against models, from one sample to the next
 # Of the spread, how large an open gap may be. Until a load has turned over slowly nothing tells it from one
 # that is held, and then a held one is the better guess.
 OPEN = 0.3
 _OTHERWISE = 0.1  # of the size of gear errors, what they have of other shapes than these; assumed
-_LEAST_TORQUE = 1e-6  # N m, so that a gear which nothing holds has a side
 
 
 class GearErrors:
@@ -112,7 +109,7 @@ class GearErrors:
             weights: of the camera, one over variances, (6,).
             others: by how much links would be further ahead with each model, rad, (6, 6), see `MotorPlan`.
         """
-        kernels.gears.weigh(J, r, weights, others, (_USUAL, 1.0 / _ONE_IN, _KEPT), against)
+        kernels.gears.weigh(J, r, weights, others, (USUAL, 1.0 / _ONE_IN, _KEPT), against)
 
     @staticmethod
     def likely(against: np.ndarray) -> np.ndarray:
@@ -138,14 +135,9 @@ class GearErrors:
             torque: of the gears in N m, (6,).
             spread: of the sizes, as it was believed before, rad.
         """
-        hysteresis, *teeth = states.reshape(3, NUM_JOINTS)
-        gap, spring = sizes[-2:].sum(axis=0), _GAP.held / self._compliance
-        carried = spring * _GAP.widths[0] * hysteresis
-        unsure = np.maximum(np.hypot(carried, 2.0 * spring * gap), _LEAST_TORQUE)
-        expected = -erf((torque + 0.5 * carried) / (math.sqrt(2.0) * unsure))
-        position = (sizes[-2:] * teeth).sum(axis=0)  # times the gap
-        off = (position - gap * expected) ** 2 + gap**2 * (1.0 - expected**2)
-        return off + (_OTHERWISE * spread) ** 2
+        least, out = (_OTHERWISE * spread) ** 2, np.empty(NUM_JOINTS)
+        kernels.gears.variances(self._compliance, _GAP, sizes, states, torque, least, out)
+        return out
 
     def shapes(self, theta: np.ndarray, states: np.ndarray) -> np.ndarray:
         """The shapes at motor positions in rad (6,), shape (7, 6).

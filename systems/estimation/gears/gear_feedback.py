@@ -1,0 +1,86 @@
+"""What a camera shows of teeth that cross otherwise than the model of their gear expects, fed back."""
+
+import math
+from types import SimpleNamespace
+
+import numpy as np
+
+from robots.description.model import NUM_JOINTS
+from systems.estimation import kernels
+from systems.estimation.gears.gear_errors import USUAL
+from systems.estimation.memory import Layout
+
+# Both assumed. Teeth that lie free cross in some tenths of a second. And links follow their motors through
+# free teeth with some 40 rad/s; what is fed back faster makes them swing from one side to the other.
+_LASTS = 0.1  # s, after which a third is left of what a joint is off by
+_FREQUENCY = 40.0  # rad/s, with which joints are led to where it is made up for
+
+
+class GearFeedback:
+    """Makes up for the positions of teeth that no model foresees, one angle of each joint.
+
+    When teeth that lie free cross from one side of their gap to the other depends on tenths of a newton
+    metre. But while they are elsewhere than expected a camera shows where. What a joint is off by is an
+    Ornstein-Uhlenbeck process: it is forgotten within a time, and its variance is a share of that which the
+    model of the gear admits, so that next to nothing is fed back of a gear under load. A Kalman filter takes
+    the samples. Joints are led aside by what is expected of it at the instant that is planned, on a
+    critically damped way of which the plan has the loads, for they push teeth, too.
+    """
+
+    def __init__(self, share: float) -> None:
+        """Takes how much of the variance that gears admit is believed in; none feeds nothing back."""
+        self._share = share
+        self.layout = Layout(
+            off=(NUM_JOINTS,),  # rad, at the last exposure
+            P=(NUM_JOINTS, NUM_JOINTS),  # rad^2, its covariance
+            exposure=(1,),  # s, as the camera has it
+            aside=(2, NUM_JOINTS),  # rad and rad/s, by which joints are led aside
+        )
+
+    @property
+    def acts(self) -> bool:
+        """Whether anything is fed back."""
+        return self._share > 0.0
+
+    def rest(self, memory: SimpleNamespace) -> None:
+        """Nothing is known, and nothing led aside."""
+        memory.all[:] = 0.0
+
+    def hear(
+        self,
+        memory: SimpleNamespace,
+        J: np.ndarray,
+        r: np.ndarray,
+        weights: np.ndarray,
+        variances: np.ndarray,
+        exposure: float,
+    ) -> None:
+        """Takes one sample.
+
+        Args:
+            memory: of the layout.
+            J: Jacobian of the tip, (6, 6), rotation first.
+            r: how far the tip was seen from where it was predicted, (6,).
+            weights: of the camera, one over variances, (6,).
+            variances: of what gears may be off by, rad^2, (6,).
+            exposure: s, as the camera has it.
+        """
+        kept = math.exp(-max(0.0, exposure - float(memory.exposure[0])) / _LASTS)
+        kernels.gears.follow(J, r, weights, USUAL, self._share * variances, kept, memory.off, memory.P)
+        memory.exposure[0] = exposure
+
+    def lead(self, memory: SimpleNamespace, ahead: float, step: float) -> np.ndarray:
+        """Leads joints aside; returns by how much in rad, and its two derivatives, (3, 6).
+
+        Args:
+            memory: of the layout.
+            ahead: s, of the instant that is planned, after the last exposure.
+            step: s since the last instant that was planned.
+        """
+        goal = -math.exp(-max(0.0, ahead) / _LASTS) * memory.off
+        aside, rate = memory.aside
+        before, w = rate.copy(), _FREQUENCY
+        # Implicit, so that it is stable with any step.
+        rate[:] = (rate + step * w * w * (goal - aside)) / (1.0 + w * step) ** 2
+        aside += step * rate
+        return np.array((aside, rate, (rate - before) / step))
