@@ -10,7 +10,7 @@ import plotly.graph_objects as go
 import typer
 from rich.markup import escape
 
-from experiments.cli.console import count, print_files, progress_bar, refusing
+from experiments.cli.console import count, print_files, print_note, progress_bar, refusing
 from experiments.cli.json_output import human_console, json_output
 from experiments.cli.option_limits import at_least
 from experiments.cli.options import (
@@ -22,7 +22,7 @@ from experiments.cli.options import (
     WithCellOption,
     YesOption,
 )
-from experiments.cli.prepare import Prepared, prepare
+from experiments.cli.prepare import Prepared, prepare, with_assumed
 from experiments.cli.staging import PAGE, staged_file
 from experiments.health.history import History, read_history, write_history
 from experiments.health.station import check_on_station
@@ -111,6 +111,7 @@ def health_command(
         page = stack.enter_context(staged_file(out, *PAGE))
         table = stack.enter_context(staged_file(history, *_HISTORY))
         stack.enter_context(output.staged())
+        print_note(human, prepared.note)
         if not is_simulated:
             ask_before_moving(human, prepared, with_cell or yes)
         with progress_bar(count(checks, "check")) as progress:
@@ -123,7 +124,8 @@ def health_command(
         write_history(table, after)
         verdict = _verdict(after, alarms)
         _write_page(page, f"Health, {prepared.title}", verdict, after, prepared.robot, alarms)
-        output.write({"alarms": alarms, "history": str(history), "checks": len(after.time)})
+        numbers = {"alarms": alarms, "history": str(history), "checks": len(after.time)}
+        output.write(with_assumed(numbers, prepared.robot) if is_simulated else numbers)
     human.print(escape(verdict))
     print_files(human, out, history)
 

@@ -17,7 +17,7 @@ from rich.console import Console
 from diagrams.runs.cell_loop import CellLoop, CellStatistics
 from diagrams.runs.shown_cell import ShownCell
 from diagrams.scenario.scenario_file import OptionSetting
-from experiments.cli.console import count, refusing
+from experiments.cli.console import count, print_note, refusing
 from experiments.cli.options import RobotOption, ScenarioOption, SetOption, json_option
 from experiments.cli.prepare import prepare
 from experiments.cli.staging import staged_file
@@ -106,6 +106,7 @@ def cell_command(
         )
         stack.callback(loop.close)
         stop = _Stop(duration, until_eof)
+        print_note(human, prepared.note)
         if announce:
             ports = {"camera_port": camera.port} | ({"image_port": shown.port} if shown else {})
             sys.stdout.write(json.dumps(ports) + "\n")

@@ -10,7 +10,7 @@ from rich.markup import escape
 
 from diagrams.scenario.scenario import load_scenario
 from diagrams.scenario.scenario_file import OptionSetting
-from experiments.cli.console import BROKEN_OFF, fail, print_files, progress_bar, refusing
+from experiments.cli.console import BROKEN_OFF, fail, print_files, print_note, progress_bar, refusing
 from experiments.cli.json_output import human_console, json_output
 from experiments.cli.option_limits import at_least, not_negative, positive, refuse_given
 from experiments.cli.options import JsonOption, PictureOption, RobotOption, SetOption, WithCellOption
@@ -22,6 +22,7 @@ from experiments.watch.live_command import watch_station
 from experiments.watch.page import AID, run_verdict, study_verdict, write_run_page, write_study_page
 from experiments.watch.run import seen_by_network, watch_recorded, watch_simulated
 from experiments.watch.study import study_watch
+from robots.description.source_notes import foreign_sources_note
 from systems.link.udp_channel import ChannelError
 from systems.vision.people.person_networks import PersonNetwork
 from systems.vision.people.surroundings import load_surroundings
@@ -119,6 +120,8 @@ def watch_command(
         chosen, ground = prepared.scenario, load_surroundings(prepared.scenario.station.overview.surroundings)
         page = stack.enter_context(staged_file(out, *PAGE))
         stack.enter_context(output.staged())
+        # Of recorded images nothing is carried over to the robot that is in them.
+        print_note(human, foreign_sources_note(prepared.robot) if images else prepared.note)
         title = f"Watch, {prepared.title}"
         problem = ""
         if study:

@@ -62,6 +62,22 @@ def test_laws_are_compared(robot: str):
 
 
 @pytest.mark.slow
+@pytest.mark.parametrize(
+    "command",
+    [
+        ("cell", "--duration=0.1", "--set=station.link.camera.server.port=0"),
+        ("health", "--set=station.elasticity=rigid"),
+        ("watch", "--study", "--places=1", "--minutes=0", "--set=station.overview.width=320"),
+    ],
+    ids=lambda command: command[0],
+)
+def test_what_was_carried_over_is_said_where_nothing_of_a_run_is_shown(robot: str, command: tuple[str, ...]):
+    result = truetip(*command, "--robot", robot)
+    assert result.exit_code == 0, result.output
+    assert " ".join(result.stdout.split()).count("Note: carried over from ABB IRB 1200") == 1
+
+
+@pytest.mark.slow
 def test_modes_are_found(robot: str):
     result = truetip("modes", "--robot", robot, "--grid=3", "--json", "-")
     assert result.exit_code == 0, result.output
