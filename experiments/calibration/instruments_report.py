@@ -7,6 +7,7 @@ import numpy as np
 
 from experiments.calibration.figures import correlation_figure, joints_figure, noise_figure, vectors_figure
 from experiments.calibration.page import CORRELATION_NOTE, NOISE_NOTE
+from experiments.calibration.report import gravity_dict, gravity_sentence
 from experiments.calibration.words import icon, in_words, rounded, unit
 from experiments.report.plot_page import Section, sortable_table, write_plot_page
 from robots.calibration.instruments.identify import InstrumentCalibration
@@ -36,7 +37,8 @@ def sentence(found: InstrumentCalibration) -> str:
     if found.is_noise_believed:
         text += "The lines are too few to tell their noise: it leans on the usual 0.1 mm, and the intervals "
         text += "are as good as that; who knows it better may say it (sigma_mm, --noise). "
-    return text + f"Noise of the joints {np.rad2deg(found.noise[0]):.2g} degrees."
+    text += f"Noise of the joints {np.rad2deg(found.noise[0]):.2g} degrees."
+    return text + gravity_sentence(found.gravity)
 
 
 def validation_sentence(checked: FreshLines) -> str:
@@ -84,6 +86,7 @@ def instruments_json(
             "joint_deg": float(np.rad2deg(found.noise[0])),
             **{name: 1e3 * float(s) for name, s in zip(seen.instruments, found.noise[1:], strict=True)},
         },
+        "gravity": gravity_dict(found.gravity),
         "targets_mm": {
             name: (1e3 * place).tolist() for name, place in zip(seen.targets, at.places, strict=True)
         },

@@ -17,6 +17,7 @@ from robots.calibration.identified import Identified
 from robots.calibration.measurement_file import RowProblem
 from robots.calibration.measurements import MeasurementNoise
 from robots.calibration.repeatability import repeatability
+from robots.calibration.solver.left_over import GravityTest
 from robots.calibration.validation import ErrorStatistics, prediction_errors, statistics
 from robots.pose import zyx_from_rotation
 
@@ -62,8 +63,7 @@ def calibration_json(
         "condition": found.condition,
         "residuals": residual_rows(found),
         "noise": noise_dict(found),
-        "gravity": found.gravity
-        and {"explained_mm": 1e3 * found.gravity.explained, "chance": found.gravity.chance},
+        "gravity": gravity_dict(found.gravity),
         "frame": frame,
         "repeatability": repeated and asdict(repeated),
         "completeness_of_48": asdict(source_set),
@@ -243,18 +243,29 @@ def _size(noise: float) -> str:
     return f"{noise:.2g}" if noise >= _NO_NOISE else "0"
 
 
+def gravity_dict(gravity: GravityTest | None) -> dict[str, float] | None:
+    """The test for gravity in what a fit leaves, in mm; None without one."""
+    return gravity and {"explained_mm": 1e3 * gravity.explained, "chance": gravity.chance}
+
+
+def gravity_sentence(gravity: GravityTest | None) -> str:
+    """That what is left follows the weight; empty if it does not."""
+    if gravity is None or not gravity.is_clear:
+        return ""
+    return (
+        f" Of what these parameters leave, {1e3 * gravity.explained:.2g} mm (rms) follow the weight of "
+        "arm and load, as where joints yield; identify that, too (--compliance)."
+    )
+
+
 def unexplained_sentence(found: Identified) -> str:
     """That the rows agree on something that the parameters cannot describe; empty if they do not.
 
     Springs move a tip as noise of the joints does, and on a long arm little noise of joints hides much sag;
     but sag follows the weight. What else there is shows where it is more than encoders have.
     """
-    gravity = found.gravity
-    if gravity is not None and gravity.is_clear:
-        return (
-            f" Of what these parameters leave, {1e3 * gravity.explained:.2g} mm (rms) follow the weight of "
-            "arm and load, as where joints yield; identify that, too (--compliance)."
-        )
+    if said := gravity_sentence(found.gravity):
+        return said
     joint_deg = 0.0 if found.is_noise_known else float(np.rad2deg(found.noise.joint_sigma))
     if not found.lacks_something and joint_deg < _ENCODERS_DEG:
         return ""
@@ -262,7 +273,9 @@ def unexplained_sentence(found: Identified) -> str:
     if has_springs:
         cause = "do bearings yield, or joints err (--joint-errors)"
     else:
-        cause = "do joints yield (--compliance)" if gravity is None else "do joints err (--joint-errors)"
+        cause = (
+            "do joints yield (--compliance)" if found.gravity is None else "do joints err (--joint-errors)"
+        )
     if not found.lacks_something:
         return (
             f" Noise of {joint_deg:.2g} degrees of the joints is far more than encoders have: most of it "

@@ -13,6 +13,7 @@ from robots.calibration.instruments.noise import JOINT, InstrumentNoise, instrum
 from robots.calibration.instruments.observations import MeasuringCell, Observations
 from robots.calibration.instruments.problem import InstrumentProblem, Setting, Start
 from robots.calibration.prior import not_to_be_believed
+from robots.calibration.solver.left_over import GravityTest, gravity_test, spring_columns
 from robots.calibration.solver.levenberg_marquardt import Fit, minimise
 from robots.calibration.solver.noise_belief import BELIEVED, ENOUGH, taken
 from robots.calibration.solver.noise_model import FLOOR, POSITION
@@ -59,6 +60,7 @@ class InstrumentCalibration:
     rank: int  # directions that the data show better than what was known before
     condition: float  # of these directions, in units of what was known before
     standardised: np.ndarray  # (any,) residuals of the lines used, made white and of unit size by the noise
+    gravity: GravityTest | None  # of compliances that were not sought; None if they were or cannot be
     spread: float  # their standard deviation where the noise is right: a fit makes it less than one
     iterations: int
 
@@ -123,7 +125,10 @@ def identify_with_instruments(
     model = ErrorModel(robot, joint_errors)
     start = _start(model, observations, cell)
     problem = InstrumentProblem(model, observations, cell, start, compliance, fixed)
-    return _Adjustment(problem, cell).result(robot)
+    yielding = None
+    if not compliance and observations.loads.max() <= robot.payload.largest_mass:
+        yielding = InstrumentProblem(model, observations, cell, start, True, fixed)
+    return _Adjustment(problem, cell, yielding).result(robot)
 
 
 def _start(model: ErrorModel, seen: Observations, cell: MeasuringCell) -> Start:
@@ -176,7 +181,10 @@ def _said(seen: Observations, instrument: int, known: float | None) -> tuple[flo
 class _Adjustment:
     """From a problem to its solution."""
 
-    def __init__(self, problem: InstrumentProblem, cell: MeasuringCell) -> None:
+    def __init__(
+        self, problem: InstrumentProblem, cell: MeasuringCell, yielding: InstrumentProblem | None = None
+    ) -> None:
+        self._yielding = yielding  # the same with compliances, where they were not sought
         self._problem, self._everything, self._iterations = problem, problem.active, 0
         seen = problem.observations
         given = [_said(seen, i, cell.sigmas.get(name)) for i, name in enumerate(seen.instruments)]
@@ -221,6 +229,7 @@ class _Adjustment:
         s = np.linalg.svd(np.linalg.qr((W @ fit.at.A).reshape(-1, len(sizes)), mode="r"), compute_uv=False)
         rank = int(np.sum(s > 1.0))
         white = np.einsum("nij,nj->ni", W, fit.at.residuals)[noise.instrument >= 0]
+        gravity = self._gravity(fit, noise)
         problem.active = self._everything
         values = problem.parameters(fit.u)
         seen = self._everything
@@ -247,9 +256,18 @@ class _Adjustment:
             rank=rank,
             condition=float(s[0] / s[rank - 1]) if rank else float("inf"),
             standardised=white,
+            gravity=gravity,
             spread=float(np.sqrt(max(1.0 - np.sum(s**2 / (1.0 + s**2)) / max(white.size, 1), 0.0))),
             iterations=self._iterations,
         )
+
+    def _gravity(self, fit: Fit, noise: InstrumentNoise) -> GravityTest | None:
+        """Whether the lines that are active follow the weight; None where that cannot be told."""
+        if self._yielding is None:
+            return None
+        active = self._yielding.active = self._problem.active
+        springs = spring_columns(self._yielding, fit.u)
+        return gravity_test(fit.at, fit.u, springs, noise, self._problem.spread(active) > 0.0)
 
     def _refuse_the_implausible(self, u: np.ndarray) -> None:
         """Names the instrument whose lines fit worst if what was found is not the robot."""

@@ -1,6 +1,7 @@
 """What a fit leaves over: how large it is beside the noise, and whether it follows the torques of gravity."""
 
 from dataclasses import dataclass
+from typing import Protocol
 
 import numpy as np
 from scipy.linalg import solve_triangular
@@ -8,7 +9,7 @@ from scipy.special import fdtrc
 
 from robots.calibration.solver.noise_belief import taken
 from robots.calibration.solver.noise_model import Noise
-from robots.calibration.solver.problem import Linearised, Problem
+from robots.calibration.solver.problem import Linearised, Predicted
 from robots.description.model import NUM_JOINTS
 
 _RISK = 1e-4  # that noise alone is taken for springs
@@ -16,12 +17,18 @@ _SEEN = 1e-6  # of its length: a column of which the other parameters leave no m
 _ROUNDING = 1e-7  # m: what is smaller is not told from rounding
 
 
+class Yielding(Predicted, Protocol):
+    """A problem in which compliances of the joints, then errors of masses, follow all other parameters."""
+
+    columns: np.ndarray  # which parameters are free
+
+
 @dataclass(frozen=True)
 class GravityTest:
     """Whether compliances that were not sought would explain what is left."""
 
     chance: float  # that noise alone follows the torques of gravity as closely
-    explained: float  # m, rms over the rows, by which tips would be nearer to their measured positions
+    explained: float  # m, rms over the points, by which they would be nearer to where they were measured
 
     @property
     def is_clear(self) -> bool:
@@ -35,7 +42,9 @@ def misfit(at: Linearised, noise: Noise) -> float:
     return float(np.sqrt(np.sum(whitened**2) / max(whitened.size - taken(at, noise), 1.0)))
 
 
-def gravity_test(at: Linearised, u: np.ndarray, springs: np.ndarray, noise: Noise) -> GravityTest:
+def gravity_test(
+    at: Linearised, u: np.ndarray, springs: np.ndarray, noise: Noise, measured: np.ndarray | None = None
+) -> GravityTest:
     """The F test of columns that a linear fit does not have; its noise may have any size.
 
     Args:
@@ -43,8 +52,12 @@ def gravity_test(at: Linearised, u: np.ndarray, springs: np.ndarray, noise: Nois
         u: its scaled parameters, (m,); their prior counts as m more numbers.
         springs: derivatives of the prediction by compliances, (n, k, c).
         noise: of the rows.
+        measured: which numbers were, (n, k) bool, where a row holds several points, three numbers each; None
+            where it is a pose or a position.
     """
     n, k, m = at.A.shape
+    points = np.ones((n, 1, 3), dtype=bool) if measured is None else measured.reshape(n, -1, 3)
+    numbers = n * k if measured is None else int(measured.sum())
     W = noise.whitening(at.J)
     Q, R = np.linalg.qr(np.vstack([(W @ at.A).reshape(-1, m), np.eye(m)]))
     columns = np.vstack([(W @ springs).reshape(n * k, -1), np.zeros((m, springs.shape[2]))])
@@ -57,17 +70,17 @@ def gravity_test(at: Linearised, u: np.ndarray, springs: np.ndarray, noise: Nois
     left = left - Q @ (Q.T @ left)
     along = U.T @ left
     rest = float(left @ left - along @ along)
-    spare = n * k - taken(at, noise) - len(s)
+    spare = numbers - taken(at, noise) - len(s)
     if not len(s) or spare < 1.0 or not rest > 0.0:
         return GravityTest(1.0, 0.0)
     found = Vt @ (along / s)
     taken_over = solve_triangular(R, Q.T @ (columns @ found), check_finite=False)  # by the other parameters
-    change = (springs @ found - at.A @ taken_over)[:, -3:]
+    change = (springs @ found - at.A @ taken_over)[:, -points[0].size :]
     chance = float(fdtrc(len(s), spare, (along @ along / len(s)) / (rest / spare)))
-    return GravityTest(chance, float(np.sqrt(np.mean(np.sum(change**2, axis=1)))))
+    return GravityTest(chance, float(np.sqrt(np.sum(change**2) / points.any(axis=2).sum())))
 
 
-def spring_columns(yielding: Problem, u: np.ndarray) -> np.ndarray:
+def spring_columns(yielding: Yielding, u: np.ndarray) -> np.ndarray:
     """Derivatives of the rows by scaled compliances, (n, k, 6), where a stiff robot has the parameters u."""
     stiff = np.zeros(len(yielding.columns))
     stiff[: len(u)] = u

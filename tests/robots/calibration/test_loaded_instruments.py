@@ -6,6 +6,7 @@ from functools import cache
 import numpy as np
 import pytest
 
+from experiments.calibration.instruments_report import sentence
 from robots.calibration.error_model import ErrorModel
 from robots.calibration.instruments.identify import (
     InstrumentCalibration,
@@ -88,6 +89,37 @@ def test_without_noise_geometry_springs_and_joint_errors_are_found():
     assert np.nanmax(np.abs(found.residuals)) < 1e-8
     stiff = identify_with_instruments(load_robot("irb1200"), seen, None, KINDS)
     assert worst_error(stiff, true, LOAD) > 5e-5
+
+
+def rms(e: np.ndarray) -> float:
+    """Of the lengths of lines (m, 3) with gaps."""
+    return float(np.sqrt(np.nansum(e**2) / len(e)))
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("noise", [3e-5, 3e-4])
+def test_a_stiff_fit_says_how_far_its_lines_follow_the_weight(noise: float):
+    """Only the other fit knows of springs; to this one they look like noise of the joints."""
+    _, seen = scene(noise)
+    stiff, soft = (
+        identify_with_instruments(load_robot("irb1200"), seen, None, KINDS, is_yielding)
+        for is_yielding in (False, True)
+    )
+    assert stiff.gravity is not None
+    assert stiff.gravity.is_clear
+    assert stiff.gravity.explained == pytest.approx(rms(stiff.residuals - soft.residuals), rel=0.02)
+    assert soft.gravity is None
+    assert f"{1e3 * stiff.gravity.explained:.2g} mm (rms) follow the weight" in sentence(stiff)
+    assert "weight" not in sentence(soft)
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_noise_of_a_stiff_robot_does_not_follow_the_weight(seed: int):
+    _, seen = observed(noise=3e-5, joint=2e-5, seed=seed)
+    found = identify_with_instruments(load_robot("irb1200"), seen)
+    assert found.gravity is not None
+    assert found.gravity.chance > 1e-3
+    assert "weight" not in sentence(found)
 
 
 @pytest.mark.slow

@@ -16,7 +16,7 @@ class White:
     """Noise of one unit in every number."""
 
     def whitening(self, J: np.ndarray) -> np.ndarray:
-        return np.tile(np.eye(NUMBERS), (len(J), 1, 1))
+        return np.tile(np.eye(J.shape[1]), (len(J), 1, 1))
 
 
 def found(seed: int, sag: float) -> tuple[GravityTest, float]:
@@ -39,6 +39,22 @@ def found(seed: int, sag: float) -> tuple[GravityTest, float]:
 def test_the_chance_is_that_of_two_least_squares_one_inside_the_other(seed: int, sag: float):
     test, chance = found(seed, sag)
     assert test.chance == pytest.approx(chance, rel=1e-4)  # of a prior of 1e-8 of the rows
+
+
+def test_places_where_nothing_was_measured_change_nothing():
+    """Rows of one point each, and the same rows with an empty place for a second one."""
+    random = np.random.default_rng(3)
+    noise: Any = White()
+    A, C = (random.standard_normal((ROWS, NUMBERS, count)) for count in (PARAMETERS, SPRINGS))
+    parts = [random.standard_normal((ROWS, NUMBERS)) + 3.0 * C.sum(axis=2), A, C]
+    tests = []
+    for points in (1, 2):
+        e, A, C = (np.concatenate([each, *[0.0 * each] * (points - 1)], axis=1) for each in parts)
+        at = Linearised(e, A, np.zeros((*e.shape, 6)))
+        measured = np.tile(np.arange(points * NUMBERS) < NUMBERS, (ROWS, 1))
+        tests.append(gravity_test(at, np.zeros(PARAMETERS), C, noise, measured))
+    assert tests[1].chance == pytest.approx(tests[0].chance)
+    assert tests[1].explained == pytest.approx(tests[0].explained)
 
 
 def test_noise_alone_has_every_chance_as_often_as_any_other():
