@@ -33,6 +33,17 @@ def option_with(value: str) -> str:
 
 def naming(file: Path) -> list[str]:
     """The options and arguments of the running command that were given this file, however it is spelled."""
+    return [_called(each) for each in _naming(file)]
+
+
+def typed(file: Path) -> str:
+    """The option or argument that was typed with this file behind it; empty where there is none."""
+    context = _running.get()
+    sources = ((each, context.get_parameter_source(each.name)) for each in _naming(file))
+    return next((_called(each) for each, source in sources if source and source.name == "COMMANDLINE"), "")
+
+
+def _naming(file: Path) -> list[Any]:
     context = _running.get()
     params = context.command.params if context else []
     found = []
@@ -40,8 +51,12 @@ def naming(file: Path) -> list[str]:
         given = context.params.get(each.name)
         values = given if isinstance(given, list | tuple) else [given]
         if any(isinstance(value, str | Path) and _is(file, value) for value in values):
-            found.append(each.opts[0] if each.param_type_name == "option" else _shown(each).strip("[]."))
+            found.append(each)
     return found
+
+
+def _called(parameter: Any) -> str:
+    return parameter.opts[0] if parameter.param_type_name == "option" else _shown(parameter).strip("[].")
 
 
 def stays(file: str | Path) -> None:

@@ -7,7 +7,9 @@ from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 
-from experiments.cli.command_table import naming
+import typer
+
+from experiments.cli.command_table import naming, typed
 
 PAGE = (".html", ".htm")
 YAML = (".yaml", ".yml")
@@ -69,6 +71,19 @@ def staged_file(path: str | Path, *suffixes: str) -> Iterator[Path]:
         raise OSError(f"{' and '.join(options)} name the same file {path}: what is written needs its own")
     with staged_folder(path.parent) as stage:
         yield stage / path.name
+        make_folder_of(path)
+
+
+def make_folder_of(path: Path) -> None:
+    """Makes the folder of a file where there is none, and says so if somebody has typed it: it may be a slip.
+
+    Raises:
+        OSError: if it cannot be made.
+    """
+    is_new = not path.parent.exists()
+    path.parent.mkdir(parents=True, exist_ok=True)
+    if is_new and (option := typed(path)):
+        typer.echo(f"Made the folder {path.parent} for {option} {path}", err=True)
 
 
 def check_suffix(path: str | Path, suffixes: Sequence[str]) -> None:

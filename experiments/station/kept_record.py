@@ -7,6 +7,7 @@ import typer
 
 from diagrams.record.run_record import RunRecord
 from experiments.cli.command_table import stays
+from experiments.cli.staging import make_folder_of
 
 
 def kept_record(stack: ExitStack, path: Path, text: str) -> RunRecord:
@@ -22,7 +23,7 @@ def kept_record(stack: ExitStack, path: Path, text: str) -> RunRecord:
     Raises:
         OSError: if the file cannot be written.
     """
-    path.parent.mkdir(parents=True, exist_ok=True)
+    make_folder_of(path)
     record = RunRecord(path, text)
     stays(path)
 

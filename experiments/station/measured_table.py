@@ -6,6 +6,7 @@ from pathlib import Path
 import numpy as np
 
 from diagrams.runs.guided_measurement import Row
+from experiments.cli.staging import make_folder_of
 from robots.calibration.measurement_file import measurement_text, read_measurements
 from robots.calibration.measurements import Measurements
 from robots.description.model import NUM_JOINTS
@@ -67,7 +68,7 @@ class MeasuredTable:
         """
         self.path, self._payload = path, payload
         self.measured: set[int] = set()
-        path.parent.mkdir(parents=True, exist_ok=True)
+        make_folder_of(path)
         if not path.exists():
             return
         found, problems = read_measurements(path)

@@ -57,6 +57,26 @@ def test_a_file_whose_name_says_something_else_is_refused(tmp_path: Path):
     assert files(tmp_path) == {"page.HTML"}
 
 
+@pytest.mark.parametrize(
+    ("typed", "said"),
+    [
+        (["--json", "reslts/a.json"], "Made the folder reslts for --json reslts/a.json\n"),
+        (["--json", "new/a.json", "--report", "new/a.html"], "Made the folder new for --json new/a.json\n"),
+        (["--json", "old/a.json"], ""),
+        (["--json", "a.json"], ""),
+        ([], ""),  # the default of --report is in a folder that is made, too
+    ],
+)
+def test_a_folder_that_is_made_for_a_file_is_named_as_it_may_be_a_slip(
+    typed: list[str], said: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+):
+    monkeypatch.chdir(tmp_path)
+    Path("old").mkdir()
+    result = truetip("modes", "--grid=2", *typed)
+    assert result.exit_code == 0, result.output
+    assert result.stderr == said
+
+
 def test_a_file_is_replaced_whole(tmp_path: Path):
     (tmp_path / "a.txt").write_text("old")
     with staged_file(tmp_path / "a.txt") as path:
