@@ -1,14 +1,19 @@
 """A scenario as it is kept beside results: it names the same files wherever it is read."""
 
+from collections.abc import Iterable
+from contextlib import suppress
 from copy import deepcopy
 from dataclasses import fields, is_dataclass, replace
 from pathlib import Path
 from typing import Any
 
 from diagrams.scenario.scenario import Scenario, scenario_text
+from robots.configuration.nodes import ConfigurationError, read_nodes
 from robots.configuration.quantity import declaration
 
 _CLASS = ".py:"  # before the name of a class in a file
+_YAML = (".yaml", ".yml")
+_LONGEST = 250  # bytes of a name of a file; longer ones are refused by systems
 
 
 def kept_text(scenario: Scenario, calibrated: str = "") -> str:
@@ -49,9 +54,35 @@ def file_of(name: str) -> Path | None:
 
 
 def named_files(scenario: Scenario) -> list[Path]:
-    """The files that a scenario names; not those that these name in turn."""
+    """The files that a scenario names; not those that these name in turn (`with_inner_files`)."""
     found = [file_of(name) for name in [*_names(scenario), *scenario.servo.laws.own]]
     return sorted({file for file in found if file})
+
+
+def with_inner_files(files: Iterable[Path]) -> list[Path]:
+    """Files with those that YAML files among them name in turn, from their own folders or from this one.
+
+    Such are the robot that another one extends, or from which it was calibrated, and meshes of links.
+    """
+    found: dict[Path, Path] = {}  # by where they truly are
+    left = list(files)
+    while left:
+        file = left.pop()
+        if found.setdefault(file.resolve(), file) is file and file.suffix.lower() in _YAML:
+            with suppress(ConfigurationError):  # a row that cannot use it says so
+                texts = _texts(read_nodes(file, f"file {file}").plain)
+                places = (place for text in texts for place in (str(file.parent / text), text))
+                left += filter(None, map(file_of, places))
+    return sorted(found.values())
+
+
+def _texts(value: Any) -> list[str]:
+    """The texts in a tree of mappings and lists that may be the name of a file."""
+    if isinstance(value, dict | list):
+        inside = value.values() if isinstance(value, dict) else value
+        return [text for each in inside for text in _texts(each)]
+    is_name = isinstance(value, str) and len(value.encode()) <= _LONGEST and value.isprintable()
+    return [value] if is_name else []
 
 
 def _names(part: Any) -> list[str]:

@@ -8,7 +8,7 @@ from hashlib import sha256
 from typing import Any
 
 from diagrams.runs.simulation import run
-from diagrams.scenario.kept import file_of, named_files
+from diagrams.scenario.kept import file_of, named_files, with_inner_files
 from diagrams.scenario.scenario import scenario_text
 from experiments.cli.prepare import prepare
 from experiments.cli.workers import Progress
@@ -112,7 +112,7 @@ def first_run(rows: Sequence[StudyRow]) -> dict[str, Any]:
 
     Returns:
         The whole scenario as YAML, ``first_scenario``, and if there are any what identifies the files that it
-        and the rows name: ``files``.
+        and the rows name, and those that these name in turn: ``files``.
 
     Raises:
         ValueError: with what the scenario refuses in the first row.
@@ -125,8 +125,9 @@ def first_run(rows: Sequence[StudyRow]) -> dict[str, Any]:
     named = {row.law for row in rows} | {value for row in rows for _, value in row.factors}
     files = {file_of(name) for name in [*named, prepared.calibrated] if isinstance(name, str)}
     files |= set(named_files(prepared.scenario))
+    files = with_inner_files(filter(None, files))
     said: dict[str, Any] = {"first_scenario": f"# {prepared.title}\n{scenario_text(prepared.scenario)}"}
-    marks = {str(file): sha256(file.read_bytes()).hexdigest() for file in sorted(filter(None, files))}
+    marks = {str(file): sha256(file.read_bytes()).hexdigest() for file in files}
     return said | ({"files": marks} if marks else {})
 
 

@@ -207,6 +207,27 @@ def test_a_file_that_has_changed_since_makes_another_study(tmp_path, monkeypatch
     assert {key for key in found if found[key] != before[key]} == {"files"}
 
 
+def test_a_file_that_is_named_by_a_file_of_a_study_identifies_it_too(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+):
+    """An arm extends another one beside it, which has a picture: what is not beside the study counts, too."""
+    monkeypatch.chdir(tmp_path)
+    Path("arms").mkdir()
+    Path("arms/arm.yaml").write_text("extends: base.yaml\n")
+    Path("arms/base.yaml").write_text(
+        "extends: irb1200\nbase_link: {pictures: [{shape: mesh, file: foot.obj}]}\n"
+    )
+    triangle = "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n"
+    Path("arms/foot.obj").write_text(triangle)
+    Path("study.yaml").write_text(STUDY.replace("2000]}", "1]}\n  robot: !Names {values: [arms/arm.yaml]}"))
+    rows = study_rows(load_study("study.yaml"))
+    before = first_run(rows)["files"]
+    assert [Path(file).name for file in before] == ["arm.yaml", "base.yaml", "foot.obj"]
+    Path("arms/foot.obj").write_text(triangle.replace("0 0 0", "0 0 1"))
+    found = first_run(rows)["files"]
+    assert {Path(file).name for file in found if found[file] != before[file]} == {"foot.obj"}
+
+
 def test_two_processes_do_not_work_on_one_study(study):
     file, out = study
     with alone_in(out):
