@@ -3,18 +3,18 @@
 import math
 from array import array
 from collections.abc import Callable
-from typing import Protocol
 
 import numpy as np
 
 from diagrams.host_lateness import HostLateness, pause_before
 from diagrams.scenario.scenario import Scenario
 from robots.description.model import RobotModel
+from systems.guard.following import Following
 from systems.guard.joint_limits import JointLimits
 from systems.guard.message_guard import LONGEST_OWED, MOST_BRIDGED, MessageGuard, PassedTime
 from systems.link.clock import ClockConfig, StampClock, steady_time
 from systems.link.poses_on_path import PosesOnPath
-from systems.link.protocols import PoseSource, RobotLink, RobotReport
+from systems.link.protocols import PoseSource, RobotLink, RobotReport, Starting
 from systems.reference.joint_mover import smooth_motion
 from systems.samples import PoseSample
 
@@ -50,20 +50,6 @@ class StationError(RuntimeError):
 
 class EndedOnRequest(Exception):  # noqa: N818 - as KeyboardInterrupt, no error
     """Somebody wanted an end before the path began; the robot is at rest."""
-
-
-class Starting(Protocol):
-    """What needs time until it works."""
-
-    @property
-    def is_ready(self) -> bool:
-        """Whether it works."""
-        ...
-
-    @property
-    def problem(self) -> str:
-        """Why it never will; empty as long as it may."""
-        ...
 
 
 class HardwareLink:
@@ -105,6 +91,7 @@ class HardwareLink:
         self._time = PassedTime(self._period)
         limits = JointLimits(robot, scenario.servo.guard.speed_share)
         self._guard = MessageGuard(limits, self._period, is_speed_only)
+        self.following = Following(is_speed_only)
         self._stop_time = scenario.servo.guard.stop_time
         self.passed = self._period  # s from the report before the newest one to it, on the slower clock
         self.gap = 0.0  # s, the same without an upper limit
@@ -301,6 +288,7 @@ class HardwareLink:
     def start_path(self) -> None:
         """What the camera saw before now belongs to another time."""
         self.poses.start_path(self._now())
+        self.following.restart()
         self._phase = 0.0
 
     def pose_at(self, time: float) -> PoseSample:
@@ -314,6 +302,8 @@ class HardwareLink:
         if self._client.send(position, velocity, self._is_speed_only):
             self.turn_around.append(self._now() - self.arrived)
             self._has_rested = False
+            if self.last is not None:
+                self.following.note(self.last.position, position, velocity, self.passed)
         else:
             self._guard.take_back()
         return position, velocity
@@ -352,7 +342,7 @@ class HardwareLink:
 
         Raises:
             EndedOnRequest: if somebody wanted an end.
-            StationError: if the controller stopped, its joints jumped, or the robot does not come there.
+            StationError: if the controller stopped, its joints jumped, or the robot does not follow or come.
         """
         deadline = self._now() + _LONGEST_APPROACH
         epoch, start, passed = -1, goal, 0.0
@@ -373,10 +363,14 @@ class HardwareLink:
                 raise StationError(why)
             if self.epoch != epoch or self.was_interrupted:
                 epoch, start, passed = self.epoch, report.position, 0.0
+                self.following.restart()
             position, velocity, left = smooth_motion(start, goal, passed, speed_share * self._speed)
             if self._is_speed_only:
                 velocity = velocity + _APPROACH_GAIN * (position - report.position)
             self.send_command(position, velocity)
+            if why := self.following.problem:
+                self.stop_smoothly()
+                raise StationError(why)
             off = float(np.abs(report.position - goal).max())
             if left <= -_SETTLE and off < (_ARRIVED if left > -_PATIENCE else _NEARLY):
                 return

@@ -17,6 +17,7 @@ _FREQUENCIES = (0.15, 0.25, 0.4)  # Hz: so slow that no filter or controller of 
 _RISE = 1.0  # s, in which the motion begins and ends
 _LOOK = 50  # messages, after which the clocks are looked at
 _PATIENCE = 3.0  # times the duration, in which the clocks may be set anew
+_FOLLOWS = 0.05  # of the motion: a joint that moves by less is not moved by its commands
 
 
 @dataclass
@@ -103,7 +104,8 @@ def measure_latency(
 
     Raises:
         EndedOnRequest: if somebody wanted an end.
-        StationError: if the station is not there or falls silent, or its clocks are set anew again and again.
+        StationError: if the station is not there or falls silent, its robot does not follow, or its clocks
+            are set anew again and again.
         ValueError: if there is no such joint, or the motion would leave its range.
     """
     config.check()
@@ -154,6 +156,12 @@ def measure_latency(
         wire.stop_smoothly()
         raise
     stamp, commanded, measured = np.array(rows).T
+    if np.ptp(measured) < _FOLLOWS * np.ptp(commanded):
+        raise StationError(
+            f"the robot does not follow: joint {config.joint} was told to move by "
+            f"{np.rad2deg(np.ptp(commanded)):.1f} degrees and moved by {np.rad2deg(np.ptp(measured)):.2f}; "
+            "does the program of its controller take commands?"
+        )
     reported = np.array([wire.robot_clock.station_time(round(1e6 * each)) for each in stamp])
     seen = np.array(frames).reshape(-1, 4)
     counters = client.counters()

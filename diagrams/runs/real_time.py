@@ -235,6 +235,8 @@ class RealTimeRun:
                 self._note(tick, "clock_step", f"the controller's clock went {wire.clock_step:.3g} s ahead")
                 wire.start_path()
             self._tick(wire, report, tick, is_running=not is_seeding)
+            if wire.following.problem:
+                return wire.following.problem
             # Telling people takes time that belongs to the next message.
             if tick * self.period - shown > 0.5:
                 shown = tick * self.period

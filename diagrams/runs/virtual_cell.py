@@ -120,7 +120,11 @@ class VirtualCell:
 
     def advance(self, controller: VirtualController) -> list[Exposure]:
         """Computes the next cycle with the controller's references; returns what the camera saw in it."""
-        for value, reference in zip(self._inputs, controller.references, strict=True):
+        if self._faults.is_deaf(self.time):
+            references = self.planned, np.zeros_like(self.planned)
+        else:
+            references = controller.references
+        for value, reference in zip(self._inputs, references, strict=True):
             value.GetMutableData().set_value(reference)
         self._cycle += 1
         end, exposures = self.time, []

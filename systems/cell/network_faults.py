@@ -23,6 +23,7 @@ class FaultConfig:
     stall_at: float = -1.0  # s of the cell's time at which nothing gets through any more; negative: never
     stall_for: float = 1.0  # s
     stop_at: float = -1.0  # s at which the controller's program is stopped; negative: never
+    deaf_at: float = -1.0  # s at which it says that it follows commands and follows none; negative: never
     clock_step_at: float = -1.0  # s at which the controller's clock is set; negative: never
     clock_step: float = quantity(1.0, -100.0, 100.0, "s")  # by which it is set
     joint_jump_at: float = -1.0  # s at which a joint is suddenly measured elsewhere; negative: never
@@ -34,6 +35,10 @@ class FaultConfig:
     def is_stalled(self, time: float) -> bool:
         """Whether nothing gets through."""
         return 0.0 <= self.stall_at <= time < self.stall_at + self.stall_for
+
+    def is_deaf(self, time: float) -> bool:
+        """Whether the controller takes no commands, and does not say so."""
+        return 0.0 <= self.deaf_at <= time
 
     def clock_offset(self, time: float) -> float:
         """By how much the controller's clock has been set, in s."""

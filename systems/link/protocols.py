@@ -162,6 +162,20 @@ class PoseSource(Protocol):
         ...
 
 
+class Starting(Protocol):
+    """What needs time until it works."""
+
+    @property
+    def is_ready(self) -> bool:
+        """Whether it works."""
+        ...
+
+    @property
+    def problem(self) -> str:
+        """Why it never will; empty as long as it may."""
+        ...
+
+
 class VirtualController(Protocol):
     """Stands for a maker's controller before a simulated robot. Times are its own clock's in s."""
 

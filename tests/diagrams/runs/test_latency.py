@@ -44,6 +44,11 @@ def test_a_dead_time_is_found_to_a_millisecond(dead_time: float):
     assert found.camera == pytest.approx(0.0, abs=3e-4)
 
 
+def test_of_a_robot_that_does_not_follow_no_delay_is_measured():
+    with pytest.raises(StationError, match=r"joint 1 was told to move by \d\.\d degrees and moved by 0\.00"):
+        measured("station.faults.deaf_at=0", duration=4.0)
+
+
 @pytest.mark.slow
 def test_lost_and_late_messages_only_add_what_they_cost():
     """Jitter of up to 3 ms makes a reply miss a cycle now and then, a lost one holds the last command."""

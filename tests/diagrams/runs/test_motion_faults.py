@@ -313,6 +313,30 @@ def test_joints_that_jump_on_the_way_to_the_start_end_it_with_a_smooth_stop():
     assert_stopped(wire, at)
 
 
+@pytest.mark.parametrize(
+    ("law", "settings", "at"),
+    [
+        ("open_loop", [], 0.0),
+        ("open_loop", [], 1.9),  # s, on the path
+        ("pbvs", ["servo.laws.pbvs.drive=velocity"], 1.9),
+        ("numerical_ik", [], 1.9),
+    ],
+)
+def test_a_controller_that_takes_no_commands_ends_the_run_by_name(law: str, settings: list[str], at: float):
+    """Nothing in its messages says so; an open loop would have ended as if it had run its path."""
+    record, wire = guided(faulty(f"station.faults.deaf_at={at}", *settings), law)
+    assert re.match(r"the robot does not follow: joint \d stands still", record.ended)
+    assert_unsurprising(wire)
+
+
+def test_nor_is_it_waited_for_on_the_way_to_the_start():
+    wire = Lockstep(faulty("station.faults.deaf_at=0", "reference.path=rectangle"))
+    with pytest.raises(StationError, match="the robot does not follow: joint"):
+        RealTimeRun(faulty(), "open_loop").run(wire.link, wire.camera(), now=wire.now)
+    assert wire.time < 5.0  # s
+    assert_unsurprising(wire)
+
+
 def test_a_camera_whose_first_sample_comes_after_the_stop_is_refused_beforehand():
     scenario = faulty("station.camera.delay=0.5")
     with pytest.raises(
