@@ -44,8 +44,8 @@ class RunRecord:
         """Opens the file.
 
         Args:
-            path: of the file. One that is there already is replaced with the first message: a run that never
-                begins leaves an earlier record as it is.
+            path: of the file. The first message takes the place of what is in it: a run that never begins
+                leaves an earlier record as it is.
             scenario: its text, for the attachment.
             viewer: is told of every message too.
 
@@ -55,13 +55,16 @@ class RunRecord:
         self.path = Path(path)
         self.problem = ""  # why nothing is written any more, in words
         self._viewer = viewer
-        is_file = self.path.is_file() or not self.path.exists()  # and no device
-        # Its name until there is a message.
-        self._begun = self.path.with_name(f".{self.path.name}-begun") if is_file else self.path
-        self._file = self._begun.open("wb")
-        self._writer = Writer(self._file, compression=CompressionType.LZ4)
-        self._writer.start(profile="", library="truetip")
-        self._writer.add_attachment(0, 0, SCENARIO, "application/yaml", scenario.encode())
+        self._scenario = scenario
+        self._writer: Writer | None = None  # None while an earlier record stands
+        if self.path.is_file():
+            self._file = self.path.open("r+b")  # which leaves what is in it
+        else:
+            is_new = not self.path.exists()  # and no device
+            self._file = self.path.open("wb")
+            self._writer = self._begun()
+            if is_new:
+                self._file.flush()  # a process that is killed before the first message leaves no riddle
         self._channels: dict[str, int] = {}
         self._counts: dict[str, int] = {}
         self._flushed = time.monotonic()
@@ -73,12 +76,11 @@ class RunRecord:
         if self.problem:
             return
         try:
-            if not self._counts and self._begun != self.path:
-                self._begun.replace(self.path)
-            channel = self._channels.get(topic) or self._register(topic)
+            writer = self._writer = self._writer or self._begun()
+            channel = self._channels.get(topic) or self._register(topic, writer)
             self._counts[topic] += 1
             stamp = max(0, round(1e9 * at))
-            self._writer.add_message(channel, stamp, json.dumps(message).encode(), stamp, self._counts[topic])
+            writer.add_message(channel, stamp, json.dumps(message).encode(), stamp, self._counts[topic])
             if time.monotonic() - self._flushed > _FLUSH:
                 self.flush()
         except OSError as error:
@@ -86,14 +88,15 @@ class RunRecord:
 
     def flush(self) -> None:
         """Brings what has been written to the disk."""
-        self._writer.flush()
+        if self._writer is not None:
+            self._writer.flush()
         self._file.flush()
         self._flushed = time.monotonic()
 
     def close(self, **metadata: object) -> None:
         """Ends the file with what is to be known of the run, as texts by name."""
         try:
-            if not self.problem:
+            if self._writer is not None and not self.problem:
                 self._writer.add_metadata(RUN, {name: json.dumps(value) for name, value in metadata.items()})
                 self._writer.finish()
         except OSError as error:
@@ -101,14 +104,20 @@ class RunRecord:
         finally:
             with contextlib.suppress(OSError):  # what is left in the buffer of a full disk
                 self._file.close()
-            with contextlib.suppress(FileNotFoundError):  # where a message has given it its name
-                if self._begun != self.path:
-                    self._begun.unlink() if self.path.exists() else self._begun.replace(self.path)
 
-    def _register(self, topic: str) -> int:
+    def _begun(self) -> Writer:
+        """Begins the file, in the place of an earlier record. Raises OSError."""
+        if self.path.is_file():
+            self._file.truncate()
+        writer = Writer(self._file, compression=CompressionType.LZ4)
+        writer.start(profile="", library="truetip")
+        writer.add_attachment(0, 0, SCENARIO, "application/yaml", self._scenario.encode())
+        return writer
+
+    def _register(self, topic: str, writer: Writer) -> int:
         schema = SCHEMAS[topic]
-        number = self._writer.register_schema(schema["title"], "jsonschema", json.dumps(schema).encode())
-        self._channels[topic] = self._writer.register_channel(topic, "json", number)
+        number = writer.register_schema(schema["title"], "jsonschema", json.dumps(schema).encode())
+        self._channels[topic] = writer.register_channel(topic, "json", number)
         self._counts[topic] = 0
         return self._channels[topic]
 

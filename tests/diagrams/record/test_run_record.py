@@ -6,6 +6,7 @@ import subprocess
 import sys
 import tracemalloc
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -95,6 +96,39 @@ def test_after_a_kill_everything_that_was_flushed_is_there(tmp_path):
     positions = found.topics[JOINTS].columns["position"][:, 0]
     assert len(positions) >= 501
     np.testing.assert_array_equal(positions, np.arange(len(positions)))
+
+
+WAITER = """
+import os, signal, sys
+from diagrams.record.run_record import RunRecord
+record = RunRecord(sys.argv[1], "text")
+os.kill(os.getpid(), signal.SIGKILL)
+"""
+
+
+@pytest.mark.parametrize("has_earlier", [False, True])
+def test_who_is_killed_before_the_first_message_leaves_nothing_hidden(
+    log: RunLog, tmp_path: Path, has_earlier: bool
+):
+    """As while a robot is on its way to the start; an earlier record is worth more than an empty one."""
+    path = tmp_path / "run.mcap"
+    if has_earlier:
+        write_log(path, "an earlier one", log)
+    earlier = path.read_bytes() if has_earlier else b""
+    subprocess.run([sys.executable, "-c", WAITER, str(path)], check=False)
+    assert [file.name for file in tmp_path.iterdir()] == ["run.mcap"]
+    assert not has_earlier or path.read_bytes() == earlier
+    assert read_record(path).scenario == ("an earlier one" if has_earlier else "text")
+
+
+def test_a_shorter_record_in_the_place_of_a_longer_one_is_whole(log: RunLog, tmp_path: Path):
+    path, six = tmp_path / "run.mcap", np.zeros(6)
+    write_log(path, "an earlier one", log)
+    record = RunRecord(path, "text")
+    write_tick(record, 0.0, 1.0, (six, six), (six, six), six, np.eye(4))
+    record.close()
+    found = read_record(path)
+    assert (found.is_complete, found.scenario, len(found.topics[JOINTS].time)) == (True, "text", 1)
 
 
 @pytest.mark.parametrize("share", [0.3, 0.7, 0.99])
