@@ -148,6 +148,8 @@ class Compensation:
     def _load(self, target: Target) -> float:
         if self._payload is not None:
             return self._payload
+        if target.load_unread and self.is_compliant:
+            raise ValueError(f"{target.load_unread}; --payload says one load for all")
         if len(target.payloads) > 1 and self.is_compliant:
             loads = ", ".join(f"{each:g}" for each in target.payloads)
             raise ValueError(f"moved to with loads of {loads} kg, under which the robot bends differently")

@@ -55,6 +55,7 @@ class _State:
     tool: Frame | None = None
     base: Frame | None = None
     load: float | None = None  # kg
+    load_unread: str = ""  # why it may be another one
     is_at_rest: bool = False  # whether the tool stands still and the robot carries the workpiece
 
 
@@ -85,7 +86,7 @@ class _Reader:
         self._source, self._context = source, context
         self._notes: list[Note] = []
         self._values: dict[str, Value] = {}  # TOOL_DATA[1], FP1, ... by capital name
-        self._changed: set[str] = set()  # names of values that the program changes
+        self._changed: set[str] = set()  # names of what the program changes
         self._places: dict[str, list[_Place]] = {}
         self._inline: list[_Place] = []
         self._state = _State()
@@ -98,8 +99,7 @@ class _Reader:
             for line in lines:
                 self._declare(line)
         for line in (line for lines in files for line in lines):
-            name = _changed(line)
-            self._changed |= {each for each in self._values if name and _is_of(each, name)}
+            self._changed |= {_changed(line)} - {""}
         for lines in files:
             self._state = _State()
             for line in lines:
@@ -144,7 +144,7 @@ class _Reader:
             kind, number = suggested[1].upper(), int(suggested[2])
             self._state = replace(self._state, **{kind.lower(): self._numbered(kind, number, line)})
             if kind == "TOOL":
-                self._state = replace(self._state, load=self._load(number))
+                self._state = self._with_load(self._state, number, line)
         match = _PLACED.match(line.code)
         if match:
             name = re.sub(r"\s", "", match["name"]).upper() + match["part"]
@@ -165,7 +165,7 @@ class _Reader:
             self._state = replace(self._state, **{name[1:].lower(): frame})
             number = re.fullmatch(r"TOOL_DATA\[\s*(\d+)\s*\]", value, re.IGNORECASE)
             if number:
-                self._state = replace(self._state, load=self._load(int(number[1])))
+                self._state = self._with_load(self._state, int(number[1]), line)
         elif name == "$IPO_MODE":
             self._state = replace(self._state, is_at_rest=value.upper() == "#TCP")
         elif name == "$LOAD":
@@ -173,7 +173,11 @@ class _Reader:
             mass = found.numbers.get("M") if found else None
             if mass is None:
                 raise ProgramError(f"{line.where}: the mass of {value} is not known; --with FILE reads it")
-            self._state = replace(self._state, load=mass.value)
+            unread = "" if value.startswith("{") else self._unread(value.upper(), line)
+            self._state = replace(self._state, load=mass.value, load_unread=unread)
+        elif name.upper() == "$LOAD.M":
+            unread = f"{line.where}: {name} = {value} changes a part of the load, which is not read"
+            self._state = replace(self._state, load_unread=unread)
         elif name == "FDAT_ACT" and value.upper() in self._values:
             found = self._of_fdat(self._values[value.upper()])
             self._state = found or replace(self._state, is_at_rest=True)
@@ -186,11 +190,15 @@ class _Reader:
 
     def _declared(self, name: str, line: Line) -> Value | None:
         """What declarations say of a frame; None if they say nothing. Raises ProgramError if it changes."""
-        if name in self._changed:
-            raise ProgramError(
-                f"{line.where}: {name} is given another value by the program, which is not read"
-            )
+        if unread := self._unread(name, line):
+            raise ProgramError(unread)
         return self._values.get(name)
+
+    def _unread(self, name: str, line: Line) -> str:
+        """That a program changes a value, at a line that takes it; empty if none does."""
+        if not any(_is_of(name, each) for each in self._changed):
+            return ""
+        return f"{line.where}: {name} is given another value by the program, which is not read"
 
     def _frame_value(self, line: Line, name: str, value: str, at: int) -> Frame:
         if value.upper() in ("$NULLFRAME", "$WORLD"):
@@ -215,11 +223,13 @@ class _Reader:
             raise ProgramError(f"{line.where}: {name} is not declared; --with $config.dat reads it")
         return Frame(name, _pose(declared, name))
 
-    def _load(self, number: int) -> float | None:
-        """What the controller knows to hang at the flange with a tool, kg."""
-        value = self._values.get(f"LOAD_DATA[{number}]")
+    def _with_load(self, state: _State, number: int, line: Line) -> _State:
+        """With what the controller knows to hang at the flange with a tool."""
+        name = f"LOAD_DATA[{number}]"
+        value = self._values.get(name)
         mass = value.numbers.get("M") if value else None
-        return mass.value if mass and mass.value >= 0.0 else None
+        load = mass.value if mass and mass.value >= 0.0 else None
+        return replace(state, load=load, load_unread=self._unread(name, line))
 
     def _of_fdat(self, value: Value) -> _State | None:
         """Tool and base of a target; None if the tool stands still."""
@@ -227,7 +237,7 @@ class _Reader:
             return None
         tool, base = value.number("TOOL_NO"), value.number("BASE_NO")
         frames = self._numbered("TOOL", tool, value.line), self._numbered("BASE", base, value.line)
-        return _State(*frames, self._load(tool))
+        return self._with_load(_State(*frames), tool, value.line)
 
     def _move(self, line: Line, at: int) -> None:
         """The places that a motion names or holds; two of them in a circle."""
@@ -306,8 +316,9 @@ class _Reader:
                         f"{first_line.where}: no single place is right for both"
                     )
         payloads = tuple(sorted({state.load for _, state in uses if state.load is not None}))
+        unread = next((state.load_unread for _, state in uses if state.load_unread), "")
         base = first.base or WORLD
-        return Target(place.name, place.line.number, place.numbers, first.tool, base, payloads)
+        return Target(place.name, place.line.number, place.numbers, first.tool, base, payloads, unread)
 
     def _by_default(self, line: Line) -> _State:
         for option, text in (("--tool", self._context.tool), ("--base", self._context.base or "0")):
@@ -315,7 +326,7 @@ class _Reader:
                 raise ProgramError(f"{option} must be a number in KRL, got '{text}'")
         tool = int(self._context.tool)
         base = self._numbered("BASE", int(self._context.base or "0"), line)
-        return _State(self._numbered("TOOL", tool, line), base, self._load(tool))
+        return self._with_load(_State(self._numbered("TOOL", tool, line), base), tool, line)
 
 
 def _changed(line: Line) -> str:

@@ -107,6 +107,7 @@ class Target:
     tool: Frame | None = None  # None for the tool of the robot file
     base: Frame = WORLD
     payloads: tuple[float, ...] = ()  # kg, with which it is moved to; empty where the program does not say
+    load_unread: str = ""  # why the payloads may be others when the program runs
 
     @property
     def has_joints(self) -> bool:

@@ -77,6 +77,7 @@ class _Use:
     tool: Frame | None
     base: Frame
     payload: float
+    load_unread: str = ""  # why it may be another one
 
 
 @dataclass
@@ -113,7 +114,7 @@ class _Reader:
         self._places: dict[str, list[_Place]] = {}  # by the small letters of the name
         self._inline: list[_Place] = []
         self._changed: set[str] = set()  # names, in small letters
-        self._gripped = 0.0
+        self._gripped, self._gripped_unread = 0.0, ""
         self._course = Course()
         self._parsed = [(each, list(statements(each))) for each in (source, *context.others)]
 
@@ -130,7 +131,7 @@ class _Reader:
         names = (assigned(_done(statement)) for _, found in self._parsed for statement in found)
         self._changed = {name.word for name in names if name}
         for source, found in self._parsed:
-            self._gripped = 0.0
+            self._gripped, self._gripped_unread = 0.0, ""
             for statement in found:
                 is_brief = source is self._source and steer(self._course, source, statement)
                 self._follow(source, statement)
@@ -183,8 +184,8 @@ class _Reader:
         declared = self._declared.get(name.lower())
         if declared is None:
             raise ProgramError(f"{where}: {name} is not declared; --with FILE reads further modules")
-        if name.lower() in self._changed:
-            raise ProgramError(f"{where}: {name} is given another value by the program, which is not read")
+        if unread := self._unread(name, where):
+            raise ProgramError(unread)
         tree, at = declared.tree, declared.source.where(declared.line)
         is_tool = declared.kind == "tooldata"
         frames = []
@@ -200,6 +201,12 @@ class _Reader:
         for rows in filter(None, frames):
             X = X @ declared_pose(rows[0], rows[1], f"{at}: {name}")
         return Frame(name, X)
+
+    def _unread(self, name: str, where: str) -> str:
+        """That the program changes a value; empty if it does not."""
+        if name.lower() not in self._changed:
+            return ""
+        return f"{where}: {name} is given another value by the program, which is not read"
 
     def _mass(self, name: str, where: str) -> float:
         """Of a load, or of a tool, in kg."""
@@ -245,7 +252,8 @@ class _Reader:
             elif part:
                 positional.append(part)
         if name.word == "gripload" and positional:
-            self._gripped = self._mass(positional[0][0].text, where)
+            part = positional[0][0].text
+            self._gripped, self._gripped_unread = self._mass(part, where), self._unread(part, where)
         if name.word in _DISPLACING:
             text = f"{name.text} displaces what follows, which is not taken into account"
             self._note(source, line, text)
@@ -256,14 +264,15 @@ class _Reader:
             self._moves(source, line, name, positional, None)
             return
         tool = self._tool_of(name.word, positional, where)
-        base, payload = WORLD, self._gripped
+        base, payload, unread = WORLD, self._gripped, self._gripped_unread
         if options.get("wobj"):
             base = self._frame(options["wobj"][0].text, where)
         if options.get("tload"):
-            payload = self._mass(options["tload"][0].text, where)
+            part = options["tload"][0].text
+            payload, unread = self._mass(part, where), self._unread(part, where)
         elif tool is not None:
             payload += self._mass(tool.name, where)
-        use = _Use(where, tool, base, payload)
+        use = _Use(where, tool, base, payload, unread)
         for place in places:
             place.uses.append(use)
         self._moves(source, line, name, positional, use)
@@ -352,7 +361,8 @@ class _Reader:
                         f"{b.name} in {first.line}: no single place is right for both"
                     )
         payloads = tuple(sorted({use.payload for use in uses}))
-        return Target(place.name, place.line, place.numbers, first.tool, first.base, payloads)
+        unread = next((use.load_unread for use in uses if use.load_unread), "")
+        return Target(place.name, place.line, place.numbers, first.tool, first.base, payloads, unread)
 
 
 def _target_numbers(tree: Tree) -> dict[str, Literal] | None:

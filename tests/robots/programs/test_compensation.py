@@ -131,6 +131,20 @@ def test_a_robot_that_bends_is_corrected_for_the_load_of_each_target():
     assert np.abs(X[1] - X[0])[:, 2, 3].min() > 1e-5  # m: the load is lifted
 
 
+def test_a_load_that_a_program_changes_is_asked_for_where_the_robot_bends():
+    nominal, q = load_robot("kr16"), configurations(1, 0)
+    text = krl_list(nominal, q).replace("\n", "\nLOAD_DATA[0]={M 2}\nLOAD_DATA[0].M=SEEN\n", 1)
+    program = parse_program(Source("m.dat", text))
+    compliance = (1.0 / nominal.joint_stiffness).tolist()
+    for given, payload, refused in (([], None, False), (compliance, None, True), (compliance, 2.0, False)):
+        true = replace(nominal, calibration=replace(nominal.calibration, compliance=given, **CALIBRATED))
+        (found,) = Compensation(nominal, true, payload).false_targets(program, np.zeros(6))
+        assert isinstance(found, Refusal) == refused
+        if isinstance(found, Refusal):
+            assert "LOAD_DATA[0] is given another value by the program" in found.why
+            assert "--payload" in found.why
+
+
 def test_what_cannot_be_reached_is_refused_and_the_others_are_not():
     nominal = load_robot("irb1200")
     rows = ["0.4,0.1,0.4,0,0,1,0", "0.9,0.1,0.4,0,0,1,0", "0.4,0.1,0.5,0,0,1,0"]

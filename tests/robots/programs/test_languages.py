@@ -248,6 +248,46 @@ def test_krl_refuses_a_frame_that_the_program_changes(line: str, refusal: str):
             others=(CONFIG,))  # fmt: skip
 
 
+@pytest.mark.parametrize(
+    ("lines", "says"),
+    [
+        (["$TOOL=TOOL_DATA[1]"], ""),
+        (["LOAD_DATA[2].M=5", "$TOOL=TOOL_DATA[1]"], ""),
+        (["LOAD_DATA[1].M=5", "$TOOL=TOOL_DATA[1]"], "line 3: LOAD_DATA[1] is given another value"),
+        (["LOAD_DATA[n]=SEEN", "BAS(#TOOL,1)"], "line 3: LOAD_DATA[1] is given another value"),
+        (
+            ["LOAD_DATA[1].M=5", "$TOOL=$NULLFRAME", "$LOAD=LOAD_DATA[1]"],
+            "line 4: LOAD_DATA[1] is given another",
+        ),
+        (["$TOOL=TOOL_DATA[1]", "$LOAD.M=5"], "line 3: $LOAD.M = 5 changes a part"),
+        (["$TOOL=TOOL_DATA[1]", "$LOAD.CM.X=5"], ""),  # the centre of what hangs there is not asked
+        (["$TOOL=TOOL_DATA[1]", "$LOAD.M=5", "$LOAD={M 5}"], ""),
+    ],
+)
+def test_krl_knows_a_load_or_says_why_not(lines: list[str], says: str):
+    (target,) = krl("DEF m()", *lines, f"LIN {{{POSE}}}", others=(CONFIG,)).targets
+    assert says in target.load_unread
+    assert bool(says) == bool(target.load_unread)
+
+
+@pytest.mark.parametrize(
+    ("change", "says"),
+    [
+        ("", ""),
+        ("other:=seen;", ""),
+        ("part.mass:=seen;", "part is given another value"),
+        ("part:=seen;", "part is given another value"),
+    ],
+)
+def test_rapid_knows_a_load_or_says_why_not(change: str, says: str):
+    program = rapid(
+        GRIPPER, PART, robtarget("p"), f"PROC main() {change} GripLoad part;", "MoveL p,v1,fine,grip; ENDPROC"
+    )
+    (target,) = program.targets
+    assert says in target.load_unread
+    assert bool(says) == bool(target.load_unread)
+
+
 def test_krl_has_a_tool_for_each_of_an_array_and_leaves_alone_the_one_that_the_program_changes():
     targets = (f"P[1]={{{POSE}}}", f"P[2]={{{POSE}}}", "$TOOL=$NULLFRAME")
     loop = ("FOR i=1 TO 2", "PTP P[i]", "ENDFOR")
