@@ -129,13 +129,20 @@ class StudyStore:
             before = json.loads(path.read_text(encoding="utf-8"))
             different = [key for key in sorted({*before, *plan}) if before.get(key) != plan.get(key)]
             if different:
-                what = ", ".join(different)
+                what = ", ".join(_with_keys(key, before.get(key), plan.get(key)) for key in different)
                 raise ValueError(
                     f"{self._folder} holds rows of another study (its {what} differ): choose another --out, "
                     "or remove the folder"
                 )
             return
         _replace(path, (json.dumps(plan, indent=1, sort_keys=True) + "\n").encode())
+
+
+def _with_keys(name: str, before: Any, now: Any) -> str:
+    """The name of a part of a plan, with those of its own that are different where it has some."""
+    if not (isinstance(before, dict) and isinstance(now, dict)):
+        return name
+    return f"{name} {' '.join(key for key in sorted({*before, *now}) if before.get(key) != now.get(key))}"
 
 
 _WALL_TIME = pa.field("wall_s", pa.float64())

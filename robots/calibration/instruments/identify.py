@@ -19,6 +19,7 @@ from robots.calibration.solver.noise_belief import BELIEVED, ENOUGH, taken
 from robots.calibration.solver.noise_model import FLOOR, POSITION
 from robots.calibration.solver.variance_components import parameter_factor, variance_components
 from robots.calibration.yielding_joints import COMPLIANCE_NAMES
+from robots.configuration.suggestion import did_you_mean
 from robots.description.calibration import Calibration
 from robots.description.model import RobotModel
 from robots.metrology.least_squares import UndeterminedError
@@ -150,8 +151,9 @@ def _start(model: ErrorModel, seen: Observations, cell: MeasuringCell) -> Start:
             try:
                 found = instrument_frame(p[whole], seen.position[whole], _EVERYWHERE, 0.0)
             except (UndeterminedError, ValueError) as error:
+                others = [other for other in seen.instruments if other != name]
                 raise IdentificationError(
-                    f"instrument {name}: nothing says where it stands: {error}"
+                    f"instrument {name}: nothing says where it stands: {error}{did_you_mean(name, others)}"
                 ) from error
             assert found is not None
             frames[i] = found

@@ -69,6 +69,14 @@ def test_rows_of_another_study_are_not_mixed_in(tmp_path):
         StudyStore(tmp_path, {"study": 2}, COLUMNS)
 
 
+def test_what_makes_it_another_study_is_named(tmp_path: Path):
+    plan = {"study": {"seed": 1, "laws": ["pbvs"]}, "files": {"a.yaml": "1", "b.yaml": "2"}}
+    StudyStore(tmp_path, plan, COLUMNS)
+    other = {"study": plan["study"] | {"seed": 2}, "files": plan["files"] | {"b.yaml": "3"}}
+    with pytest.raises(ValueError, match=r"another study \(its files b\.yaml, study seed differ\)"):
+        StudyStore(tmp_path, other, COLUMNS)
+
+
 def test_a_file_that_was_not_completed_is_not_read(tmp_path):
     store = StudyStore(tmp_path, {}, COLUMNS)
     store.add(line(0))

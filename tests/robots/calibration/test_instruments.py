@@ -157,6 +157,15 @@ def test_an_instrument_that_nothing_places_is_refused():
         )
 
 
+def test_a_slip_in_the_name_of_an_instrument_is_told_from_a_new_one():
+    _, seen = observed(count=10, instruments=("tracker",))
+    slipped = replace(
+        seen, instrument=(np.arange(len(seen)) == 7).astype(int), instruments=("tracker", "traker")
+    )
+    with pytest.raises(IdentificationError, match=r"instrument traker: .*got 1; did you mean tracker\?"):
+        identify_with_instruments(load_robot("irb1200"), slipped)
+
+
 @pytest.mark.parametrize("name", ["tracker", "camera"])
 def test_an_instrument_whose_lines_belong_to_other_configurations_is_named(name: str):
     """However noisy the adjustment would have to believe it, and though the others fit."""
