@@ -44,7 +44,6 @@ from experiments.cli.staging import PAGE, staged_file
 from experiments.comparison.compare import RunJob, run_job
 from experiments.report.style import law_title
 from experiments.station.guided_command import ask_before_moving, check_measures_alone, on_station
-from robots.description.source_notes import assumed_note
 from robots.dynamics.newton_inverse import inverse_kinematics
 from systems.link.udp_channel import ChannelError
 
@@ -94,7 +93,7 @@ def accept_robot_command(
         if not is_simulated:
             _refuse_on_station(prepared, masses)
             ask_before_moving(human, prepared, with_cell or yes)
-        print_note(human, assumed_note(prepared.robot))
+        print_note(human, prepared.note)
         page = stack.enter_context(staged_file(out, *PAGE))
         stack.enter_context(output.staged())
         rows: list[Row] = []

@@ -83,10 +83,11 @@ def test_the_table_of_a_robot_has_a_column_for_each_speed(tmp_path: Path):
     result = truetip(
         "accept", "robot", "--scenario", "nominal", "--law", "open_loop", "--cycles", "2", "--dwell", "0.3",
         "--speeds", "100,50", "--set=station.elasticity=rigid", "--set=initial_error_mm=[0,0,0]",
-        "--set=reference.acceleration=4", "--set=reference.settle=0.2",
+        "--set=reference.acceleration=4", "--set=reference.settle=0.2", "--robot", "tx2_90",
         "--report", tmp_path / "r.html", "--json", tmp_path / "r.json",
     )  # fmt: skip
     assert result.exit_code == 0, result.output
+    assert "Note: carried over from ABB IRB 1200" in " ".join(result.stdout.split())
     fast, slow = json.loads((tmp_path / "r.json").read_text())["rows"]
     assert fast["AP_mm"] < 0.05  # a rigid robot without errors that follows its commands
     assert slow["AT_mm"] <= fast["AT_mm"]
