@@ -8,11 +8,10 @@ from pathlib import Path
 from typing import Any
 
 from diagrams.scenario.scenario import Scenario, scenario_text
-from robots.configuration.nodes import ConfigurationError, read_nodes
+from robots.configuration.nodes import YAML, ConfigurationError, read_nodes
 from robots.configuration.quantity import declaration
 
 _CLASS = ".py:"  # before the name of a class in a file
-_YAML = (".yaml", ".yml")
 _LONGEST = 250  # bytes of a name of a file; longer ones are refused by systems
 
 
@@ -68,7 +67,7 @@ def with_inner_files(files: Iterable[Path]) -> list[Path]:
     left = list(files)
     while left:
         file = left.pop()
-        if found.setdefault(file.resolve(), file) is file and file.suffix.lower() in _YAML:
+        if found.setdefault(file.resolve(), file) is file and file.suffix.lower() in YAML:
             with suppress(ConfigurationError):  # a row that cannot use it says so
                 texts = _texts(read_nodes(file, f"file {file}").plain)
                 places = (place for text in texts for place in (str(file.parent / text), text))

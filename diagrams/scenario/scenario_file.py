@@ -6,8 +6,8 @@ from pathlib import Path
 from diagrams.scenario.former_names import renamed
 from diagrams.scenario.own_laws import key_parts
 from robots.configuration.extended import FileKind, read_extended
-from robots.configuration.nodes import ConfigurationError, Node, parse
-from robots.configuration.suggestion import did_you_mean
+from robots.configuration.nodes import YAML, ConfigurationError, Node, parse
+from robots.configuration.suggestion import did_you_mean, why_no_file
 from robots.configuration.typed import merged
 
 
@@ -72,11 +72,11 @@ def _folder():
 
 def _find(name: str, beside: Path) -> tuple[Path, str]:
     """Path and label of a scenario."""
-    is_file = name.endswith((".yaml", ".yml"))
+    is_file = name.lower().endswith(YAML)
     path = beside / name if is_file else Path(str(_folder() / f"{name}.yaml"))
     if not path.is_file():
         allowed, guess = ", ".join(shipped_scenarios()), did_you_mean(name, shipped_scenarios())
-        missing = f"no file {path}" if is_file else "no file of that name comes with truetip"
+        missing = why_no_file(beside / name, is_file, *YAML)
         raise ScenarioError(
             f"scenario '{name}': {missing}; give the path of a YAML file or one of {allowed}{guess}"
         )

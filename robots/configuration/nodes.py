@@ -9,6 +9,8 @@ from typing import Any
 
 import yaml
 
+YAML = (".yaml", ".yml")  # how names of files end that are read as such, in letters of either size
+
 # Octal numbers such as 010, and 1:30, which is 90; 0o10, 0x8 and 0b1000 are meant.
 _SURPRISING = re.compile(r"[-+]?(0[0-7_]+|\d[\d_]*(:\d+)+(\.\d*)?)")
 

@@ -5,12 +5,12 @@ from pathlib import Path
 
 import numpy as np
 
-from robots.configuration.nodes import Node
+from robots.configuration.nodes import YAML, Node
 from robots.configuration.quantity import numbers
 from robots.description.joint_errors import check_names
 
 _JOINTS = 6
-_FILES = (".yaml", ".yml", ".urdf", ".xacro")
+FILES = (*YAML, ".urdf", ".xacro")  # how names of robot files end
 
 
 @dataclass
@@ -81,7 +81,7 @@ def with_nominal_from(folder: Path, robot: Node) -> Node:
 
 def names_file(robot: object) -> bool:
     """Whether a robot is named by the path of its file, not by the name of a shipped one."""
-    return isinstance(robot, str) and robot.lower().endswith(_FILES)
+    return isinstance(robot, str) and robot.lower().endswith(FILES)
 
 
 def is_same_robot(one: str, other: str) -> bool:

@@ -20,10 +20,10 @@ import numpy as np
 from robots.configuration.extended import FileKind, extends, read_extended
 from robots.configuration.nodes import ConfigurationError, Node, read_nodes
 from robots.configuration.quantity import numbers, positive, quantity
-from robots.configuration.suggestion import did_you_mean
+from robots.configuration.suggestion import did_you_mean, why_no_file
 from robots.configuration.typed import typed
 from robots.description.beam import Beam, beam_surrogate
-from robots.description.calibration import Calibration, with_nominal_from
+from robots.description.calibration import FILES, Calibration, names_file, with_nominal_from
 from robots.description.counterbalance_spring import CounterbalanceSpring
 from robots.description.drive_train import DriveLimits, DriveTrain, Tilting, drive_trains
 from robots.description.measuring import MeasuringRange
@@ -278,10 +278,10 @@ def _read(path: Path, label: str) -> Node:
 
 def _find(name: str, beside: Path) -> tuple[Path, str]:
     """Path and label of a robot file."""
-    is_file = name.endswith((".yaml", ".yml")) or is_urdf(name)
+    is_file = names_file(name)
     path = beside / name if is_file else Path(str(_data_folder() / f"{name}.yaml"))
     if not path.is_file():
-        missing = f"no file {path}" if is_file else "no file of that name comes with truetip"
+        missing = why_no_file(beside / name, is_file, *FILES)
         raise RobotFileError(
             f"robot '{name}': {missing}; "
             f"give the path of a YAML file or a URDF, or one of {', '.join(shipped_robots())}"

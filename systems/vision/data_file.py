@@ -5,7 +5,8 @@ from importlib.resources import files
 from pathlib import Path
 from typing import TypeVar
 
-from robots.configuration.nodes import read_nodes
+from robots.configuration.nodes import YAML, read_nodes
+from robots.configuration.suggestion import why_no_file
 from robots.configuration.typed import typed
 
 Problem = tuple[Sequence[str | int], str]  # a place in a file, and what is wrong there
@@ -49,14 +50,14 @@ def data_file(name: str, kind: str) -> Path:
         ValueError: if there is no such file.
     """
     folder = files("systems.vision") / "data"
-    is_file = name.endswith((".yaml", ".yml"))
+    is_file = name.lower().endswith(YAML)
     path = Path(name) if is_file else Path(str(folder / f"{name}_{kind}.yaml"))
     if not path.is_file():
         ending = f"_{kind}.yaml"
         shipped = sorted(
             entry.name.removesuffix(ending) for entry in folder.iterdir() if entry.name.endswith(ending)
         )
-        missing = f"no file {path}" if is_file else "no file of that name comes with truetip"
+        missing = why_no_file(Path(name), is_file, *YAML)
         raise ValueError(
             f"{kind} '{name}': {missing}; give the path of a YAML file or one of {', '.join(shipped)}"
         )

@@ -100,6 +100,8 @@ REFUSED = {
     "compare --robot arm2.urdf": "robot file arm2.urdf: it has no links",
     "compare --robot kr201": "robot 'kr201': no file",
     'compare --robot ""': "robot '': no file",
+    "compare --robot words.csv": "robot 'words.csv': the name of a file must end in .yaml or .yml or",
+    "run --scenario words.csv": "scenario 'words.csv': the name of a file must end in .yaml or .yml; give",
     "run --scenario misalined": "scenario 'misalined': no file of that name comes with",
     "run --station sim": "--station sim: station.kind must be one of simulated, egm, rsi, got 'sim'",
     "accept robot --cube 5000": "--cube 5000: P2 of the cube cannot be reached:",

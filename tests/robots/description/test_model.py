@@ -177,6 +177,12 @@ def test_a_file_that_is_no_mapping_in_yaml_is_refused_in_one_line(tmp_path: Path
     assert "\n" not in str(refused.value)
 
 
+def test_a_robot_file_may_be_named_in_capitals(tmp_path: Path):
+    """As some systems do."""
+    (tmp_path / "ARM.YAML").write_text("extends: irb1200\nname: mine\n")
+    assert load_robot(str(tmp_path / "ARM.YAML")).name == "mine"
+
+
 @pytest.mark.parametrize(
     ("name", "missing"),
     [
