@@ -144,7 +144,7 @@ class _Reader:
             kind, number = suggested[1].upper(), int(suggested[2])
             self._state = replace(self._state, **{kind.lower(): self._numbered(kind, number, line)})
             if kind == "TOOL":
-                self._state = self._with_load(self._state, number, line)
+                self._state = self._with_load(self._state, number)
         match = _PLACED.match(line.code)
         if match:
             name = re.sub(r"\s", "", match["name"]).upper() + match["part"]
@@ -165,7 +165,7 @@ class _Reader:
             self._state = replace(self._state, **{name[1:].lower(): frame})
             number = re.fullmatch(r"TOOL_DATA\[\s*(\d+)\s*\]", value, re.IGNORECASE)
             if number:
-                self._state = self._with_load(self._state, int(number[1]), line)
+                self._state = self._with_load(self._state, int(number[1]))
         elif name == "$IPO_MODE":
             self._state = replace(self._state, is_at_rest=value.upper() == "#TCP")
         elif name == "$LOAD":
@@ -173,11 +173,10 @@ class _Reader:
             mass = found.numbers.get("M") if found else None
             if mass is None:
                 raise ProgramError(f"{line.where}: the mass of {value} is not known; --with FILE reads it")
-            unread = "" if value.startswith("{") else self._unread(value.upper(), line)
+            unread = "" if value.startswith("{") else self._unread(value.upper())
             self._state = replace(self._state, load=mass.value, load_unread=unread)
         elif name.upper() == "$LOAD.M":
-            unread = f"{line.where}: {name} = {value} changes a part of the load, which is not read"
-            self._state = replace(self._state, load_unread=unread)
+            self._state = replace(self._state, load_unread=_not_read(name))
         elif name == "FDAT_ACT" and value.upper() in self._values:
             found = self._of_fdat(self._values[value.upper()])
             self._state = found or replace(self._state, is_at_rest=True)
@@ -190,15 +189,13 @@ class _Reader:
 
     def _declared(self, name: str, line: Line) -> Value | None:
         """What declarations say of a frame; None if they say nothing. Raises ProgramError if it changes."""
-        if unread := self._unread(name, line):
-            raise ProgramError(unread)
+        if unread := self._unread(name):
+            raise ProgramError(f"{line.where}: {unread}")
         return self._values.get(name)
 
-    def _unread(self, name: str, line: Line) -> str:
-        """That a program changes a value, at a line that takes it; empty if none does."""
-        if not any(_is_of(name, each) for each in self._changed):
-            return ""
-        return f"{line.where}: {name} is given another value by the program, which is not read"
+    def _unread(self, name: str) -> str:
+        """That the program changes a value; empty if it does not."""
+        return _not_read(name) if any(_is_of(name, each) for each in self._changed) else ""
 
     def _frame_value(self, line: Line, name: str, value: str, at: int) -> Frame:
         if value.upper() in ("$NULLFRAME", "$WORLD"):
@@ -223,13 +220,13 @@ class _Reader:
             raise ProgramError(f"{line.where}: {name} is not declared; --with $config.dat reads it")
         return Frame(name, _pose(declared, name))
 
-    def _with_load(self, state: _State, number: int, line: Line) -> _State:
+    def _with_load(self, state: _State, number: int) -> _State:
         """With what the controller knows to hang at the flange with a tool."""
         name = f"LOAD_DATA[{number}]"
         value = self._values.get(name)
         mass = value.numbers.get("M") if value else None
         load = mass.value if mass and mass.value >= 0.0 else None
-        return replace(state, load=load, load_unread=self._unread(name, line))
+        return replace(state, load=load, load_unread=self._unread(name))
 
     def _of_fdat(self, value: Value) -> _State | None:
         """Tool and base of a target; None if the tool stands still."""
@@ -237,7 +234,7 @@ class _Reader:
             return None
         tool, base = value.number("TOOL_NO"), value.number("BASE_NO")
         frames = self._numbered("TOOL", tool, value.line), self._numbered("BASE", base, value.line)
-        return self._with_load(_State(*frames), tool, value.line)
+        return self._with_load(_State(*frames), tool)
 
     def _move(self, line: Line, at: int) -> None:
         """The places that a motion names or holds; two of them in a circle."""
@@ -326,7 +323,11 @@ class _Reader:
                 raise ProgramError(f"{option} must be a number in KRL, got '{text}'")
         tool = int(self._context.tool)
         base = self._numbered("BASE", int(self._context.base or "0"), line)
-        return self._with_load(_State(self._numbered("TOOL", tool, line), base), tool, line)
+        return self._with_load(_State(self._numbered("TOOL", tool, line), base), tool)
+
+
+def _not_read(name: str) -> str:
+    return f"{name} is given another value by the program, which is not read"
 
 
 def _changed(line: Line) -> str:

@@ -184,8 +184,8 @@ class _Reader:
         declared = self._declared.get(name.lower())
         if declared is None:
             raise ProgramError(f"{where}: {name} is not declared; --with FILE reads further modules")
-        if unread := self._unread(name, where):
-            raise ProgramError(unread)
+        if unread := self._unread(name):
+            raise ProgramError(f"{where}: {unread}")
         tree, at = declared.tree, declared.source.where(declared.line)
         is_tool = declared.kind == "tooldata"
         frames = []
@@ -202,11 +202,10 @@ class _Reader:
             X = X @ declared_pose(rows[0], rows[1], f"{at}: {name}")
         return Frame(name, X)
 
-    def _unread(self, name: str, where: str) -> str:
+    def _unread(self, name: str) -> str:
         """That the program changes a value; empty if it does not."""
-        if name.lower() not in self._changed:
-            return ""
-        return f"{where}: {name} is given another value by the program, which is not read"
+        is_changed = name.lower() in self._changed
+        return f"{name} is given another value by the program, which is not read" if is_changed else ""
 
     def _mass(self, name: str, where: str) -> float:
         """Of a load, or of a tool, in kg."""
@@ -253,7 +252,7 @@ class _Reader:
                 positional.append(part)
         if name.word == "gripload" and positional:
             part = positional[0][0].text
-            self._gripped, self._gripped_unread = self._mass(part, where), self._unread(part, where)
+            self._gripped, self._gripped_unread = self._mass(part, where), self._unread(part)
         if name.word in _DISPLACING:
             text = f"{name.text} displaces what follows, which is not taken into account"
             self._note(source, line, text)
@@ -269,7 +268,7 @@ class _Reader:
             base = self._frame(options["wobj"][0].text, where)
         if options.get("tload"):
             part = options["tload"][0].text
-            payload, unread = self._mass(part, where), self._unread(part, where)
+            payload, unread = self._mass(part, where), self._unread(part)
         elif tool is not None:
             payload += self._mass(tool.name, where)
         use = _Use(where, tool, base, payload, unread)
