@@ -29,6 +29,7 @@ from robots.calibration.validation import ErrorStatistics
 from robots.description.model import RobotModel, load_robot, shipped_robots
 from robots.description.robot_file import robot_text
 from robots.measurement_design.design import MeasurementDesign, design_measurements
+from systems.named_classes import read_changed_files_again
 from systems.servo import LAWS
 
 Progress = Callable[[float], None]
@@ -119,6 +120,7 @@ def simulate(
         ValueError: if something is missing, unknown, out of range or out of reach; one line.
         RuntimeError: if the integration fails.
     """
+    read_changed_files_again()
     scenario = _scenario(scenario)
     known = None if robot is None else _robot(robot)
     return run(scenario, law or scenario.law, known, seed, progress)
@@ -148,6 +150,7 @@ def compare(
         ValueError: as of `simulate`, and if there are no cycles or a law is named twice.
         experiments.cli.workers.SimulationError: if a run broke off.
     """
+    read_changed_files_again()
     scenario = _scenario(scenario)
     chosen = list(laws) if laws is not None else compared_laws()
     if cycles < 1 or not chosen or len(set(chosen)) < len(chosen):

@@ -3,6 +3,7 @@
 import hashlib
 import importlib
 import importlib.util
+import multiprocessing
 import sys
 import traceback
 from collections.abc import Iterator, Mapping
@@ -12,6 +13,7 @@ from types import ModuleType
 from robots.configuration.suggestion import did_you_mean
 
 _OWN_FILES: dict[str, str] = {}  # those that were imported here, by their path the name of the module
+_READ: dict[str, bytes] = {}  # what stood in them, by the name of the module
 
 
 class OwnClassError(RuntimeError):
@@ -68,6 +70,19 @@ class NamedClasses(Mapping[str, type]):
         return found
 
 
+def read_changed_files_again() -> None:
+    """What a file of one's own says now counts from here on, not what it said when it was first imported.
+
+    To be called where work begins, as in a session in which the file is edited between two runs. A process
+    that was given its work by another keeps what it has read: the runs of one study are of one law.
+    """
+    if multiprocessing.parent_process() is not None:
+        return
+    for file, name in _OWN_FILES.items():
+        if name in sys.modules and _text(Path(file)) != _READ.get(name):
+            del sys.modules[name]
+
+
 def place_in_own_file(error: BaseException) -> str | None:
     """Where in a file of one's own an error arose: ``law.py, line 5, in step: KeyError: 'gain'``, one line.
 
@@ -108,6 +123,10 @@ def _classes_in(file: str, kind: str) -> list[str]:
     return [name for name, each in vars(module).items() if isinstance(each, type)]
 
 
+def _text(path: Path) -> bytes | None:
+    return path.read_bytes() if path.is_file() else None
+
+
 def _module_of(file: str, kind: str) -> ModuleType:
     """The module that a file holds, imported once a process. Raises ValueError, one line."""
     path = Path(file).resolve()
@@ -124,7 +143,9 @@ def _module_of(file: str, kind: str) -> ModuleType:
     sys.modules[name] = module
     _OWN_FILES[str(path)] = name
     try:
-        spec.loader.exec_module(module)
+        # Not by the loader: it takes a file of the same second and size for the one that it has compiled.
+        _READ[name] = path.read_bytes()
+        exec(compile(_READ[name], str(path), "exec"), module.__dict__)
     except (Exception, SystemExit) as error:  # whatever the file of somebody else does when it is imported
         problem = _import_problem(file, error)
         del sys.modules[name]

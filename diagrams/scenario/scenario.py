@@ -26,6 +26,7 @@ from systems.feedforward import FEEDFORWARDS, FeedforwardConfig
 from systems.guard.guard import GuardConfig
 from systems.guard.separation.protective_distance import SeparationConfig
 from systems.link.makers import LINK_NAMES, RobotLinkConfig, default_link
+from systems.named_classes import read_changed_files_again
 from systems.reference.paths import ReferenceConfig
 from systems.servo import LAWS
 from systems.servo.gains import LawGains
@@ -115,6 +116,7 @@ def load_scenario(name: str, settings: list[str] | None = None) -> Scenario:
         ScenarioError: if something is missing, unknown, out of range or not readable; one line that
             says what and where.
     """
+    read_changed_files_again()
     try:
         node = read_scenario_nodes(name, settings or [], Scenario)
         shipped, own = without_own_laws(node)

@@ -12,6 +12,7 @@ from pydrake.systems.framework import Context, DiagramBuilder, DiscreteValues, L
 
 from diagrams.runs.simulation import Experiment
 from diagrams.scenario.scenario import ScenarioError, load_scenario, scenario_text
+from experiments.library import simulate
 from experiments.metrics.run_metrics import error_metrics
 from robots.dynamics.newton_inverse import inverse_kinematics
 from robots.kinematics.forward import Kinematics
@@ -73,6 +74,15 @@ def test_run_and_compare_take_it_beside_the_shipped_ones(my_law: str, tmp_path: 
     alone = truetip("run", f"--law={my_law}", *SHORT, f"--out={tmp_path / 'alone'}")
     assert alone.exit_code == 0, alone.output
     assert "summary.json" in files(tmp_path / "alone")
+
+
+def test_a_file_that_is_edited_between_two_runs_of_a_session_is_read_again(my_law: str):
+    scenario = load_scenario("misaligned", LONG_ENOUGH)
+    before = simulate(scenario, my_law)
+    file = Path(my_law.rpartition(":")[0])
+    file.write_text(printed().replace("translation: float = 4.0", "translation: float = 1.0"))  # as long
+    after = simulate(scenario, my_law)
+    assert not np.array_equal(before.X_WE_true, after.X_WE_true)
 
 
 class Bare(LeafSystem):
