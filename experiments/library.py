@@ -140,16 +140,19 @@ def compare(
 
     Args:
         scenario: as of `simulate`.
-        laws: by name; None for the open loop and the three that Probst (2024) compares.
+        laws: shipped laws' names or ``FILE.py:CLASS``, for processes import them; None for the open loop and
+            the three that Probst (2024) compares.
         robot: as of `simulate`.
         cycles: runs of each law, with the scenario's seed and the ones after it.
         executor: where they run, such as ``LocalProcesses(1)`` of `experiments.cli.workers`.
         progress: as of `simulate`.
 
     Raises:
-        ValueError: as of `simulate`, and if there are no cycles or a law is named twice.
+        ValueError: as of `simulate`, and if there are no cycles, or a law is given otherwise or named twice.
         experiments.cli.workers.SimulationError: if a run broke off.
     """
+    if laws is not None and (isinstance(laws, str) or not all(isinstance(law, str) for law in laws)):
+        raise ValueError(f"compare: takes laws by name, ['pbvs'] or ['my_law.py:MyLaw'], got {laws!r}")
     read_changed_files_again()
     scenario = _scenario(scenario)
     chosen = list(laws) if laws is not None else compared_laws()

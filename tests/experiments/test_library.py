@@ -17,6 +17,7 @@ from robots.calibration.measurements import Measurements
 from robots.description.model import load_robot
 from robots.identification.motion import SensorPlace
 from robots.identification.recording import RecordedCase
+from systems.servo.pbvs import Pbvs
 from tests.experiments.commands import SHORT, files
 
 
@@ -58,6 +59,12 @@ def test_a_comparison_has_the_logs_of_single_runs_and_says_what_came_out(
 def test_what_cannot_be_compared_is_refused(laws: list[str], cycles: int, reason: str):
     with pytest.raises(ValueError, match=reason):
         compare("misaligned", laws, cycles=cycles)
+
+
+@pytest.mark.parametrize(("laws", "given"), [("pbvs", "'pbvs'"), ([Pbvs], "Pbvs")])
+def test_laws_to_compare_are_a_list_of_names(laws: list[str], given: str):
+    with pytest.raises(ValueError, match=rf"takes laws by name, \['pbvs'\] .*my_law.py:MyLaw.*{given}"):
+        compare("misaligned", laws)
 
 
 def test_a_law_that_does_not_exist_is_refused_before_anything_runs():
