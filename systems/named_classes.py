@@ -4,6 +4,7 @@ import hashlib
 import importlib
 import importlib.util
 import multiprocessing
+import re
 import sys
 import traceback
 from collections.abc import Iterator, Mapping
@@ -14,6 +15,9 @@ from robots.configuration.suggestion import did_you_mean
 
 _OWN_FILES: dict[str, str] = {}  # those that were imported here, by their path the name of the module
 _READ: dict[str, bytes] = {}  # what stood in them, by the name of the module
+_CALLED = re.compile(
+    r"(\w+)\.(\w+)\(\) (?:takes|missing|got) "
+)  # a wrong number of arguments, or one unknown
 
 
 class OwnClassError(RuntimeError):
@@ -88,7 +92,7 @@ def place_in_own_file(error: BaseException) -> str | None:
 
     None if no such file had a part in it: then it is a defect of truetip, and its traceback is wanted.
     """
-    frame = _own_frame(error)
+    frame = _own_frame(error) or _own_method_called(error)
     return None if frame is None else f"{Path(frame.filename).name}, {_line(frame)}: {_told(error)}"
 
 
@@ -97,6 +101,19 @@ def _own_frame(error: BaseException) -> traceback.FrameSummary | None:
     own = {file for file, name in _OWN_FILES.items() if name in sys.modules}
     frames = reversed(traceback.extract_tb(error.__traceback__))
     return next((frame for frame in frames if frame.filename in own), None)
+
+
+def _own_method_called(error: BaseException) -> traceback.FrameSummary | None:
+    """The method of one's own that does not take what it was given: Python names it, but is not in it yet."""
+    called = _CALLED.match(str(error)) if isinstance(error, TypeError) else None
+    if called is None:
+        return None
+    for name in _OWN_FILES.values():
+        method = getattr(getattr(sys.modules.get(name), called[1], None), called[2], None)
+        code = getattr(method, "__code__", None)
+        if code is not None and code.co_filename in _OWN_FILES:
+            return traceback.FrameSummary(code.co_filename, code.co_firstlineno, called[2])
+    return None
 
 
 def _line(frame: traceback.FrameSummary) -> str:

@@ -193,6 +193,21 @@ def test_a_result_of_the_wrong_size_is_named(my_law: str, right: str, wrong: str
         Experiment(load_scenario("misaligned"), my_law).advance(until=0.1)
 
 
+@pytest.mark.parametrize(
+    ("method", "given"), [("step", "takes 2 positional arguments but 3"), ("initial_state", "takes 1")]
+)
+def test_a_method_that_does_not_take_what_it_is_given_is_named_with_its_line(
+    my_law: str, method: str, given: str
+):
+    wrong = {"step": "moment: LawInput", "initial_state": ""}[method]
+    text = re.sub(rf"def {method}\(self.*?\)", f"def {method}(self, {wrong})", printed())
+    Path(my_law.rpartition(":")[0]).write_text(text)
+    line = next(n for n, line in enumerate(text.splitlines(), 1) if f"def {method}" in line)
+    told = truetip("run", f"--law={my_law}", *SHORT)
+    assert told.exit_code == 1
+    assert f"my_law.py, line {line}, in {method}: TypeError: MyLaw.{method}() {given}" in told.stderr
+
+
 @pytest.mark.parametrize("command", ["run", "compare"])
 @pytest.mark.parametrize(
     ("at", "method", "raises", "what"),
