@@ -20,6 +20,7 @@ from robots.description.source_notes import assumed_note, foreign_sources_note
 from robots.dynamics.compliant_kinematics import controller_kinematics
 from robots.kinematics.error_kinematics import ErrorKinematics
 from systems.cell.events.station_events import check_events
+from systems.named_classes import place_in_own_file
 from systems.reference.paths import make_path
 from systems.reference.shapes import Planned
 
@@ -240,6 +241,8 @@ def check(prepared: Prepared, laws: Sequence[str]) -> None:
             try:
                 Experiment(prepared.scenario, law, prepared.robot)
             except RuntimeError as error:  # what Drake does not like, such as an unknown integration scheme
+                if place_in_own_file(error) is not None:
+                    raise
                 raise ScenarioError(f"scenario {prepared.title}: {' '.join(str(error).split())}") from error
 
 

@@ -265,6 +265,10 @@ def test_what_is_no_law_is_refused_in_one_line(tmp_path: Path):
             "mine.py, line 3, in __init__: SystemExit: no licence",
         ),
         (
+            "class Mine:\n    def __init__(self, *_):\n        raise RuntimeError('no licence')\n",
+            "truetip: mine.py, line 3, in __init__: RuntimeError: no licence",
+        ),
+        (
             "from pydrake.systems.primitives import Adder\n"
             "class Mine(Adder):\n    def __init__(self, *_): super().__init__(2, 6)\n",
             "law Mine: input port 'joint_sample' is missing",
@@ -307,6 +311,7 @@ def test_what_is_no_law_is_refused_in_one_line(tmp_path: Path):
             "import",
             "raises",
             "exit of the class",
+            "error of the class",
             "missing port",
             "unknown port",
             "config",
