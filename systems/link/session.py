@@ -110,6 +110,8 @@ class LinkSession(Generic[Report]):
         self.heard = -math.inf  # when anything last came from the controller, also what is refused
         self.trouble = ""  # why its newest messages are refused, or were until commands had to start anew
         self.refused = ""  # what was the matter with the last datagram that was none of the controller's
+        self._useless = 0  # messages of the controller since the last accepted that cannot be used
+        self._why_useless = ""
         self._is_over = True  # whether a message has followed another since there was trouble
         self._speed, self._break_after, self._host = np.asarray(largest_speed).tolist(), break_after, host
         self._period = period
@@ -141,6 +143,7 @@ class LinkSession(Generic[Report]):
         except TelegramError as error:
             self.counters.undecodable += 1
             self.refused = str(error)
+            self._note_useless(self.refused)
             return None
         self.heard, self._may_stop, self._newest = now, report.is_ready, report
         if self.last is not None and not self._follows(report, now):
@@ -159,6 +162,10 @@ class LinkSession(Generic[Report]):
         if self.link in (Link.READY, Link.STOPPED) and now - self._heard > self._break_after:
             self.counters.breaks += 1
             self.link, self._may_reply = Link.BROKEN, False
+            # One alone may have been spoiled on the way, or be there twice; so many are what it sends.
+            if self._useless >= _CONFIRMATIONS and not self.trouble:
+                self.trouble = f"no message of the controller can be used: {self._why_useless}"
+                self._is_over = False
 
     def answer(self, command: Any, now: float) -> bytes | None:
         """The answer to the newest message, or None where there must be none.
@@ -203,6 +210,10 @@ class LinkSession(Generic[Report]):
             self.codec.decode(self._last_data)
             self.codec.encode(*self._last_reply)
 
+    def _note_useless(self, why: str) -> None:
+        self._useless += 1
+        self._why_useless = why
+
     def _is_known(self, sender: Address) -> bool:
         if self._host is not None and sender[0] != self._host:
             return False
@@ -219,6 +230,7 @@ class LinkSession(Generic[Report]):
         passed = report.time - last.time
         if ahead == 0 and passed == 0.0:
             self.counters.duplicates += 1
+            self._note_useless("it repeats the same one")
             return False
         longest = 2.0 * max(passed, ahead * self._period, self._period)
         moves = (report.position - last.position).tolist()
@@ -272,6 +284,7 @@ class LinkSession(Generic[Report]):
             self.counters.stops += 1
         self.sender, self.last, self._heard = sender, report, now
         self._candidate, self._candidates = None, 0
+        self._useless = 0
         self._may_reply = self.link is Link.READY
         self.counters.accepted += 1
 

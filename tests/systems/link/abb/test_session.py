@@ -244,3 +244,24 @@ def test_what_came_but_is_no_use_is_known_by_its_reason():
     assert rig.session.refused == "it is of 127.0.0.1, not of 192.168.125.1"
     rig.hear(b"nothing", ("192.168.125.1", 6510))
     assert rig.session.refused.startswith("not an EGM message")
+
+
+@pytest.mark.parametrize(
+    ("sent", "why"), [(b"nothing", "can be used: not an EGM message"), (report(1), "it repeats the same one")]
+)
+def test_a_controller_that_goes_on_with_messages_of_no_use_is_not_called_silent(sent: bytes, why: str):
+    rig = Rig()
+    rig.hear(report(1))
+    for _ in range(30):
+        rig.hear(sent)
+    assert rig.session.link is Link.BROKEN
+    assert why in rig.session.trouble
+
+
+def test_a_silence_after_one_spoiled_message_is_one():
+    rig = Rig()
+    rig.hear(report(1))
+    rig.hear(b"nothing")
+    rig.session.check(rig.now + 1.0)
+    assert rig.session.link is Link.BROKEN
+    assert rig.session.trouble == ""
