@@ -92,9 +92,10 @@ def study_zeros(
             progress(len(workspace) / grid)
     study = ZeroStudy(robot, elasticity, payload, axis_2, axis_3, wrist, workspace)
     if not study.regular:
+        angles = ",".join(f"{angle:.3g}" for angle in np.rad2deg(wrist))
         raise ValueError(
-            f"zeros of {robot.name}: the arm is singular at all {grid} x {grid} positions of axes 2 and 3; "
-            "a larger --grid may have others"
+            f"zeros of {robot.name}: the arm is singular at all {grid} x {grid} positions of axes 2 and 3 "
+            f"with axes 4 to 6 at {angles} degrees; another --wrist or a larger --grid may have others"
         )
     return study
 
