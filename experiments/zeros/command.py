@@ -113,6 +113,14 @@ def zeros_verdict(study: ZeroStudy) -> str:
     )
 
 
+def _white(study: ZeroStudy) -> str:
+    """What positions without a colour are; nothing if all have one."""
+    empty = int(np.isnan(study.slowest_rhp).sum())
+    singular = study.slowest_rhp.size - len(study.regular)
+    reasons = ["no such zero"] * (empty > singular) + ["the arm is singular"] * (singular > 0)
+    return f" White: {' or '.join(reasons)}." if reasons else ""
+
+
 def _write_study(page: Path, study: ZeroStudy, verdict: str) -> None:
     sections = []
     wrist = ", ".join(f"{angle:.0f}" for angle in np.rad2deg(study.wrist) + 0.0)
@@ -120,7 +128,7 @@ def _write_study(page: Path, study: ZeroStudy, verdict: str) -> None:
     if np.isfinite(study.slowest_rhp).any():
         note = (
             f"From the motors to the pose of the tool; {pose}. A pair that has just crossed the imaginary "
-            "axis has a small real part at a high frequency."
+            f"axis has a small real part at a high frequency.{_white(study)}"
         )
         sections.append(Section("Slowest zero in the right half-plane", note, workspace_figure(study), 560))
     middle = study.regular[len(study.regular) // 2]

@@ -65,6 +65,7 @@ def test_positions_of_an_arm_that_turns_further_are_counted_once_and_singular_on
     singular = 16 - numbers["poses"]
     assert 0 < singular < 16
     assert f"Left out: {singular} positions where the arm is singular." in " ".join(result.stdout.split())
+    assert "White: no such zero or the arm is singular." in (tmp_path / "zeros.html").read_text()
 
 
 @pytest.mark.slow
