@@ -1,9 +1,5 @@
 """What the replay and the live view show in Meshcat: floor, robot, paths and frames."""
 
-import logging
-from collections.abc import Iterator
-from contextlib import contextmanager
-
 import numpy as np
 from pydrake.geometry import (
     Box,
@@ -20,6 +16,7 @@ from pydrake.systems.framework import DiagramBuilder
 
 from robots.description.geometric_errors import GeometricErrors
 from robots.description.model import RobotModel
+from robots.drake_log import quiet_drake
 from robots.dynamics.plant import add_robot
 
 FRAME_RATE = 30.0  # 1/s
@@ -38,7 +35,7 @@ def open_meshcat(p_WE: np.ndarray, port: int | None = None) -> Meshcat:
     Raises:
         OSError: if no port is free.
     """
-    with _quiet_drake():
+    with quiet_drake():  # which announces the address of a server, also of one that lives for a second
         try:
             meshcat = Meshcat(MeshcatParams(host="localhost", port=port))
         except RuntimeError as error:
@@ -115,15 +112,3 @@ def rgba(color: str, alpha: float = 1.0) -> Rgba:
     """A colour given as #rrggbb."""
     red, green, blue = (int(color[i : i + 2], 16) / 255.0 for i in (1, 3, 5))
     return Rgba(red, green, blue, alpha)
-
-
-@contextmanager
-def _quiet_drake() -> Iterator[None]:
-    """Keeps Drake from announcing the address of a server that lives for a second."""
-    log = logging.getLogger("drake")
-    level = log.level
-    log.setLevel(logging.WARNING)
-    try:
-        yield
-    finally:
-        log.setLevel(level)

@@ -10,6 +10,8 @@ from experiments.feedforward.rectangle import working_position
 from experiments.plan.legs import Leg, legs_of
 from robots.description.model import load_robot
 from robots.kinematics.forward import Kinematics
+from robots.planning.limits import motion_limits
+from robots.planning.rigid_start import quickest_rigid
 from tests.robots.programs.test_languages import EXTERNAL
 
 KR16 = load_robot("kr16")
@@ -115,3 +117,18 @@ def test_an_arm_with_less_room_plans_a_smaller_rectangle():
     ]
     assert np.array(sizes[4:]) / np.array(sizes[:4]) == pytest.approx(np.full(4, sizes[4] / sizes[0]))
     assert 0.2 < sizes[4] / sizes[0] < 0.9
+
+
+@pytest.mark.parametrize("share", [0.7, 0.8, 0.9])
+def test_a_line_on_which_joints_turn_back_half_way_has_a_quickest_motion(
+    share: float, caplog: pytest.LogCaptureFixture
+):
+    robot = load_robot("kr210")
+    across = legs_of(robot, "rectangle")[1].path
+    most = motion_limits(robot)
+    names = "speed", "acceleration", "motor_torque"
+    kept = replace(most, **{name: share * getattr(most, name) for name in names})
+    times, s = quickest_rigid(robot, 210.0, across, kept)
+    assert s[[0, -1]] == pytest.approx([0.0, 1.0])
+    assert times[-1] < 1.0
+    assert "Toppra" not in caplog.text
