@@ -36,7 +36,7 @@ def plan_command(
         typer.Option(
             "--path",
             metavar="rectangle|joints|FILE",
-            help="A level rectangle; 20 degrees of axes 1 to 3 from the stretched arm; or a table, RAPID or "
+            help="A level rectangle; axes 1 to 3 from zero to -20 degrees; or a table, RAPID or "
             "KRL, with a rest at the end of each move.",
         ),
     ] = "rectangle",

@@ -28,7 +28,7 @@ from systems.reference.segment import Segment, line, weights
 RECTANGLE, JOINTS = "rectangle", "joints"
 _MOTION = np.deg2rad(
     [-20.0, -20.0, -20.0, 0.0, 0.0, 0.0]
-)  # from the stretched arm, Reiner (2010), section 5.3
+)  # from zero, where his KUKA is stretched, Reiner (2010), section 5.3
 
 
 @dataclass(frozen=True)
