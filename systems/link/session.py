@@ -300,9 +300,14 @@ def _trouble(report: RobotReport, ahead: int, passed: float, since: float, farth
         farthest: rad, the largest change of a joint.
     """
     if passed < 0.0:
-        return f"the controller's clock stepped back by {since - passed:.3g} s"
+        return f"the controller's clock stepped back by {_seconds(since - passed)} s"
     if passed > _LARGEST_WAIT:
-        return f"the controller's clock stepped forward by {passed - since:.3g} s"
+        return f"the controller's clock stepped forward by {_seconds(passed - since)} s"
     if not 0 < ahead <= _LARGEST_GAP:
         return f"the controller's count jumped by {ahead} to {report.seqno}"
     return f"a joint jumped by {math.degrees(farthest):.3g} degrees from one message to the next"
+
+
+def _seconds(time: float) -> str:
+    """Three digits, and never a power of ten: clocks that are set anew step by hours."""
+    return f"{time:.3g}" if time < 1e3 else f"{time:.0f}"

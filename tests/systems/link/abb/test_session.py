@@ -265,3 +265,11 @@ def test_a_silence_after_one_spoiled_message_is_one():
     rig.session.check(rig.now + 1.0)
     assert rig.session.link is Link.BROKEN
     assert rig.session.trouble == ""
+
+
+@pytest.mark.parametrize(("step", "told"), [(5000.0, "forward by 5000 s"), (-1234.0, "back by 1234 s")])
+def test_a_step_of_the_clock_is_told_in_plain_seconds(step: float, told: str):
+    rig = Rig()
+    rig.hear(report(1, time=2000.0))
+    rig.hear(report(2, time=2000.0 + PERIOD + step))
+    assert told in rig.session.trouble
