@@ -181,8 +181,10 @@ def _joint(
     }
     if fit.parameters.of_kind("play").size:
         lubricant = numbers.lubricant * changes["damping"]
-        changes["backlash"] = drive_parts.Backlash(float(numbers.play[i]) / ARC_MINUTE, lubricant)
-        changes["hysteresis"] = drive_parts.Dahl([float(numbers.hysteresis[i])], [numbers.width])
+        # Where there is none, a fit that goes on from another may come out a trace below it.
+        play, hysteresis = max(0.0, float(numbers.play[i])), max(0.0, float(numbers.hysteresis[i]))
+        changes["backlash"] = drive_parts.Backlash(play / ARC_MINUTE, lubricant)
+        changes["hysteresis"] = drive_parts.Dahl([hysteresis], [numbers.width])
         changes["ratio_error"] = _ripple(i, numbers, fit) or train.ratio_error
     tilting = joint.tilting
     if tilting is not None:
