@@ -2,7 +2,7 @@
 
 Each row is a command of its own, `experiments.bench.accuracy.rows`. Its numbers stay in a folder, and a row
 that is there already is not measured again, so that an interrupted measurement goes on where it was; another
-law wants another folder. All rows are 533 runs and take hours.
+law wants another folder. All rows are 523 runs and take hours.
 """
 
 import argparse
