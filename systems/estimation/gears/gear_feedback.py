@@ -10,9 +10,11 @@ from systems.estimation import kernels
 from systems.estimation.gears.gear_errors import USUAL
 from systems.estimation.memory import Layout
 
-# Both assumed. Teeth that lie free cross in some tenths of a second. And links follow their motors through
-# free teeth with some 40 rad/s; what is fed back faster makes them swing from one side to the other.
-_LASTS = 0.1  # s, after which a third is left of what a joint is off by
+# All assumed. Teeth that lie free cross in some tenths of a second, and hardly while nothing moves. And links
+# follow their motors through free teeth with some 40 rad/s; what is fed back faster makes them swing from
+# one side to the other.
+_LASTS, _LASTS_AT_REST = 0.1, 10.0  # s, after which a third is left of what a joint is off by
+_AT_REST = 1e-3  # rad/s, of the joints; what is fed back moves them by less
 _FREQUENCY = 40.0  # rad/s, with which joints are led to where it is made up for
 
 
@@ -53,6 +55,7 @@ class GearFeedback:
         r: np.ndarray,
         weights: np.ndarray,
         variances: np.ndarray,
+        speed: float,
         exposure: float,
     ) -> None:
         """Takes one sample.
@@ -63,9 +66,11 @@ class GearFeedback:
             r: how far the tip was seen from where it was predicted, (6,).
             weights: of the camera, one over variances, (6,).
             variances: of what gears may be off by, rad^2, (6,).
+            speed: of the fastest joint, rad/s.
             exposure: s, as the camera has it.
         """
-        kept = math.exp(-max(0.0, exposure - float(memory.exposure[0])) / _LASTS)
+        lasts = _LASTS if speed > _AT_REST else _LASTS_AT_REST
+        kept = math.exp(-max(0.0, exposure - float(memory.exposure[0])) / lasts)
         kernels.gears.follow(J, r, weights, USUAL, self._share * variances, kept, memory.off, memory.P)
         memory.exposure[0] = exposure
 

@@ -24,12 +24,14 @@ def started(share: float = 0.1):
     return feedback, memory
 
 
-def shown(feedback, memory, J, off, variances, ticks: int, seed: int = 0, noise: float = 1.0) -> np.ndarray:
+def shown(
+    feedback, memory, J, off, variances, ticks: int, noise: float = 1.0, speed: float = 0.1
+) -> np.ndarray:
     """Where joints are led aside, (ticks, 3, 6), while a camera sees them off by an angle, rad, (6,)."""
-    rng, rows = np.random.default_rng(seed), []
+    rng, rows = np.random.default_rng(0), []
     for k in range(ticks):
         r = J @ off + noise * SIGMA * rng.normal(size=6)
-        feedback.hear(memory, J, r, 1.0 / SIGMA**2, variances, PERIOD * k)
+        feedback.hear(memory, J, r, 1.0 / SIGMA**2, variances, speed, PERIOD * k)
         rows.append(feedback.lead(memory, PERIOD, PERIOD))
     return np.array(rows)
 
@@ -55,6 +57,15 @@ def test_noise_of_a_camera_moves_the_tip_by_a_third_of_what_it_is(J):
     assert 0.0 < np.sqrt((moved**2).mean(axis=0)).max() < SIGMA[3] / 3.0
 
 
+def test_at_rest_nearly_all_of_it_is_made_up_for_and_noise_moves_the_tip_by_a_tenth_of_what_it_is(J):
+    off, variances = np.zeros(6), np.where(np.arange(6) == 0, FREE, LOADED)
+    off[0] = 100e-6
+    aside = shown(*started(), J, off, variances, 4000, speed=0.0)[500:, 0]
+    left = np.einsum("ij,kj->ki", J[3:], aside + off)
+    assert np.abs(left.mean(axis=0)).max() < 0.1 * np.linalg.norm(J[3:, 0]) * off[0]
+    assert left.std(axis=0).max() < SIGMA[3] / 10.0
+
+
 def test_the_filter_is_that_of_the_textbook(J):
     """Against a Kalman filter in matrices, whose gain takes the six numbers of a sample at once."""
     feedback, memory = started(share=0.3)
@@ -67,7 +78,7 @@ def test_the_filter_is_that_of_the_textbook(J):
             P = np.diag(0.3 * variances) * (1.0 - np.exp(-2.0 * PERIOD / 0.1))
         gain = P @ J.T @ np.linalg.inv(J @ P @ J.T + np.diag(SIGMA**2))
         x, P = x + gain @ (r - J @ x), P - gain @ J @ P
-        feedback.hear(memory, J, r, 1.0 / SIGMA**2, variances, PERIOD * k)
+        feedback.hear(memory, J, r, 1.0 / SIGMA**2, variances, 0.1, PERIOD * k)
         np.testing.assert_allclose(memory.off, x, rtol=1e-9, atol=1e-15)
         np.testing.assert_allclose(memory.P, P, rtol=1e-9, atol=1e-22)
 
@@ -85,7 +96,7 @@ def test_what_was_seen_is_forgotten_where_the_camera_is_blind_and_after_a_dead_t
 def test_a_sample_that_no_gear_explains_is_left_alone(J):
     feedback, memory = started()
     r = np.array([0.0, 0.0, 0.0, 5.0 * SIGMA[3], 0.0, 0.0])
-    feedback.hear(memory, J, r, 1.0 / SIGMA**2, np.full(6, FREE), PERIOD)
+    feedback.hear(memory, J, r, 1.0 / SIGMA**2, np.full(6, FREE), 0.1, PERIOD)
     assert not memory.off.any()
 
 
