@@ -102,6 +102,7 @@ class TipEstimator:
         self._begin_from(memory, self.model.prior, memory.xi)
         self._suppositions.start(memory.supposed)
         self._noise.start(memory.noise)
+        self.gear_feedback.rest(memory.loose)
         self._innovations.start(memory.innovations)
 
     def x(self, memory: SimpleNamespace) -> np.ndarray:

@@ -36,6 +36,7 @@ class GearFeedback:
             off=(NUM_JOINTS,),  # rad, at the last exposure
             P=(NUM_JOINTS, NUM_JOINTS),  # rad^2, its covariance
             exposure=(1,),  # s, as the camera has it
+            lasts=(1,),  # s, after which a third is left of it
             aside=(2, NUM_JOINTS),  # rad and rad/s, by which joints are led aside
         )
 
@@ -46,7 +47,7 @@ class GearFeedback:
 
     def rest(self, memory: SimpleNamespace) -> None:
         """Nothing is known, and nothing led aside."""
-        memory.all[:] = 0.0
+        memory.all[:], memory.lasts[0] = 0.0, _LASTS
 
     def hear(
         self,
@@ -69,8 +70,8 @@ class GearFeedback:
             speed: of the fastest joint, rad/s.
             exposure: s, as the camera has it.
         """
-        lasts = _LASTS if speed > _AT_REST else _LASTS_AT_REST
-        kept = math.exp(-max(0.0, exposure - float(memory.exposure[0])) / lasts)
+        memory.lasts[0] = _LASTS if speed > _AT_REST else _LASTS_AT_REST
+        kept = _kept(memory, exposure - float(memory.exposure[0]))
         kernels.gears.follow(J, r, weights, USUAL, self._share * variances, kept, memory.off, memory.P)
         memory.exposure[0] = exposure
 
@@ -82,10 +83,15 @@ class GearFeedback:
             ahead: s, of the instant that is planned, after the last exposure.
             step: s since the last instant that was planned.
         """
-        goal = -math.exp(-max(0.0, ahead) / _LASTS) * memory.off
+        goal = -_kept(memory, ahead) * memory.off
         aside, rate = memory.aside
         before, w = rate.copy(), _FREQUENCY
         # Implicit, so that it is stable with any step.
         rate[:] = (rate + step * w * w * (goal - aside)) / (1.0 + w * step) ** 2
         aside += step * rate
         return np.array((aside, rate, (rate - before) / step))
+
+
+def _kept(memory: SimpleNamespace, time: float) -> float:
+    """What is left after a time in s of what a joint is off by."""
+    return math.exp(-max(0.0, time) / float(memory.lasts[0]))

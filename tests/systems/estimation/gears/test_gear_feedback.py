@@ -106,3 +106,15 @@ def test_rates_are_those_of_the_way(J):
     way, rate, acceleration = aside[:, 0], aside[:, 1], aside[:, 2]
     np.testing.assert_allclose(np.diff(way, axis=0), PERIOD * rate[1:], rtol=1e-9, atol=1e-15)
     np.testing.assert_allclose(np.diff(rate, axis=0), PERIOD * acceleration[1:], rtol=1e-9, atol=1e-12)
+
+
+def test_at_rest_a_dead_time_keeps_nothing_of_it_from_being_made_up_for(J):
+    off = np.array([100e-6, 0.0, 0.0, 0.0, 0.0, 0.0])
+    made_up_for = []
+    for speed in (0.0, 0.1):
+        feedback, memory = started()
+        shown(feedback, memory, J, off, np.full(6, FREE), 500, noise=0.0, speed=speed)
+        late = [feedback.lead(memory, 0.14, PERIOD)[0, 0] for _ in range(200)]
+        made_up_for.append(-late[-1] / memory.off[0])
+    assert made_up_for[0] > 0.98
+    assert made_up_for[1] == pytest.approx(np.exp(-1.4), rel=0.01)
