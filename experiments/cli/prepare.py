@@ -181,10 +181,13 @@ def _fitted(
     """The scenario `carried_over` from the robot for which its path was written, and what has changed.
 
     A path that the scenario says itself belongs to its robot; else it is the default one and its robot's.
+    A robot among the settings is as one beside them: the scenario was not written for it.
     """
-    written = read_scenario_nodes(name, list(settings), Scenario)
-    by_scenario = stated_keys(written)
-    named = str(load_scenario(name, list(settings)).robot)
+    others = [setting for setting in settings if setting.partition("=")[0].strip() != "robot"]
+    if robot is None and len(others) < len(settings):
+        robot = str(scenario.robot)
+    by_scenario = stated_keys(read_scenario_nodes(name, others, Scenario))
+    named = str(load_scenario(name, others).robot)
     own = PATH in by_scenario
     before = named if own else Scenario().robot
     if scenario.robot == before:

@@ -40,6 +40,15 @@ def test_a_scenario_is_carried_over_unless_it_says_otherwise(tmp_path: Path, mon
     assert free.scenario.reference.path.kind == "rectangle"
 
 
+def test_a_robot_among_the_settings_is_as_one_beside_them():
+    """The largest payload of a Puma 560 is a third of the 7 kg that the scenario says for its own robot."""
+    beside, among = prepare("misaligned", robot="puma560"), prepare("misaligned", ["robot=puma560"])
+    assert among.note == beside.note
+    assert among.scenario.station.payload == beside.scenario.station.payload == 2.5
+    own = prepare("misaligned", ["robot=puma560", "station.payload=1"])
+    assert own.scenario.station.payload == 1.0
+
+
 @pytest.mark.slow
 def test_the_diagram_is_drawn(robot: str):
     assert truetip("diagram", "--robot", robot).exit_code == 0
