@@ -48,7 +48,7 @@ REFUSED = {
     "run --set station.errors.random.seed=-1": "station.errors.random.seed must be between 0 and",
     "compare --scenario twice.yaml": "scenario twice.yaml, line 2: key 'seed' is given twice",
     "compare --scenario .": "scenario '.': no file",
-    "compare --scenario binary.bin": "scenario 'binary.bin': no file",
+    "compare --scenario binary.bin": "scenario 'binary.bin': the name of a file must end in .yaml",
     "compare --scenario misalignd": "scenario 'misalignd': no file",
     "compare --set station": "--set station: must look like station.camera.delay=0.008",
     "compare --set =3": "--set =3: must look like station.camera.delay=0.008",
