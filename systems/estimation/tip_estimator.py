@@ -243,9 +243,9 @@ class TipEstimator:
         if model.has_gear_errors and weight > _CALM_WEIGHT:
             seen = J, r, memory.noise.weights
             model.gear_errors.weigh(memory.against, *seen, pair.others)
-            by_gears = model.gear_variances(x, pair.loads, pair.states)
-            speed = float(np.abs(pair.motion[:6]).max())
-            self.gear_feedback.hear(memory.loose, *seen, by_gears, speed, pair.time)
+            if self.gear_feedback.acts:
+                by_gears = model.gear_variances(x, pair.loads, pair.states)
+                self.gear_feedback.hear(memory.loose, *seen, by_gears, pair.motion[:6], pair.time)
         if self._noise.hear(memory.noise, r, H, memory.xi, pair):
             self._weigh_anew(memory)
         self._take(memory, (r, gears, H), pair, shapes, weight)

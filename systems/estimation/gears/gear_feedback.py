@@ -56,7 +56,7 @@ class GearFeedback:
         r: np.ndarray,
         weights: np.ndarray,
         variances: np.ndarray,
-        speed: float,
+        velocity: np.ndarray,
         exposure: float,
     ) -> None:
         """Takes one sample.
@@ -67,10 +67,10 @@ class GearFeedback:
             r: how far the tip was seen from where it was predicted, (6,).
             weights: of the camera, one over variances, (6,).
             variances: of what gears may be off by, rad^2, (6,).
-            speed: of the fastest joint, rad/s.
+            velocity: of the joints, rad/s, (6,).
             exposure: s, as the camera has it.
         """
-        memory.lasts[0] = _LASTS if speed > _AT_REST else _LASTS_AT_REST
+        memory.lasts[0] = _LASTS if np.abs(velocity).max() > _AT_REST else _LASTS_AT_REST
         kept = _kept(memory, exposure - float(memory.exposure[0]))
         kernels.gears.follow(J, r, weights, USUAL, self._share * variances, kept, memory.off, memory.P)
         memory.exposure[0] = exposure

@@ -11,6 +11,8 @@ PERIOD = 4e-3  # s
 SIGMA = np.repeat([1.75e-4, 5e-5], 3)  # rad and m, of a camera
 FREE, LOADED = 80e-6**2, 5e-6**2  # rad^2, what a gear may be off by between its flanks and under load
 
+MOVING = np.full(6, 0.1)  # rad/s
+
 
 @pytest.fixture(scope="module", name="J")
 def jacobian() -> np.ndarray:
@@ -31,7 +33,7 @@ def shown(
     rng, rows = np.random.default_rng(0), []
     for k in range(ticks):
         r = J @ off + noise * SIGMA * rng.normal(size=6)
-        feedback.hear(memory, J, r, 1.0 / SIGMA**2, variances, speed, PERIOD * k)
+        feedback.hear(memory, J, r, 1.0 / SIGMA**2, variances, np.full(6, speed), PERIOD * k)
         rows.append(feedback.lead(memory, PERIOD, PERIOD))
     return np.array(rows)
 
@@ -78,7 +80,7 @@ def test_the_filter_is_that_of_the_textbook(J):
             P = np.diag(0.3 * variances) * (1.0 - np.exp(-2.0 * PERIOD / 0.1))
         gain = P @ J.T @ np.linalg.inv(J @ P @ J.T + np.diag(SIGMA**2))
         x, P = x + gain @ (r - J @ x), P - gain @ J @ P
-        feedback.hear(memory, J, r, 1.0 / SIGMA**2, variances, 0.1, PERIOD * k)
+        feedback.hear(memory, J, r, 1.0 / SIGMA**2, variances, MOVING, PERIOD * k)
         np.testing.assert_allclose(memory.off, x, rtol=1e-9, atol=1e-15)
         np.testing.assert_allclose(memory.P, P, rtol=1e-9, atol=1e-22)
 
@@ -96,7 +98,7 @@ def test_what_was_seen_is_forgotten_where_the_camera_is_blind_and_after_a_dead_t
 def test_a_sample_that_no_gear_explains_is_left_alone(J):
     feedback, memory = started()
     r = np.array([0.0, 0.0, 0.0, 5.0 * SIGMA[3], 0.0, 0.0])
-    feedback.hear(memory, J, r, 1.0 / SIGMA**2, np.full(6, FREE), 0.1, PERIOD)
+    feedback.hear(memory, J, r, 1.0 / SIGMA**2, np.full(6, FREE), MOVING, PERIOD)
     assert not memory.off.any()
 
 
