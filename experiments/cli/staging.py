@@ -34,11 +34,7 @@ def staged_folder(folder: str | Path, *names: str) -> Iterator[Path]:
     """
     folder = Path(folder)
     refuse_replaced(folder, *names)
-    try:
-        place = _nearest_existing(folder)
-        stage = Path(tempfile.mkdtemp(prefix=".truetip-", dir=place))
-    except OSError as error:
-        raise OSError(f"cannot write in folder {folder}: {_reason(error)}") from error
+    stage = _stage(folder)
     try:
         yield stage
         try:
@@ -74,6 +70,11 @@ def staged_file(path: str | Path, *suffixes: str) -> Iterator[Path]:
         make_folder_of(path)
 
 
+def check_folder_of(path: Path) -> None:
+    """Raises OSError, one line, if the folder of a file cannot be made or written; makes nothing."""
+    _stage(path.parent).rmdir()
+
+
 def make_folder_of(path: Path) -> None:
     """Makes the folder of a file where there is none, and says so if somebody has typed it: it may be a slip.
 
@@ -107,6 +108,18 @@ def keep_files(stage: Path, folder: Path) -> None:
     folder.mkdir(parents=True, exist_ok=True)
     for path in stage.iterdir():
         shutil.copyfile(path, folder / path.name)
+
+
+def _stage(folder: Path) -> Path:
+    """A new hidden folder inside a folder or its nearest existing parent.
+
+    Raises:
+        OSError: if it cannot be made; one line.
+    """
+    try:
+        return Path(tempfile.mkdtemp(prefix=".truetip-", dir=_nearest_existing(folder)))
+    except OSError as error:
+        raise OSError(f"cannot write in folder {folder}: {_reason(error)}") from error
 
 
 def _nearest_existing(folder: Path) -> Path:

@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 
 from diagrams.runs.guided_measurement import Row
-from experiments.cli.staging import make_folder_of
+from experiments.cli.staging import check_folder_of, make_folder_of
 from robots.calibration.measurement_file import measurement_text, read_measurements
 from robots.calibration.measurements import Measurements
 from robots.description.model import NUM_JOINTS
@@ -58,7 +58,7 @@ class MeasuredTable:
         """Reads what an earlier run has left.
 
         Args:
-            path: of the file; its folder is made.
+            path: of the file; its folder is made with its first row.
             q: the configurations of the design, (n, 6) in rad.
             payload: at the flange in kg.
 
@@ -68,7 +68,7 @@ class MeasuredTable:
         """
         self.path, self._payload = path, payload
         self.measured: set[int] = set()
-        make_folder_of(path)
+        check_folder_of(path)
         if not path.exists():
             return
         found, problems = read_measurements(path)
@@ -91,6 +91,7 @@ class MeasuredTable:
         text = measurement_text(
             Measurements(q[None], position[None], rotation[None], np.array([self._payload]))
         )
+        make_folder_of(self.path)
         is_new = not self.path.exists()
         with self.path.open("a", encoding="utf-8") as file:
             file.write(text if is_new else text.splitlines(keepends=True)[1])

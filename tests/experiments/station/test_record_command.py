@@ -115,6 +115,17 @@ def test_a_controller_that_stops_leaves_what_was_measured_and_said(
     assert parts == ["said.mcap", "said-2.mcap"]
 
 
+def test_a_run_that_measures_nothing_leaves_no_folder(tmp_path, design, monkeypatch: pytest.MonkeyPatch):
+    def silent(*_):
+        raise SimulationError("no message of a controller came in")
+
+    monkeypatch.setattr(record_command, "_recorded", silent)
+    table = tmp_path / "new" / "folder" / "measured.csv"
+    result = CliRunner().invoke(app, ["record", str(design), "--with-cell", "--write", str(table)])
+    assert (result.exit_code, result.stderr) == (1, "truetip: no message of a controller came in\n")
+    assert not (tmp_path / "new").exists()
+
+
 def test_a_recording_without_a_dwell_is_refused_in_one_line(tmp_path):
     path = tmp_path / "moving.mcap"
     # A path has a tag, which a reader of plain YAML refuses.
