@@ -7,7 +7,7 @@ import numpy as np
 
 from experiments.calibration.figures import correlation_figure, joints_figure, noise_figure, vectors_figure
 from experiments.calibration.page import CORRELATION_NOTE, NOISE_NOTE
-from experiments.calibration.report import gravity_dict, gravity_sentence
+from experiments.calibration.report import gravity_dict, gravity_sentence, load_sentence
 from experiments.calibration.words import icon, in_words, rounded, unit
 from experiments.report.plot_page import Section, sortable_table, write_plot_page
 from robots.calibration.instruments.identify import InstrumentCalibration
@@ -38,7 +38,7 @@ def sentence(found: InstrumentCalibration) -> str:
         text += "The lines are too few to tell their noise: it leans on the usual 0.1 mm, and the intervals "
         text += "are as good as that; who knows it better may say it (sigma_mm, --noise). "
     text += f"Noise of the joints {np.rad2deg(found.noise[0]):.2g} degrees."
-    return text + gravity_sentence(found.gravity)
+    return text + gravity_sentence(found.gravity) + load_sentence(found.robot, seen.loads)
 
 
 def validation_sentence(checked: FreshLines) -> str:

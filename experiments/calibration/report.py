@@ -19,6 +19,7 @@ from robots.calibration.measurements import MeasurementNoise
 from robots.calibration.repeatability import repeatability
 from robots.calibration.solver.left_over import GravityTest
 from robots.calibration.validation import ErrorStatistics, prediction_errors, statistics
+from robots.description.model import RobotModel
 from robots.pose import zyx_from_rotation
 
 Problems = Sequence[tuple[str, RowProblem]]
@@ -170,6 +171,7 @@ def calibration_verdict(study: CalibrationStudy, path: Mapping[str, Any] | None)
     text += f" from {len(identified.residuals)} measurements"
     text += f" in {identified.iterations} iterations."
     text += noise_sentence(identified) + unexplained_sentence(identified)
+    text += load_sentence(identified.robot, identified.measurements.payload)
     if identified.frame is not None:
         far = float(np.linalg.norm(identified.frame[:3, 3]))
         text += f" The instrument measures in a frame of its own, {far:.2f} m from the world of the robot."
@@ -255,6 +257,17 @@ def gravity_sentence(gravity: GravityTest | None) -> str:
     return (
         f" Of what these parameters leave, {1e3 * gravity.explained:.2g} mm (rms) follow the weight of "
         "arm and load, as where joints yield; identify that, too (--compliance)."
+    )
+
+
+def load_sentence(robot: RobotModel, loads: np.ndarray) -> str:
+    """That loads in kg, (n,), are more than a robot may carry, which no rigid one feels; else empty."""
+    heaviest, largest = float(loads.max(initial=0.0)), robot.payload.largest_mass
+    if heaviest <= largest:
+        return ""
+    return (
+        f" The loads of the table (payload_kg, up to {heaviest:g} kg) have no effect on geometry alone; "
+        f"{robot.name} may carry {largest:g} kg: whether joints yield was not looked at."
     )
 
 

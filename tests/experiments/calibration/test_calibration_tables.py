@@ -105,6 +105,17 @@ def test_what_does_not_go_together_is_said_in_one_line(
     assert not (tmp_path / "out").exists()
 
 
+def test_loads_beyond_what_the_robot_carries_are_named(tmp_path: Path):
+    """Grams for kilograms: geometry alone does not ask for them."""
+    tables(tmp_path, "irb1200")
+    table = tmp_path / "measured.csv"
+    table.write_text(table.read_text().replace(",0.0\n", ",5000.0\n"))
+    result = truetip("calibrate", "--measurements", table, "--out", tmp_path / "out")
+    assert result.exit_code == 0, result.output
+    said = "payload_kg, up to 5000 kg) have no effect on geometry alone; ABB IRB 1200-7/0.7 may carry 7 kg"
+    assert said in " ".join(result.stdout.split())
+
+
 def test_a_file_of_known_noise_is_believed(tmp_path: Path):
     tables(tmp_path, "irb1200")
     (tmp_path / "noise.yaml").write_text("{joint_deg: 0.01, position_mm: 0.1, rotation_deg: 0.05}")
