@@ -15,6 +15,12 @@ class GuardEvent:
     time: float  # s
     kind: str  # for example "velocity_limit"; see systems.guard.guard.KINDS
     detail: str  # what was limited, in words
+    lasted: float = 0.0  # s, of an unbroken row of ticks
+
+    @property
+    def end(self) -> float:
+        """When it was over, in s."""
+        return self.time + self.lasted
 
 
 @dataclass(frozen=True)

@@ -332,8 +332,7 @@ def guard_events(times: np.ndarray, counts: np.ndarray) -> list[GuardEvent]:
     for column, kind in enumerate(KINDS):
         edges = np.diff(increments[:, column].astype(int), prepend=0, append=0)
         for start, stop in zip(np.flatnonzero(edges == 1), np.flatnonzero(edges == -1), strict=True):
-            length = times[stop - 1] - times[start]
-            events.append(
-                GuardEvent(float(times[start]), kind, f"for {1e3 * length:.0f} ms, {stop - start} ticks")
-            )
+            length = float(times[stop - 1] - times[start])
+            detail = f"for {1e3 * length:.0f} ms, {stop - start} ticks"
+            events.append(GuardEvent(float(times[start]), kind, detail, length))
     return sorted(events, key=lambda event: event.time)

@@ -41,7 +41,7 @@ from experiments.comparison.results import replacing
 from experiments.metrics.run_metrics import timing, with_timing
 from experiments.plan.plan_option import PlanOption, plan_settings
 from experiments.record.simulated import write_records
-from experiments.running.outcome import print_outcome, write_outcome
+from experiments.running.outcome import conclude, print_outcome, write_outcome
 from experiments.station.guided_command import (
     Guided,
     ask_before_moving,
@@ -130,3 +130,5 @@ def compare_command(
     print_outcome(human, result, out, write)
     if guided:
         guided.conclude()
+    else:
+        conclude(logs)

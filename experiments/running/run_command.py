@@ -40,7 +40,7 @@ from experiments.comparison.learnt_file import WriteOption, check_write, robot_w
 from experiments.comparison.results import replacing
 from experiments.record.simulated import write_records
 from experiments.replay.live import LiveView, advance_live
-from experiments.running.outcome import print_outcome, write_outcome
+from experiments.running.outcome import conclude, print_outcome, write_outcome
 from experiments.station.guided_command import (
     Guided,
     ask_before_moving,
@@ -154,3 +154,5 @@ def run_command(
         guided.conclude()
     if view:
         wait_for_interrupt(console, f"Still at {view.address}; Ctrl-C ends it")
+    if not guided:
+        conclude(logs)

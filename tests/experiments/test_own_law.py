@@ -76,6 +76,28 @@ def test_run_and_compare_take_it_beside_the_shipped_ones(my_law: str, tmp_path: 
     assert "summary.json" in files(tmp_path / "alone")
 
 
+@pytest.mark.parametrize(
+    ("traits", "said"),
+    [
+        ("", "the guard stopped the robot at 0.5 s and it did not go on"),
+        ("uses_camera = False", "the guard held a joint at the end of its range from 0.0 to"),
+    ],
+)
+def test_a_law_that_commands_degrees_is_told_that_the_guard_did_not_follow_it(
+    traits: str, said: str, tmp_path: Path
+):
+    text = printed().replace("joints[:6], joints[6:12]", "np.rad2deg(joints[:6]), np.rad2deg(joints[6:12])")
+    law = tmp_path / "degrees.py"
+    law.write_text(text.replace("    memory_size", f"    {traits}\n    memory_size"))
+    result = truetip("run", f"--law={law}:MyLaw", *SHORT, f"--out={tmp_path / 'out'}")
+    assert result.exit_code == 1, result.output
+    assert f"truetip: law {law}:MyLaw: {said}" in result.stderr
+    assert result.stderr.endswith(
+        "; joints were commanded beyond their range at once: are commands in rad and rad/s?\n"
+    )
+    assert "report.html" in files(tmp_path / "out")  # which shows what happened
+
+
 def test_a_file_that_is_edited_between_two_runs_of_a_session_is_read_again(my_law: str):
     scenario = load_scenario("misaligned", LONG_ENOUGH)
     before = simulate(scenario, my_law)
