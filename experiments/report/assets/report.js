@@ -89,10 +89,10 @@ function stacked(id, rows, log) {
 }
 
 function drawPath() {
-  const traces = [], wanted = data.laws[0].path.wanted;
-  traces.push({type: "scatter3d", mode: "lines", name: "wanted", x: wanted[0], y: wanted[1], z: wanted[2],
+  const wanted = data.laws[0].path.wanted;
+  const traces = [{type: "scatter3d", mode: "lines", name: "wanted", x: wanted[0], y: wanted[1], z: wanted[2],
     line: {color: css("--ink"), width: 3},
-      hovertemplate: "wanted<br>%{x:.1f}, %{y:.1f}, %{z:.1f} mm<extra></extra>"});
+      hovertemplate: "wanted<br>%{x:.1f}, %{y:.1f}, %{z:.1f} mm<extra></extra>"}];
   let low = [1e9, 1e9, 1e9], high = [-1e9, -1e9, -1e9];
   const grow = p => p.forEach((v, k) => { for (const u of v) { low[k] = Math.min(low[k], u);
     high[k] = Math.max(high[k], u); } });
@@ -104,10 +104,19 @@ function drawPath() {
       visible: shown(law),
       line: {color: law.color, width: 5}, hovertemplate: law.title + "<extra></extra>"});
   }
-  const extent = Math.max(...high.map((v, k) => v - low[k]));
-  const far = narrow() ? 1.75 : 1, eye = {x: 1.05 * far, y: -0.62 * far, z: 0.62 * far};
-  const ratio = {}, scene = {aspectmode: "manual", camera: {eye, center: {x: 0, y: 0, z: -0.04}},
-    dragmode: "turntable", uirevision: "path"};
+  const extent = Math.max(...high.map((v, k) => v - low[k])) || 1;  // of one point, where nothing else is shown
+  /* A line that stays on the spot cannot be seen: a cross stands for it, the wanted one larger. */
+  const spread = values => values.reduce((most, v) => Math.max(most, v), -1e9)
+    - values.reduce((least, v) => Math.min(least, v), 1e9);
+  traces.forEach((trace, number) => {
+    const names = ["x", "y", "z"], arm = (number ? 0.02 : 0.04) * extent;
+    if (names.some(name => spread(trace[name]) > 0.01 * extent)) return;
+    names.forEach((name, k) => {
+      const v = trace[name].at(-1);
+      trace[name] = names.flatMap((_, j) => j === k ? [v - arm, v + arm, null] : [v, v, null]);
+    });
+  });
+  const ratio = {}, scene = {aspectmode: "manual", dragmode: "turntable", uirevision: "path"};
   ["x", "y", "z"].forEach((name, k) => {
     const half = Math.max(0.54 * (high[k] - low[k]), 0.16 * extent), middle = 0.5 * (high[k] + low[k]);
     ratio[name] = 1.25 * half / (0.54 * extent);
@@ -118,6 +127,9 @@ function drawPath() {
       tickfont: {color: css("--soft"), size: 11}, showspikes: false};
   });
   scene.aspectratio = ratio;
+  /* A square one, as of a circle, is looked at from further away than a long one. */
+  const far = (narrow() ? 1.75 : 1) * Math.max(1, Math.hypot(ratio.x, ratio.y, ratio.z) / 1.36);
+  scene.camera = {eye: {x: 1.05 * far, y: -0.62 * far, z: 0.62 * far}, center: {x: 0, y: 0, z: -0.04}};
   show("path", traces, layout({scene, margin: {l: 0, r: 0, t: 0, b: 0}, uirevision: "path"}),
     config());
 }

@@ -194,6 +194,24 @@ def test_an_error_that_stays_within_a_decade_has_numbers_at_its_axis(logs, tmp_p
     assert {"6", "7"} <= set(labels), labels
 
 
+def test_a_path_of_one_point_shows_the_point_and_where_the_tip_rests(logs, tmp_path):
+    """A line that stays on the spot has no pixel."""
+    log = logs["open_loop"][0]
+    X_WD = np.tile(log.X_WE_desired[0], (len(log.time), 1, 1))
+    off = displaced(X_WD, np.array([0.0, 0.0, 0.0, 0.02, 0.0, 0.0]))
+    swinging = displaced(X_WD, np.outer(np.sin(log.time), [0.0, 0.0, 0.0, 0.01, 0.0, 0.0]))
+    runs = {
+        law: [dataclasses.replace(log, law=law, X_WE_desired=X_WD, X_WE_true=X_WE)]
+        for law, X_WE in (("open_loop", off), ("pbvs", swinging))
+    }
+    page = tmp_path / "report.html"
+    write_report(page, "", summary("s", runs), timing(runs), runs)
+    spans = "Math.max(...trace.x.map(Number)) - Math.min(...trace.x.filter(Number))"
+    drawn = f"document.title = document.getElementById('path').data.map(trace => ({spans}).toFixed(1))"
+    page.write_text(page.read_text() + f"<script>setTimeout(() => {drawn}, 2000)</script>")
+    assert "<title>2.4,1.2,20.0</title>" in open_page(page).dom
+
+
 def test_a_report_that_cannot_be_written_leaves_nothing(logs, tmp_path):
     with pytest.raises(FileNotFoundError):
         write_report(tmp_path / "missing" / "report.html", "", summary("s", logs), timing(logs), logs)
