@@ -86,6 +86,7 @@ class _Reader:
         self._source, self._context = source, context
         self._notes: list[Note] = []
         self._values: dict[str, Value] = {}  # TOOL_DATA[1], FP1, ... by capital name
+        self._given: dict[str, list[Value]] = {}  # all that stand in the files, by the same names
         self._changed: set[str] = set()  # names of what the program changes
         self._places: dict[str, list[_Place]] = {}
         self._inline: list[_Place] = []
@@ -128,6 +129,7 @@ class _Reader:
         if not _ONE.fullmatch(name):
             return
         self._values[name] = value
+        self._given.setdefault(name, []).append(value)
         if name.startswith("$") or "_DATA[" in name:
             return
         kind = (match["type"] or "").strip().upper()
@@ -144,7 +146,7 @@ class _Reader:
             kind, number = suggested[1].upper(), int(suggested[2])
             self._state = replace(self._state, **{kind.lower(): self._numbered(kind, number, line)})
             if kind == "TOOL":
-                self._state = self._with_load(self._state, number)
+                self._state = self._with_load(self._state, number, line)
         match = _PLACED.match(line.code)
         if match:
             name = re.sub(r"\s", "", match["name"]).upper() + match["part"]
@@ -165,7 +167,7 @@ class _Reader:
             self._state = replace(self._state, **{name[1:].lower(): frame})
             number = re.fullmatch(r"TOOL_DATA\[\s*(\d+)\s*\]", value, re.IGNORECASE)
             if number:
-                self._state = self._with_load(self._state, int(number[1]))
+                self._state = self._with_load(self._state, int(number[1]), line)
         elif name == "$IPO_MODE":
             self._state = replace(self._state, is_at_rest=value.upper() == "#TCP")
         elif name == "$LOAD":
@@ -173,7 +175,7 @@ class _Reader:
             mass = found.numbers.get("M") if found else None
             if mass is None:
                 raise ProgramError(f"{line.where}: the mass of {value} is not known; --with FILE reads it")
-            unread = "" if value.startswith("{") else self._unread(value.upper())
+            unread = "" if value.startswith("{") else self._unread(value.upper(), line)
             self._state = replace(self._state, load=mass.value, load_unread=unread)
         elif name.upper() == "$LOAD.M":
             self._state = replace(self._state, load_unread=_not_read(name))
@@ -189,13 +191,27 @@ class _Reader:
 
     def _declared(self, name: str, line: Line) -> Value | None:
         """What declarations say of a frame; None if they say nothing. Raises ProgramError if it changes."""
-        if unread := self._unread(name):
+        if unread := self._unread(name, line):
             raise ProgramError(f"{line.where}: {unread}")
         return self._values.get(name)
 
-    def _unread(self, name: str) -> str:
-        """That the program changes a value; empty if it does not."""
-        return _not_read(name) if any(_is_of(name, each) for each in self._changed) else ""
+    def _unread(self, name: str, line: Line) -> str:
+        """That the program changes a value that a line uses; empty if it does not."""
+        is_changed = any(_is_of(name, each) for each in self._changed) or self._is_given_anew(name, line)
+        return _not_read(name) if is_changed else ""
+
+    def _is_given_anew(self, name: str, line: Line) -> bool:
+        """Whether a value is given more than once, not all the same, and not just before a line uses it."""
+        given = self._given.get(name, [])
+        if all(each.says == given[0].says for each in given):
+            return False
+        here = [each for each in given if each.line.source is line.source]
+        return not (
+            here
+            and all(each.says == here[0].says for each in here)
+            and here[0].line.number < line.number
+            and self._values[name] in here
+        )
 
     def _frame_value(self, line: Line, name: str, value: str, at: int) -> Frame:
         if value.upper() in ("$NULLFRAME", "$WORLD"):
@@ -220,13 +236,13 @@ class _Reader:
             raise ProgramError(f"{line.where}: {name} is not declared; --with $config.dat reads it")
         return Frame(name, _pose(declared, name))
 
-    def _with_load(self, state: _State, number: int) -> _State:
+    def _with_load(self, state: _State, number: int, line: Line) -> _State:
         """With what the controller knows to hang at the flange with a tool."""
         name = f"LOAD_DATA[{number}]"
         value = self._values.get(name)
         mass = value.numbers.get("M") if value else None
         load = mass.value if mass and mass.value >= 0.0 else None
-        return replace(state, load=load, load_unread=self._unread(name))
+        return replace(state, load=load, load_unread=self._unread(name, line))
 
     def _of_fdat(self, value: Value) -> _State | None:
         """Tool and base of a target; None if the tool stands still."""
@@ -234,7 +250,7 @@ class _Reader:
             return None
         tool, base = value.number("TOOL_NO"), value.number("BASE_NO")
         frames = self._numbered("TOOL", tool, value.line), self._numbered("BASE", base, value.line)
-        return self._with_load(_State(*frames), tool)
+        return self._with_load(_State(*frames), tool, value.line)
 
     def _move(self, line: Line, at: int) -> None:
         """The places that a motion names or holds; two of them in a circle."""
@@ -323,7 +339,7 @@ class _Reader:
                 raise ProgramError(f"{option} must be a number in KRL, got '{text}'")
         tool = int(self._context.tool)
         base = self._numbered("BASE", int(self._context.base or "0"), line)
-        return self._with_load(_State(self._numbered("TOOL", tool, line), base), tool)
+        return self._with_load(_State(self._numbered("TOOL", tool, line), base), tool, line)
 
 
 def _not_read(name: str) -> str:

@@ -32,6 +32,11 @@ class Value:
     numbers: dict[str, Literal]
     texts: dict[str, str]
 
+    @property
+    def says(self) -> tuple[dict[str, float], dict[str, str]]:
+        """Its content, wherever it stands."""
+        return {key: each.value for key, each in self.numbers.items()}, self.texts
+
     def number(self, key: str) -> int:
         """An integer in it. Raises ProgramError if it is not there."""
         if key not in self.numbers:

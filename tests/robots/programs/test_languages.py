@@ -248,6 +248,32 @@ def test_krl_refuses_a_frame_that_the_program_changes(line: str, refusal: str):
             others=(CONFIG,))  # fmt: skip
 
 
+OTHER = "TOOL_DATA[1]={X 0,Y 0,Z 200,A 0,B 0,C 0}"
+
+
+@pytest.mark.parametrize(
+    ("lines", "height"),
+    [
+        (["$TOOL=TOOL_DATA[1]", f"LIN {{{POSE}}}", CONFIG.splitlines()[0]], 0.15),  # the same once more
+        ([OTHER, "$TOOL=TOOL_DATA[1]", f"LIN {{{POSE}}}"], 0.2),
+        ([OTHER, "BAS(#TOOL,1)", f"LIN {{{POSE}}}"], 0.2),
+        (["$TOOL=TOOL_DATA[1]", f"LIN {{{POSE}}}", OTHER], None),
+        ([OTHER, "$TOOL=TOOL_DATA[1]", f"LIN {{{POSE}}}", CONFIG.splitlines()[0]], None),
+        (["DECL FDAT FP1={TOOL_NO 1,BASE_NO 0}", f"XP1={{{POSE}}}", OTHER], None),
+    ],
+)
+def test_krl_takes_a_tool_that_the_program_declares_anew_only_where_it_is_plain(
+    lines: list[str], height: float | None
+):
+    if height is None:
+        with pytest.raises(ProgramError, match=r"TOOL_DATA\[1\] is given another value by the program"):
+            krl(*lines, others=(CONFIG,))
+        return
+    (target,) = krl(*lines, others=(CONFIG,)).targets
+    assert target.tool is not None
+    assert target.tool.X[2, 3] == pytest.approx(height)
+
+
 @pytest.mark.parametrize(
     ("lines", "says"),
     [
