@@ -42,7 +42,7 @@ from experiments.study.figures import (
     metric_unit,
     spread_figure,
 )
-from experiments.study.rows import StudyRow, first_run, robots_of, run_row, study_rows
+from experiments.study.rows import StudyRow, first_run, prepared_of, run_row, study_rows
 from experiments.study.store import TABLE, StudyStore, alone_in, columns_of
 from experiments.study.study_file import Study, load_study
 from robots.description.source_notes import assumed_note
@@ -73,8 +73,9 @@ def study_command(
         study = load_study(file)
         rows = study_rows(study)
         plan = {"study": asdict(study), **first_run(rows)}
-        assumed = [note for robot in robots_of(rows) if (note := assumed_note(robot))]
-        print_note(human, "; ".join(assumed))
+        prepared = prepared_of(rows)
+        assumed = [note for each in prepared if (note := assumed_note(each.robot))]
+        print_note(human, "; ".join(filter(None, dict.fromkeys(each.note for each in prepared))))
         where = executor(scheduler, jobs)
         factors = {
             name: [dict(row.factors)[name] for row in rows[:: len(study.laws)]] for name in study.factors

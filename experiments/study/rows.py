@@ -10,13 +10,12 @@ from typing import Any
 from diagrams.runs.simulation import run
 from diagrams.scenario.kept import file_of, named_files, with_inner_files
 from diagrams.scenario.scenario import scenario_text
-from experiments.cli.prepare import prepare
+from experiments.cli.prepare import Prepared, prepare
 from experiments.cli.workers import Progress
 from experiments.comparison.compare import simulating
 from experiments.metrics.single_figures import FIGURES, single_figures
 from experiments.study.designs import Value, design_points
 from experiments.study.study_file import Study
-from robots.description.model import RobotModel
 from systems.named_classes import place_in_own_file
 
 
@@ -131,11 +130,11 @@ def first_run(rows: Sequence[StudyRow]) -> dict[str, Any]:
     return said | ({"files": marks} if marks else {})
 
 
-def robots_of(rows: Sequence[StudyRow]) -> list[RobotModel]:
-    """The robots that the controllers of the rows know, each once; a row that is refused has none."""
+def prepared_of(rows: Sequence[StudyRow]) -> list[Prepared]:
+    """The first row of each robot that the rows vary, ready to run; one that is refused is left out."""
     first = {dict(row.factors).get("robot"): row for row in reversed(rows)}
-    robots = []
+    prepared = []
     for row in reversed(first.values()):
         with suppress(ValueError):
-            robots.append(prepare(row.scenario, row.all_settings, is_quick=row.is_quick).robot)
-    return robots
+            prepared.append(prepare(row.scenario, row.all_settings, is_quick=row.is_quick))
+    return prepared

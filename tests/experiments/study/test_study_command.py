@@ -17,10 +17,12 @@ import pyarrow.parquet as pq
 import pytest
 
 from experiments.cli.cluster import DaskCluster
+from experiments.cli.console import fail
 from experiments.cli.workers import in_order
+from experiments.study import command as study_command
 from experiments.study import rows
 from experiments.study.command import study_verdict
-from experiments.study.rows import first_run, robots_of, run_row, study_rows
+from experiments.study.rows import first_run, prepared_of, run_row, study_rows
 from experiments.study.store import TABLE, alone_in
 from experiments.study.study_file import Factor, Levels, Names, Study, load_study
 from robots.description.model import load_robot
@@ -62,8 +64,22 @@ def test_the_robots_of_a_study_are_known_before_it_runs_each_once():
         "robot": Names(["kr16", "crx10ial"]),
         "station.payload": Levels([0, 1]),
     }
-    found = robots_of(study_rows(Study(laws=["open_loop", "pbvs"], factors=levels)))
-    assert [robot.name for robot in found] == [load_robot(name).name for name in ("kr16", "crx10ial")]
+    found = prepared_of(study_rows(Study(laws=["open_loop", "pbvs"], factors=levels)))
+    names = [load_robot(name).name for name in ("kr16", "crx10ial")]
+    assert [each.robot.name for each in found] == names
+    for each, name in zip(found, names, strict=True):
+        assert f"carried over from ABB IRB 1200-7/0.7 to {name}: " in each.note
+
+
+def test_a_study_says_what_is_carried_over_to_another_robot(tmp_path, monkeypatch):
+    """As run and compare do: a payload of 16 kg in place of 7 is no small matter."""
+    monkeypatch.setattr(study_command, "_run", lambda *_: fail("ended here", 3))
+    file = tmp_path / "study.yaml"
+    file.write_text("laws: [open_loop]\nfactors:\n  robot: !Names {values: [irb1200, kr16]}\n")
+    result = truetip("study", file, "--out", tmp_path / "out")
+    assert result.exit_code == 3
+    said = " ".join(result.stdout.split())
+    assert said.startswith("Note: carried over from ABB IRB 1200-7/0.7 to KUKA KR 16-2: payload 16 kg")
 
 
 @pytest.mark.slow
