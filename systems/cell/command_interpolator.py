@@ -45,8 +45,9 @@ class CommandInterpolator(Diagram):
             raise ValueError(f"drive: period must be positive, got {period} s")
         if delay < period * (1.0 - 1e-9):
             raise ValueError(
-                f"drive: command_delay + dead_time must be at least one command period of {period} s, "
-                f"because a command is interpolated over one period; got {delay} s"
+                "station.drive.command_delay + station.drive.dead_time must be at least "
+                f"station.period={period:g} s, "
+                f"because a command is interpolated over one period; they are {delay:g} s"
             )
         # A command read at a tick was issued one period ago: number 0; number k another k periods before.
         base = max(0, int(np.ceil((delay - 2.0 * period) / period - 1e-9)))

@@ -107,7 +107,8 @@ def test_a_velocity_controlled_setpoint_follows_the_integral_of_the_velocity(del
         (
             0.004,
             0.003,
-            r"command_delay \+ dead_time must be at least one command period of 0.004 s.* got 0.003 s",
+            r"station.drive.command_delay \+ station.drive.dead_time must be at least station.period=0.004 s"
+            ".* they are 0.003 s",
         ),
     ],
 )
