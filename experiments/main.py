@@ -6,7 +6,8 @@ from typing import Annotated
 import typer
 
 from experiments.cli.command_app import command_app
-from experiments.cli.ending import clean_up_on_sigterm
+from experiments.cli.console import BROKEN_OFF
+from experiments.cli.ending import clean_up_on_sigterm, outliving_stdout
 from experiments.cli.one_thread import take_one_thread
 
 COMMANDS = {
@@ -55,7 +56,8 @@ def main() -> None:
     """The console command."""
     take_one_thread()
     clean_up_on_sigterm()
-    app(prog_name="truetip")
+    with outliving_stdout(BROKEN_OFF):
+        app(prog_name="truetip")
 
 
 def _print_version(wanted: bool) -> None:

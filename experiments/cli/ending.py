@@ -1,11 +1,16 @@
-"""Ctrl-C and SIGTERM: what ends at once is cleaned up, and what moves a robot is asked to end."""
+"""Ctrl-C and SIGTERM: what ends at once is cleaned up, and what moves a robot is asked to end.
 
+And a stdout that cannot be written: what a command says is lost then, but not its files.
+"""
+
+import os
 import signal
+import sys
 import time
-from collections.abc import Iterator
-from contextlib import contextmanager
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
 from types import FrameType
-from typing import NoReturn
+from typing import Any, NoReturn
 
 _TOGETHER = (
     1.0  # s between signals that are one request: a terminal and what started the command send one each
@@ -66,3 +71,50 @@ def asking() -> Iterator[Ending]:
     finally:
         for number, handler in before.items():
             signal.signal(number, handler)
+
+
+class _Stdout:
+    """A stream that goes nowhere once it cannot be written, as on a full disk; not where a pipe is closed."""
+
+    def __init__(self, stream: Any) -> None:
+        self._stream = stream
+        self.problem = ""
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self._stream, name)
+
+    def write(self, text: str) -> int:
+        self._try(self._stream.write, text)
+        return len(text)
+
+    def flush(self) -> None:
+        self._try(self._stream.flush)
+
+    def _try(self, do: Callable[..., Any], *arguments: Any) -> None:
+        try:
+            do(*arguments)
+        except BrokenPipeError:
+            raise
+        except OSError as error:
+            self.problem = (error.strerror or str(error)).lower()
+            os.dup2(os.open(os.devnull, os.O_WRONLY), self._stream.fileno())
+
+
+@contextmanager
+def outliving_stdout(code: int) -> Iterator[None]:
+    """In this block a stdout that cannot be written stops nothing; afterwards it is said.
+
+    Args:
+        code: with which the process ends then, if the block has ended well.
+    """
+    sys.stdout = stdout = _Stdout(sys.stdout)  # type: ignore[assignment]
+    ended: Any = None
+    try:
+        yield
+    except SystemExit as error:
+        ended = error.code
+    with suppress(BrokenPipeError):
+        sys.stdout.flush()
+    if stdout.problem:
+        print(f"truetip: cannot write to stdout: {stdout.problem}", file=sys.stderr)
+    sys.exit(ended or (code if stdout.problem else 0))

@@ -78,7 +78,7 @@ def read_nodes(path: Path, label: str) -> Node:
     except OSError as error:
         raise ConfigurationError(f"{label}: {(error.strerror or _one_line(error)).lower()}") from error
     except UnicodeDecodeError as error:
-        raise ConfigurationError(f"{label}: {_one_line(error)}") from error
+        raise ConfigurationError(f"{label}: not a text file in UTF-8") from error
     return parse(text, label)
 
 

@@ -36,6 +36,12 @@ def test_wrong_input_is_refused_in_one_line_and_nothing_is_written(
     assert files(folder) == set(FILES)
 
 
+def test_a_scenario_in_another_code_than_utf_8_is_named(tmp_path: Path):
+    (tmp_path / "mine.yaml").write_text("extends: misaligned\ndescription: größer\n", encoding="latin-1")
+    said = refusal(truetip("run", "--scenario", tmp_path / "mine.yaml"))
+    assert said.endswith("mine.yaml: not a text file in UTF-8\n")
+
+
 @pytest.mark.parametrize("name", COMMANDS)
 def test_every_command_refuses_an_unknown_option_and_an_option_without_its_value(
     name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
