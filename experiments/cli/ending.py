@@ -3,9 +3,11 @@
 And a stdout that cannot be written: what a command says is lost then, but not its files.
 """
 
+import math
 import os
 import signal
 import sys
+import threading
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
@@ -68,6 +70,39 @@ def asking() -> Iterator[Ending]:
         signal.signal(number, ask)
     try:
         yield ending
+    finally:
+        for number, handler in before.items():
+            signal.signal(number, handler)
+
+
+@contextmanager
+def interrupted_once(end_at_once: Callable[[], None]) -> Iterator[None]:
+    """In this block a first Ctrl-C or SIGTERM interrupts, and those within a second of it do nothing more.
+
+    They are copies, or an impatient finger, and would break off what cleans up. Later ones hurry it.
+
+    Args:
+        end_at_once: hurries it; is called in the main thread while it cleans up.
+    """
+    if threading.current_thread() is not threading.main_thread():  # only that one may set handlers
+        yield
+        return
+    asked = -math.inf
+    before = {number: signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM)}
+
+    def interrupt(number: int, frame: FrameType | None) -> None:
+        nonlocal asked
+        if asked == -math.inf:
+            asked = time.monotonic()
+            raise TerminatedError if number == signal.SIGTERM else KeyboardInterrupt
+        if time.monotonic() - asked > _TOGETHER:
+            end_at_once()
+
+    for number, handler in before.items():
+        if handler != signal.SIG_IGN:
+            signal.signal(number, interrupt)
+    try:
+        yield
     finally:
         for number, handler in before.items():
             signal.signal(number, handler)

@@ -12,6 +12,7 @@ from dataclasses import dataclass
 from multiprocessing.connection import wait as wait_for
 from typing import Any, Protocol, TypeVar
 
+from experiments.cli.ending import interrupted_once
 from experiments.cli.one_thread import ONE_THREAD
 from robots.threads import take_one_thread, usable_cores
 
@@ -80,7 +81,7 @@ class LocalProcesses:
         context = multiprocessing.get_context("spawn")
         shares = context.Array("d", len(jobs), lock=False)
         stop = context.Event()
-        with _environment(dict.fromkeys(ONE_THREAD, "1")):
+        with _environment(dict.fromkeys(ONE_THREAD, "1")), interrupted_once(_end_workers):
             pool = ProcessPoolExecutor(processes, context, _start_worker, (shares, stop))
             waiting: dict[Future[Result], int] = {}
             upcoming = iter(enumerate(jobs))
@@ -156,6 +157,12 @@ def _sigint_ignored() -> Iterator[None]:
         yield
     finally:
         signal.signal(signal.SIGINT, handler)
+
+
+def _end_workers() -> None:
+    """Ends the processes at once; a pool whose processes are gone closes by itself."""
+    for process in multiprocessing.active_children():
+        process.terminate()
 
 
 class _StoppedError(Exception):

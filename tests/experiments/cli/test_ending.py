@@ -1,5 +1,6 @@
 """Ctrl-C and SIGTERM while a robot moves: the first one asks, and its copies do not break the stop off."""
 
+import contextlib
 import os
 import signal
 import subprocess
@@ -54,3 +55,43 @@ def test_a_reader_that_has_seen_enough_ends_a_command_quietly():
         assert process.stderr
         process.stdout.close()
         assert process.stderr.read() == b""
+
+
+WORK = """
+import time
+from experiments.cli.workers import in_processes
+
+def work(job, progress):
+    for share in range(50):
+        time.sleep(0.02)
+        progress(0.02 * share)
+
+if __name__ == "__main__":
+    in_processes(work, range(50), 1, lambda share: share and print(share, flush=True))
+"""
+
+
+@pytest.mark.parametrize("gap", [0.0, 0.01, 0.2])
+def test_ctrl_c_that_comes_twice_ends_the_processes_and_does_not_wait_for_ever(gap: float, tmp_path: Path):
+    script = tmp_path / "script.py"
+    script.write_text(WORK)
+    with subprocess.Popen(
+        [sys.executable, script],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+        start_new_session=True,
+        env={**os.environ, "PYTHONPATH": os.pathsep.join([os.getcwd(), os.environ.get("PYTHONPATH", "")])},
+    ) as process:
+        assert process.stdout
+        process.stdout.readline()
+        for pause in (gap, 0.0):
+            process.send_signal(signal.SIGINT)
+            time.sleep(pause)
+        try:
+            _, said = process.communicate(timeout=30)
+        finally:
+            with contextlib.suppress(ProcessLookupError):
+                os.killpg(process.pid, signal.SIGKILL)
+    assert process.returncode == -signal.SIGINT
+    assert said.strip().endswith("KeyboardInterrupt")
