@@ -152,4 +152,7 @@ def outliving_stdout(code: int) -> Iterator[None]:
         sys.stdout.flush()
     if stdout.problem:
         print(f"truetip: cannot write to stdout: {stdout.problem}", file=sys.stderr)
+    # Nothing is left to be cleaned up: another Ctrl-C ends the interpreter on its way out, without a word.
+    for number in (signal.SIGINT, signal.SIGTERM):
+        signal.signal(number, signal.SIG_DFL)
     sys.exit(ended or (code if stdout.problem else 0))

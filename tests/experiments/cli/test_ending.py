@@ -57,6 +57,15 @@ def test_a_reader_that_has_seen_enough_ends_a_command_quietly():
         assert process.stderr.read() == b""
 
 
+def test_ctrl_c_while_python_ends_shows_no_traceback():
+    code = (
+        "import atexit, os, signal, sys; from experiments.main import main; "
+        "sys.argv = ['truetip', '--version']; atexit.register(os.kill, os.getpid(), signal.SIGINT); main()"
+    )
+    result = subprocess.run([sys.executable, "-c", code], stderr=subprocess.PIPE, text=True)
+    assert (result.returncode, result.stderr) == (-signal.SIGINT, "")
+
+
 WORK = """
 import time
 from experiments.cli.workers import in_processes
