@@ -194,9 +194,15 @@ def calibrate(
         config: what to identify; geometry alone unless it says more.
 
     Raises:
-        ValueError: if the measurements are too few or too alike, nothing explains them, or the calibrated
-            robot is worse at the fresh configurations; one line.
+        ValueError: if the measurements are none, too few or too alike, nothing explains them, or the
+            calibrated robot is worse at the fresh configurations; one line.
     """
+    for each in (measurements, fresh):
+        if each is not None and not isinstance(each, Measurements):
+            raise ValueError(
+                "measurements must be as robots.calibration.measurement_file.read_measurements reads them, "
+                f"got {type(each).__name__}"
+            )
     model = _robot(robot)
     identified = identify_geometry(model, measurements, config)
     calibrated = identified.calibrated_robot(_name_of(robot))

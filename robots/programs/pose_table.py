@@ -86,14 +86,13 @@ def _header(source: Source, line: int, text: str, separator: str) -> dict[str, i
     roles = _needed(columns)
     missing = [role for role in roles if _column(columns, role) is None]
     if missing:
-        raise ProgramError(
-            f"{where}: column {missing[0]} is missing (with its unit); there are {', '.join(names)}"
-        )
+        wanted = " or ".join(_names(missing[0]))
+        raise ProgramError(f"{where}: column {wanted} is missing; there are {', '.join(names)}")
     return columns
 
 
 def _needed(columns: Mapping[str, int]) -> tuple[str, ...]:
-    if _column(columns, JOINTS[0]):
+    if _column(columns, JOINTS[0]) or JOINTS[0] in columns:  # one without its unit is asked for it
         return JOINTS
     return _POSITION + (_QUATERNION if "qw" in columns else _EULER)
 

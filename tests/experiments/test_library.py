@@ -2,6 +2,7 @@
 
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -111,6 +112,12 @@ def test_a_robot_with_known_errors_is_found_and_tried_where_it_was_not_measured(
     assert found.robot.is_calibrated
     assert found.robot.calibration.of == "irb1200"
     assert calibrate(robot, *tables).robot.calibration.of == "irb1200"  # as scenarios call it
+
+
+@pytest.mark.parametrize("given", ["table.csv", np.zeros((20, 12))])
+def test_measurements_of_another_kind_are_refused_in_one_line(given: Any):
+    with pytest.raises(ValueError, match=r"^measurements must be as .*read_measurements reads them, got .*$"):
+        calibrate("irb1200", given)
 
 
 def test_files_may_be_given_as_paths(tmp_path: Path):

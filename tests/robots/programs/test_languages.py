@@ -329,7 +329,8 @@ POSE_HEAD = "x_mm,y_mm,z_mm,qw,qx,qy,qz"
 @pytest.mark.parametrize(
     ("text", "refusal"),
     [
-        ("x_mm,y_mm\n1,2\n", "line 1: column z is missing"),
+        ("x_mm,y_mm\n1,2\n", "line 1: column z_mm or z_m is missing"),
+        ("q1,q2,q3,q4,q5,q6\n1,2,3,4,5,6\n", "line 1: column q1_deg or q1_rad is missing; there are q1, q2"),
         ("x_mm,y_mm,z_mm,qw,qx,qy,qz,q1_deg\n", "poses and joint positions"),
         (f"{JOINT_HEAD},beta_deg\n1,2,3,4,5,6,7\n", "poses and joint positions"),
         (f"{JOINT_HEAD},q2_rad\n1,2,3,4,5,6,7\n", "line 1: q2_deg and q2_rad say the same"),
