@@ -1,13 +1,15 @@
 """A picture of a Drake diagram: as text for graphviz, or as SVG."""
 
+from collections.abc import Iterator
 from html import escape
 from pathlib import Path
 
-from pydrake.systems.framework import Diagram
+from pydrake.systems.framework import Diagram, System
 
 from experiments.diagram.graph import read_graph
 from experiments.diagram.layout import HEADER, Box, Layout, Route
 from experiments.diagram.stack import stacked
+from systems.sampled_system import SampledSystem
 
 EDGE = 24  # px around the picture
 INK, SOFT, LINE, WIRE = "#1c2430", "#5b6673", "#aab4bf", "#33658a"
@@ -31,8 +33,27 @@ def write_diagram(path: Path, diagram: Diagram, depth: int) -> None:
         raise ValueError(f"--write {path.name}: the ending must be one of {', '.join(ENDINGS)}")
     if depth < 1:
         raise ValueError(f"--depth must be at least 1, got {depth}")
-    text = diagram.GetGraphvizString(max_depth=depth) if path.suffix == ".dot" else svg(diagram, depth)
+    text = dot(diagram, depth) if path.suffix == ".dot" else svg(diagram, depth)
     path.write_text(text, encoding="utf-8")
+
+
+def dot(diagram: Diagram, depth: int) -> str:
+    """The diagram as text for graphviz."""
+    text = diagram.GetGraphvizString(max_depth=depth)
+    # Drake knows these systems by the class that they extend; it names all in this order.
+    for system in _systems(diagram):
+        if isinstance(system, SampledSystem):
+            title, name = "<B>{}</B><BR/>\nname={}\n", system.get_name()
+            known = title.format(SampledSystem.mro()[1].__name__, name)
+            text = text.replace(known, title.format(type(system).__name__, name), 1)
+    return text
+
+
+def _systems(diagram: Diagram) -> Iterator[System]:
+    for system in diagram.GetSystems():
+        yield system
+        if isinstance(system, Diagram):
+            yield from _systems(system)
 
 
 def svg(diagram: Diagram, depth: int) -> str:

@@ -5,11 +5,12 @@ from dataclasses import dataclass, field
 
 import numpy as np
 from pydrake.symbolic import Expression, MakeVectorContinuousVariable, cos, sin
-from pydrake.systems.framework import BasicVector, Context, DiscreteValues, LeafSystem
+from pydrake.systems.framework import BasicVector, Context, DiscreteValues
 from pydrake.systems.primitives import SymbolicVectorSystem
 
 from robots.configuration.quantity import choice, quantity, vector
 from robots.description.model import NUM_JOINTS, RobotModel
+from systems.sampled_system import SampledSystem
 
 SIDES = ("joint", "motor")
 _MOST_BITS = 32
@@ -110,7 +111,7 @@ def erring_encoders(encoders: Encoders) -> SymbolicVectorSystem:
     )
 
 
-class SteppedReading(LeafSystem):
+class SteppedReading(SampledSystem):
     """Angles in whole steps, and velocities that are differences of two of them a period apart.
 
     Ports:

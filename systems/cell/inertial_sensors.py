@@ -6,10 +6,11 @@ from dataclasses import dataclass, field
 import numpy as np
 from pydrake.common import RandomDistribution
 from pydrake.multibody.plant import MultibodyPlant
-from pydrake.systems.framework import Context, DiscreteValues, LeafSystem
+from pydrake.systems.framework import Context, DiscreteValues
 
 from robots.configuration.quantity import choice, numbers, positive, quantity
 from robots.pose import rotation_from_zyx
+from systems.sampled_system import SampledSystem
 
 KINDS = ("gyro", "accelerometer")
 BLOCK = 64  # samples whose noise is drawn at once
@@ -52,7 +53,7 @@ class InertialLoggerConfig:
         return self.period / (1.0 + 1e-6 * self.clock_drift_ppm)
 
 
-class InertialSensors(LeafSystem):
+class InertialSensors(SampledSystem):
     """Samples angular velocities and specific forces in the axes of the sensors.
 
     Ports:

@@ -3,13 +3,14 @@
 import math
 
 from pydrake.common.value import Value
-from pydrake.systems.framework import Context, LeafSystem
+from pydrake.systems.framework import Context
 
 from robots.description.model import NUM_JOINTS
+from systems.sampled_system import SampledSystem
 from systems.samples import JointSample
 
 
-class JointSensor(LeafSystem):
+class JointSensor(SampledSystem):
     """Stamps motor positions, velocities and torques.
 
     Ports:

@@ -11,7 +11,7 @@ import numpy as np
 from pydrake.common import RandomDistribution
 from pydrake.common.value import Value
 from pydrake.math import RigidTransform
-from pydrake.systems.framework import Context, DiscreteValues, LeafSystem
+from pydrake.systems.framework import Context, DiscreteValues
 from scipy.special import ndtri
 
 from robots.configuration.quantity import file_name
@@ -22,6 +22,7 @@ from systems.cell.imaging.features import FeatureConfig, FeatureSource
 from systems.cell.imaging.image_blobs import ImageBlobs
 from systems.cell.imaging.images import ImageConfig
 from systems.cell.pose_camera import BLOCK, ExposureConfig
+from systems.sampled_system import SampledSystem
 from systems.samples import PoseSample
 from systems.vision.blobs.centroids import CentroidConfig
 from systems.vision.camera_rig import load_cell
@@ -66,7 +67,7 @@ class MarkerImagesConfig(MarkerCameraConfig):
     kind: ClassVar[str] = "images"
 
 
-class MarkerCamera(LeafSystem):
+class MarkerCamera(SampledSystem):
     """Measures the pose of the tool at t = 0, period, 2 period, ... by the markers of a body at it.
 
     Ports, those of `systems.cell.pose_camera.PoseCamera`:

@@ -6,7 +6,6 @@ from pydrake.systems.framework import (
     Context,
     DiagramBuilder,
     InputPort,
-    LeafSystem,
     OutputPort,
 )
 from pydrake.systems.primitives import ConstantVectorSource, Demultiplexer, Integrator
@@ -14,6 +13,7 @@ from pydrake.systems.primitives import ConstantVectorSource, Demultiplexer, Inte
 from robots.description.model import RobotModel
 from robots.drivetrain.train import DriveTrains
 from systems.cell.drive_train import DriveTrainTorques, LinearGears
+from systems.sampled_system import SampledSystem
 
 
 class PartsDriveTrain:
@@ -125,7 +125,7 @@ class DriveTrainParts:
         return context.get_continuous_state_vector().CopyToVector()
 
 
-class _Parts(LeafSystem):
+class _Parts(SampledSystem):
     """Reaction, torques on links and the rates of the states, as one vector."""
 
     def __init__(self, trains: DriveTrains, viscous: np.ndarray) -> None:

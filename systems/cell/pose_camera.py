@@ -7,11 +7,12 @@ import numpy as np
 from pydrake.common import RandomDistribution
 from pydrake.common.value import Value
 from pydrake.math import RigidTransform
-from pydrake.systems.framework import Context, DiscreteValues, LeafSystem, ValueProducer
+from pydrake.systems.framework import Context, DiscreteValues, ValueProducer
 from scipy.special import ndtri
 
 from robots.configuration.quantity import quantity
 from robots.description.model import RobotModel
+from systems.sampled_system import SampledSystem
 from systems.samples import PoseSample
 
 _WIDTH = 14  # time, valid, then the rows of the 3 x 4 pose matrix
@@ -76,7 +77,7 @@ class PoseCameraConfig(ExposureConfig):
         return PoseCamera(self)
 
 
-class PoseCamera(LeafSystem):
+class PoseCamera(SampledSystem):
     """Measures the pose of the tool at t = 0, period, 2 period, ...
 
     Ports:

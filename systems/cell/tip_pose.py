@@ -4,12 +4,13 @@ from collections.abc import Callable
 
 from pydrake.common.value import Value
 from pydrake.math import RigidTransform
-from pydrake.systems.framework import Context, LeafSystem
+from pydrake.systems.framework import Context
 
 from robots.dynamics.plant import PlantRobot
+from systems.sampled_system import SampledSystem
 
 
-class TipPose(LeafSystem):
+class TipPose(SampledSystem):
     """Forward kinematics of a plant, with its deflections and geometric errors.
 
     Ports:

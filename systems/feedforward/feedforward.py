@@ -8,7 +8,7 @@ from pydrake.common.value import Value
 from pydrake.math import RigidTransform
 from pydrake.multibody.plant import MultibodyPlant
 from pydrake.multibody.tree import MultibodyForces
-from pydrake.systems.framework import Context, DiscreteValues, LeafSystem
+from pydrake.systems.framework import Context, DiscreteValues
 
 from robots.description.model import NUM_JOINTS
 from robots.dynamics.compliant_kinematics import CompliantKinematics
@@ -23,6 +23,7 @@ from systems.feedforward.joint_motion import Answer, Drive, JointReference, Stan
 from systems.feedforward.prefilter import Prefilter
 from systems.named_classes import OwnClassError
 from systems.reference.paths import CartesianPath
+from systems.sampled_system import SampledSystem
 from systems.samples import JointSample
 
 _LONGEST_SUBSTEP = 2e-3  # s; half of it changes the torque of an elastic inverse by some tenths of a percent
@@ -39,7 +40,7 @@ _OUTPUTS = {  # before the first tick, and out of reach
 }
 
 
-class Feedforward(LeafSystem):
+class Feedforward(SampledSystem):
     """The frame of an inverse model; a model adds `drive_under`.
 
     Ports:

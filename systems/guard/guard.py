@@ -5,7 +5,7 @@ import math
 
 import numpy as np
 from pydrake.common.value import Value
-from pydrake.systems.framework import BasicVector, Context, DiscreteValues, LeafSystem
+from pydrake.systems.framework import BasicVector, Context, DiscreteValues
 
 from robots.description.model import NUM_JOINTS, RobotModel
 from robots.kinematics.forward import Kinematics, robust_solve
@@ -14,6 +14,7 @@ from systems.guard.config import KINDS, GuardConfig
 from systems.guard.jerk_limits import JerkLimits
 from systems.guard.joint_limits import JointLimits
 from systems.guard.way_back import shortest_way, way_left
+from systems.sampled_system import SampledSystem
 from systems.samples import JointSample
 
 _VELOCITY, _ACCELERATION, _POSITION, _CORRECTION, _NO_COMMAND, _REFUSED, _HELD, _STOPPED, _RESUMED = range(
@@ -27,7 +28,7 @@ _NO_DEVIATION, _UNKNOWN = np.zeros(NUM_JOINTS), np.full(NUM_JOINTS, np.nan)
 _NOT_FOLLOWED = (_NO_COMMAND, _STOPPED, _VELOCITY, _ACCELERATION, _POSITION)
 
 
-class CommandGuard(LeafSystem):
+class CommandGuard(SampledSystem):
     """Passes a law's command on, made safe.
 
     Ports:

@@ -1,16 +1,17 @@
 """Moves joints from where they are to a goal, smoothly, and stays there."""
 
 import numpy as np
-from pydrake.systems.framework import BasicVector, Context, LeafSystem
+from pydrake.systems.framework import BasicVector, Context
 
 from robots.description.model import NUM_JOINTS
+from systems.sampled_system import SampledSystem
 
 _START, _GOAL, _BEGIN, _DURATION = slice(0, 6), slice(6, 12), 12, 13
 # The largest slope of the polynomial 10 s^3 - 15 s^4 + 6 s^5.
 _PEAK = 1.875
 
 
-class JointMover(LeafSystem):
+class JointMover(SampledSystem):
     """Plays a motion of all joints at once along a polynomial of fifth degree, at rest at both ends.
 
     Ports:

@@ -9,10 +9,11 @@ from typing import NamedTuple
 import numpy as np
 from pydrake.common.value import AbstractValue, Value
 from pydrake.math import RigidTransform
-from pydrake.systems.framework import BasicVector, Context, DependencyTicket, DiscreteValues, LeafSystem
+from pydrake.systems.framework import BasicVector, Context, DependencyTicket, DiscreteValues
 
 from systems.reference.path_time import PathTime
 from systems.reference.paths import CartesianPath, ReferenceConfig, make_path
+from systems.sampled_system import SampledSystem
 
 _BLOCK = 64  # ticks that are computed at once: as cheap a tick as hundreds, and no tick waits long for it
 _EPSILON = 1e-9  # s, by which rounding may miss a tick
@@ -91,7 +92,7 @@ class PathAhead:
         return _moments(*self.path.sample(ticks * self.period + phase))
 
 
-class Reference(LeafSystem):
+class Reference(SampledSystem):
     """Plays a path against the time of the context.
 
     Ports:

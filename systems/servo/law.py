@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from pydrake.common.value import Value
-from pydrake.systems.framework import Context, DiscreteValues, LeafSystem
+from pydrake.systems.framework import Context, DiscreteValues
 
 from robots.description.model import NUM_JOINTS, RobotModel
 from robots.dynamics.compliant_kinematics import CompliantKinematics
@@ -18,6 +18,7 @@ from systems.guard.guard import GuardConfig
 from systems.named_classes import OwnClassError
 from systems.reference.paths import CartesianPath
 from systems.reference.reference import PathAhead
+from systems.sampled_system import SampledSystem
 from systems.samples import JointSample, PoseSample
 from systems.servo.law_config import LawConfig
 
@@ -58,7 +59,7 @@ class LawOutput(NamedTuple):
     memory: np.ndarray
 
 
-class ServoLaw(LeafSystem):
+class ServoLaw(SampledSystem):
     """The frame of a visual-servo law on the kinematics that the controller knows.
 
     A law adds `step` and may add `initial_state`.

@@ -4,12 +4,13 @@ import math
 
 import numpy as np
 from pydrake.common.value import Value
-from pydrake.systems.framework import Context, DiscreteValues, LeafSystem
+from pydrake.systems.framework import Context, DiscreteValues
 
+from systems.sampled_system import SampledSystem
 from systems.samples import PoseSample
 
 
-class SampleWatch(LeafSystem):
+class SampleWatch(SampledSystem):
     """Notes when the newest valid sample came.
 
     Ports:

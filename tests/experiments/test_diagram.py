@@ -84,3 +84,4 @@ def test_the_command_writes_svg_and_dot(tmp_path: Path):
     dot = (tmp_path / "picture.dot").read_text()
     assert dot.startswith("digraph")
     assert all(name in dot for name in ("station", "servo", "guard", "camera"))
+    assert "<B>PoseCamera</B>" in dot

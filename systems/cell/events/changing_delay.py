@@ -3,10 +3,11 @@
 from collections.abc import Sequence
 
 import numpy as np
-from pydrake.systems.framework import BasicVector, Context, DiscreteValues, LeafSystem
+from pydrake.systems.framework import BasicVector, Context, DiscreteValues
 
 from robots.description.model import NUM_JOINTS
 from systems.cell.events.station_events import DeadTimeChange, StationEvent, of_kind
+from systems.sampled_system import SampledSystem
 
 _WIDTH = 3 * NUM_JOINTS  # positions, velocities, torques
 
@@ -16,7 +17,7 @@ def shortest_dead_time(events: Sequence[StationEvent], dead_time: float) -> floa
     return min([dead_time, *(event.dead_time for event in of_kind(events, DeadTimeChange))])
 
 
-class ChangingDelay(LeafSystem):
+class ChangingDelay(SampledSystem):
     """Delays commands by what the dead time is longer than the shortest of the run.
 
     While the dead time grows, commands are carried out slower than they were given; no motion is left out.

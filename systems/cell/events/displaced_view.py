@@ -5,13 +5,14 @@ from collections.abc import Sequence
 import numpy as np
 from pydrake.common.value import Value
 from pydrake.math import RigidTransform, RotationMatrix
-from pydrake.systems.framework import Context, LeafSystem
+from pydrake.systems.framework import Context
 from scipy.spatial.transform import Rotation
 
 from systems.cell.events.station_events import CameraShift, StationEvent, of_kind
+from systems.sampled_system import SampledSystem
 
 
-class DisplacedView(LeafSystem):
+class DisplacedView(SampledSystem):
     """Stands before a camera that believes it is where it was.
 
     Ports:

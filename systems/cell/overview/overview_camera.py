@@ -7,12 +7,13 @@ from typing import Protocol
 import numpy as np
 from pydrake.common import RandomDistribution
 from pydrake.common.value import Value
-from pydrake.systems.framework import Context, LeafSystem, State
+from pydrake.systems.framework import Context, State
 
 from robots.configuration.quantity import file_name, numbers, quantity
 from robots.description.model import NUM_JOINTS
 from robots.kinematics.arm_capsules import ArmCapsules, Capsules
 from systems.cell.overview.person import PersonConfig, WalkingPerson
+from systems.sampled_system import SampledSystem
 from systems.samples import ImageSample
 
 _FULL_SCALE = 255
@@ -76,7 +77,7 @@ class Pictures(Protocol):
         ...
 
 
-class OverviewCamera(LeafSystem):
+class OverviewCamera(SampledSystem):
     """Takes whole images of a simulated cell.
 
     Ports:

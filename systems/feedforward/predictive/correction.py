@@ -3,7 +3,7 @@
 import numpy as np
 from pydrake.common.value import Value
 from pydrake.multibody.plant import MultibodyPlant
-from pydrake.systems.framework import Context, DiscreteValues, LeafSystem
+from pydrake.systems.framework import Context, DiscreteValues
 
 from robots.description.model import NUM_JOINTS
 from robots.dynamics.friction_line import friction_line
@@ -16,6 +16,7 @@ from systems.feedforward.predictive.forecast import Cascade, Forecast
 from systems.feedforward.predictive.friction_observer import FrictionObserver
 from systems.feedforward.predictive.program import CorrectionProgram
 from systems.reference.reference import PathAhead
+from systems.sampled_system import SampledSystem
 from systems.samples import JointSample
 
 _FADING = 0.8  # of the correction, at every tick without a sample to go by: half of it is gone after three
@@ -24,7 +25,7 @@ _FOLLOWS = 0.01  # rad: a motor farther from its command is not held back by fri
 _OWN = 3 * NUM_JOINTS  # what the integral gives, error and its rate at the last tick
 
 
-class PredictiveCorrection(LeafSystem):
+class PredictiveCorrection(SampledSystem):
     """Looks ahead at every tick and corrects the torques that a feedforward tells the drives.
 
     Ports:

@@ -5,7 +5,7 @@ from collections.abc import Callable
 
 import numpy as np
 from pydrake.common.value import Value
-from pydrake.systems.framework import BasicVector, Context, DiscreteValues, LeafSystem
+from pydrake.systems.framework import BasicVector, Context, DiscreteValues
 
 from robots.description.model import NUM_JOINTS, RobotModel
 from robots.kinematics.arm_capsules import ArmCapsules
@@ -17,6 +17,7 @@ from systems.guard.separation.protective_distance import (
     protective_distance,
     stopping_time,
 )
+from systems.sampled_system import SampledSystem
 from systems.samples import JointSample, PersonSample
 
 ZONES = ("free", "slow", "stop")
@@ -31,7 +32,7 @@ _GRADES = 20  # of the share that is put out
 FAR = 1e3  # m, where nobody is
 
 
-class SeparationMonitor(LeafSystem):
+class SeparationMonitor(SampledSystem):
     """Compares the distance of the nearest person with the protective one of ISO/TS 15066.
 
     Ports:

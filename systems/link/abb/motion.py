@@ -5,10 +5,11 @@ from dataclasses import dataclass
 
 import numpy as np
 from pydrake.common.value import Value
-from pydrake.systems.framework import BasicVector, Context, DiscreteValues, LeafSystem, ValueProducer
+from pydrake.systems.framework import BasicVector, Context, DiscreteValues, ValueProducer
 
 from robots.configuration.quantity import quantity
 from robots.description.model import NUM_JOINTS
+from systems.sampled_system import SampledSystem
 
 _POSITION, _VELOCITY, _RAMP = slice(0, 6), slice(6, 12), 12
 _WIDTH = 13
@@ -27,7 +28,7 @@ class EgmMotionConfig:
     stop_time: float = quantity(0.2, 0.0, 10.0, "s")  # from full speed to rest when EGM ends (assumed)
 
 
-class EgmMotion(LeafSystem):
+class EgmMotion(SampledSystem):
     """Plans the joints' motion: speed = gain (reference - position) + speed reference, filtered and limited.
 
     Ports:

@@ -4,10 +4,11 @@ from dataclasses import dataclass
 
 import numpy as np
 from pydrake.common.value import Value
-from pydrake.systems.framework import BasicVector, Context, DiscreteValues, LeafSystem, ValueProducer
+from pydrake.systems.framework import BasicVector, Context, DiscreteValues, ValueProducer
 
 from robots.configuration.quantity import quantity
 from robots.description.model import NUM_JOINTS
+from systems.sampled_system import SampledSystem
 
 _POSITION, _VELOCITY, _BRAKING_FROM = slice(0, 6), slice(6, 12), slice(12, 18)
 
@@ -20,7 +21,7 @@ class RsiMotionConfig:
     stop_time: float = quantity(0.2, 0.0, 10.0, "s")  # from full speed to rest when RSI ends
 
 
-class RsiMotion(LeafSystem):
+class RsiMotion(SampledSystem):
     """Plans the joints' motion from set-points that come once a cycle.
 
     Ports:

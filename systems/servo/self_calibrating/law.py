@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 from pydrake.common.value import Value
-from pydrake.systems.framework import Context, DiscreteValues, LeafSystem
+from pydrake.systems.framework import Context, DiscreteValues
 
 from robots.description.model import NUM_JOINTS, RobotModel
 from systems.controller_model import ControllerModel
@@ -24,6 +24,7 @@ from systems.estimation.tip_model import Pair
 from systems.guard.guard import GuardConfig
 from systems.reference.cartesian_path import CartesianPath
 from systems.reference.reference import PathAhead
+from systems.sampled_system import SampledSystem
 from systems.samples import JointSample, PoseSample
 from systems.servo.self_calibrating.ahead import NextCommand, Pace
 from systems.servo.self_calibrating.config import SelfCalibratingConfig
@@ -34,7 +35,7 @@ _IN_REACH = 0.3  # s before the path begins, from which on the robot as it is kn
 _FOLLOWED = 4.0  # rad of the lead's frequency, after which nine tenths of a step are followed
 
 
-class SelfCalibrating(LeafSystem):
+class SelfCalibrating(SampledSystem):
     """Calibrates, predicts and plans ahead; of the camera nothing is fed back through the dead time.
 
     Ports:

@@ -2,9 +2,10 @@
 
 import numpy as np
 from pydrake.common.value import Value
-from pydrake.systems.framework import Context, DiscreteValues, LeafSystem, State
+from pydrake.systems.framework import Context, DiscreteValues, State
 
 from robots.description.model import NUM_JOINTS
+from systems.sampled_system import SampledSystem
 from systems.samples import ImageSample, JointSample, PersonSample
 from systems.vision.people.background import Memory
 from systems.vision.people.lasting_changes import LastingChange
@@ -16,7 +17,7 @@ _KEPT = 64  # joint samples, the newest first, for the one at an exposure
 _WIDTH = 1 + NUM_JOINTS  # time and positions
 
 
-class PeopleWatcher(LeafSystem):
+class PeopleWatcher(SampledSystem):
     """Finds people in sets of images. An aid, not a safety function.
 
     Ports:

@@ -1,0 +1,51 @@
+"""What happens at ticks is left alone by the integrator between them."""
+
+import pytest
+from pydrake.systems.analysis import Simulator
+from pydrake.systems.framework import Diagram, DiagramBuilder, LeafSystem, System
+from pydrake.systems.primitives import Integrator
+
+from diagrams.runs.simulation import Experiment
+from systems.sampled_system import SampledSystem
+from tests.diagrams.rigs import scenario
+
+
+@pytest.mark.parametrize(("base", "is_asked"), [(LeafSystem, True), (SampledSystem, False)])
+def test_the_integrator_does_not_ask_python_for_derivatives_that_there_are_not(base, is_asked):
+    asked = []
+
+    class Ticking(base):
+        def DoCalcTimeDerivatives(self, context, derivatives):  # noqa: N802
+            asked.append(context.get_time())
+
+    builder = DiagramBuilder()
+    builder.AddSystem(Ticking())
+    builder.AddSystem(Integrator(1))
+    builder.ExportInput(builder.GetSystems()[1].get_input_port(), "rate")
+    diagram = builder.Build()
+    simulator = Simulator(diagram)
+    diagram.get_input_port().FixValue(simulator.get_mutable_context(), [1.0])
+    simulator.AdvanceTo(0.1)
+    assert bool(asked) == is_asked
+
+
+def test_a_sampled_system_begins_without_ports_and_state():
+    system = SampledSystem()
+    assert system.num_input_ports() == system.num_output_ports() == 0
+    assert system.CreateDefaultContext().num_total_states() == 0
+
+
+def every_system(diagram: Diagram) -> list[System]:
+    return [
+        each
+        for own in diagram.GetSystems()
+        for each in (every_system(own) if isinstance(own, Diagram) else [own])
+    ]
+
+
+@pytest.mark.parametrize("law", ["numerical_ik", "self_calibrating"])
+def test_no_system_of_a_run_is_asked(law):
+    diagram = Experiment(scenario("misaligned"), law).diagram
+    own = [each for each in every_system(diagram) if type(each).__module__.startswith("systems.")]
+    assert len(own) > 5
+    assert all(isinstance(each, SampledSystem) for each in own)
