@@ -34,7 +34,7 @@ from systems.cell.joint_sensor import JointSensor
 from systems.cell.marker_camera import MarkerCamera
 from systems.cell.overview.overview_camera import OverviewCamera
 from systems.cell.pose_camera import BLOCK, PoseCamera
-from systems.cell.tip_pose import TipPose
+from systems.cell.tip_pose import Tip, TipPose
 
 _RUNAWAY = 10.0  # times the largest joint speed: no drive of a working simulation gets there
 
@@ -190,15 +190,15 @@ class Station:
     ) -> RandomSource:
         """The camera, what it looks at, and the source of its noise, which is returned."""
         builder.AddNamedSystem("camera", camera)
-        changes = None if self._geometry.is_constant else self._geometry.apply
-        tip = builder.AddNamedSystem("tip", TipPose(self.robot, changes))
-        builder.Connect(self.plant.get_state_output_port(), tip.GetInputPort("state"))
-        seen = tip.GetOutputPort("X_WE")
-        if of_kind(config.events, CameraShift):
-            view = builder.AddNamedSystem("displaced_view", DisplacedView(config.events))
-            builder.Connect(seen, view.get_input_port())
-            seen = view.get_output_port()
-        builder.Connect(seen, camera.GetInputPort("X_WE"))
+        tip = Tip(self.robot, None if self._geometry.is_constant else self._geometry.apply)
+        source: PoseCamera | TipPose
+        if isinstance(camera, PoseCamera) and not of_kind(config.events, CameraShift):
+            camera.look_at(tip)
+            source = camera
+        else:
+            source = builder.AddNamedSystem("tip", TipPose(tip))
+            self._connect_view(builder, source.GetOutputPort("X_WE"), camera.GetInputPort("X_WE"))
+        builder.Connect(self.plant.get_state_output_port(), source.GetInputPort("state"))
         if camera.HasInputPort("motor_state"):  # of the arm, which hides markers
             builder.Connect(self._driven.motor_state, camera.GetInputPort("motor_state"))
         port = camera.GetInputPort("noise")
@@ -206,9 +206,17 @@ class Station:
         builder.AddNamedSystem("noise", noise)
         builder.Connect(noise.get_output_port(), port)
         self.outputs["pose_sample"] = camera.GetOutputPort("pose_sample")
-        self.outputs["truth.X_WE"] = tip.GetOutputPort("X_WE")
+        self.outputs["truth.X_WE"] = source.GetOutputPort("X_WE")
         self.outputs["truth.exposure"] = camera.GetOutputPort("exposure")
         return noise
+
+    def _connect_view(self, builder: DiagramBuilder, true: OutputPort, camera: InputPort) -> None:
+        """The tool to a camera, which may be displaced."""
+        if of_kind(self._config.events, CameraShift):
+            view = builder.AddNamedSystem("displaced_view", DisplacedView(self._config.events))
+            builder.Connect(true, view.get_input_port())
+            true = view.get_output_port()
+        builder.Connect(true, camera)
 
     def _add_overview(self, builder: DiagramBuilder, overview: OverviewCamera) -> RandomSource:
         """The camera of whole images, and the source of its noise, which is returned."""

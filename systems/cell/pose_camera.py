@@ -1,5 +1,6 @@
 """A pose camera: it sees the tool at regular instants and reports it late, with noise, or not at all."""
 
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import ClassVar
 
@@ -12,6 +13,7 @@ from scipy.special import ndtri
 
 from robots.configuration.quantity import quantity
 from robots.description.model import RobotModel
+from systems.cell.tip_pose import Tip, declare_tip
 from systems.sampled_system import SampledSystem
 from systems.samples import PoseSample
 
@@ -85,6 +87,9 @@ class PoseCamera(SampledSystem):
         in  ``noise``        vector 448, standard normal, drawn anew every `BLOCK` periods; 896 with outliers
         out ``pose_sample``  PoseSample, the newest one that has arrived; a lost exposure arrives as invalid
         out ``exposure``     vector 14, the last exposure before it arrives: time, validity, rows of X_WE
+    and once it looks at a plant, in place of the first one:
+        in  ``state``        state of the plant
+        out ``X_WE``         RigidTransform, the true tool in the world
 
     Orientation noise is a small rotation about a random axis of the world.
     """
@@ -123,6 +128,11 @@ class PoseCamera(SampledSystem):
             "disturbances", ValueProducer(Value[object], self._calc_disturbances), {self._noise.ticket()}
         )
         self.DeclarePeriodicDiscreteUpdateEvent(config.period, 0.0, self._expose)
+        self._true_pose: Callable[[Context], RigidTransform] = self._X_WE.Eval
+
+    def look_at(self, tip: Tip) -> None:
+        """Works out itself where the tool of a plant is: another system for that would take longer."""
+        self._true_pose = declare_tip(self, tip)
 
     def _calc_disturbances(self, context: Context, value) -> None:
         """Of each exposure of a block a rotation and a shift in the world, and whether it is lost."""
@@ -143,7 +153,7 @@ class PoseCamera(SampledSystem):
         lost = are_lost[number]
         for start, end in self._config.dropouts:
             lost = lost or start <= time < end
-        pose = self._X_WE.Eval(context).GetAsMatrix34()
+        pose = self._true_pose(context).GetAsMatrix34()
         exposure = np.empty(_WIDTH)
         exposure[0], exposure[1] = time, not lost
         seen = exposure[2:].reshape(3, 4)
