@@ -1,17 +1,10 @@
-"""The controller as a diagram: the same one against a simulated and against a real station."""
+"""The controller: the same one against a simulated and against a real station."""
 
 from inspect import signature
 from typing import Any
 
 import numpy as np
-from pydrake.systems.framework import (
-    Context,
-    Diagram,
-    DiagramBuilder,
-    InputPortIndex,
-    OutputPort,
-    System,
-)
+from pydrake.systems.framework import Context, Diagram, DiagramBuilder, InputPort, OutputPort, System
 from pydrake.systems.primitives import Adder, ConstantVectorSource, Demultiplexer
 
 from diagrams.live_watch import LiveWatch
@@ -37,10 +30,13 @@ from systems.servo.sample_watch import SampleWatch
 _FROM_REFERENCE = {"X_WE_desired": "X_WE_preview", "V_WE_desired": "V_WE_preview", "reference": "reference"}
 
 
-class Servo(Diagram):
-    """Reference, law and guard.
+class Controller:
+    """Reference, law and guard, put into a diagram beside the station that they command.
 
-    Ports, the mirror image of a station's:
+    In a diagram of its own, see `Servo`, it would be slower in a simulation: at every step the
+    integrator goes through all diagrams.
+
+    Ports, the mirror image of a station's, in ``inputs`` and ``outputs`` by name:
         in  ``joint_sample``      JointSample
         in  ``pose_sample``       PoseSample
         out ``position_command``  vector 6 in rad
@@ -72,15 +68,17 @@ class Servo(Diagram):
 
     def __init__(
         self,
+        builder: DiagramBuilder,
         robot: RobotModel,
         scenario: Scenario,
         law: str | type[System] | System,
         watch: Watch | LiveWatch | None = None,
         standing: Standing | None = None,
     ) -> None:
-        """Builds the controller of one law.
+        """Adds the parts of the controller of one law.
 
         Args:
+            builder: of the diagram that they come into.
             robot: as the controller knows it, unless `servo.model` says otherwise.
             scenario: what to do, and what the controller believes of the station.
             law: a shipped law by name, ``FILE.py:CLASS``, a class, or any system with the ports of a law.
@@ -90,7 +88,9 @@ class Servo(Diagram):
         Raises:
             ValueError: if the law is unknown or has not the ports, or a part refuses its configuration.
         """
-        super().__init__()
+        # An input may lead to several systems.
+        self.inputs: dict[str, list[InputPort]] = {}
+        self.outputs: dict[str, OutputPort] = {}
         law = LAWS.find(law) if isinstance(law, str) else law
         self.model = controller_model(scenario, robot)
         self.traits = law_traits(law)
@@ -103,7 +103,6 @@ class Servo(Diagram):
         check_ports(self.law)
         if self.traits.uses_camera:
             _refuse_slow_camera(scenario)
-        builder = DiagramBuilder()
         slowed_by = ["law"] if self.law.HasOutputPort("speed_share") else []
         slowed_by += ["separation"] if watch else []
         self.obeys_controller = scenario.servo.guard.obey_utilization and scenario.station.kind != "simulated"
@@ -120,37 +119,41 @@ class Servo(Diagram):
         self._connect_reference(builder)
         if self.law.HasInputPort("deviation"):
             builder.Connect(guard.GetOutputPort("deviation"), self.law.GetInputPort("deviation"))
-        joints = builder.ExportInput(guard.GetInputPort("joint_sample"), "joint_sample")
-        builder.ConnectInput(joints, self.law.GetInputPort("joint_sample"))
+        self._take(guard, "joint_sample")
+        self._take(self.law, "joint_sample")
         if watch:
-            self._add_watch(builder, watch, joints)
+            self._add_watch(builder, watch)
         commands = self._connect_camera(builder)
         for name in ("position_command", "velocity_command", "torque_feedforward"):
             if self.law.HasOutputPort(name):
                 commands[name] = self.law.GetOutputPort(name)
         if feedforward.kind != "none":
             ahead = builder.AddNamedSystem("feedforward", self._feedforward(scenario, standing))
-            builder.ConnectInput(joints, ahead.GetInputPort("joint_sample"))
+            self._take(ahead, "joint_sample")
             self._add_feedforward(builder, ahead, commands)
         if feedforward.predictive.kind != "none":
             correction = self._add_predictive_correction(builder, feedforward.predictive, commands)
-            builder.ConnectInput(joints, correction.GetInputPort("joint_sample"))
+            self._take(correction, "joint_sample")
         if self.obeys_controller:
-            builder.ExportInput(
-                self.reference.GetInputPort("speed_share_controller"), "speed_share_controller"
-            )
+            self._take(self.reference, "speed_share_controller")
         for name, port in commands.items():
             builder.Connect(port, guard.GetInputPort(name))
-        for name in ("position_command", "velocity_command"):
-            builder.ExportOutput(self._issued[name], name)
+        self.outputs |= self._issued
         for name in ("torque_feedforward", "guard_status"):
             if guard.HasOutputPort(name):
-                builder.ExportOutput(guard.GetOutputPort(name), name)
-        for name in ("X_WE_desired", "path_time"):
-            builder.ExportOutput(self.reference.GetOutputPort(name), name)
-        builder.ExportOutput(commands["correction"], "correction")
-        builder.BuildInto(self)
-        self.set_name("servo")
+                self.outputs[name] = guard.GetOutputPort(name)
+        self.outputs |= {name: self.reference.GetOutputPort(name) for name in ("X_WE_desired", "path_time")}
+        self.outputs["correction"] = commands["correction"]
+
+    def _take(self, system: System, *names: str) -> None:
+        """Inputs lead to the ports of the same names of a system, beside others."""
+        for name in names:
+            self.inputs.setdefault(name, []).append(system.GetInputPort(name))
+
+    def read(self, root_context: Context, name: str) -> Any:
+        """What an output says now."""
+        port = self.outputs[name]
+        return port.Eval(port.get_system().GetMyContextFromRoot(root_context))
 
     def _prepare_law(self, scenario: Scenario) -> None:
         """Lets laws see the path that cannot follow every one, or do something before a run."""
@@ -201,58 +204,46 @@ class Servo(Diagram):
                 if self.law.HasOutputPort(name) and self.reference.HasInputPort(port):
                     builder.Connect(self.law.GetOutputPort(name), self.reference.GetInputPort(port))
 
-    def _add_watch(
-        self,
-        builder: DiagramBuilder,
-        watch: Watch | LiveWatch,
-        joints: InputPortIndex,
-    ) -> None:
+    def _add_watch(self, builder: DiagramBuilder, watch: Watch | LiveWatch) -> None:
         """People in whole images, and the share of the speed that they allow."""
         monitor = builder.AddNamedSystem("separation_monitor", watch.monitor)
-        builder.ConnectInput(joints, monitor.GetInputPort("joint_sample"))
+        self._take(monitor, "joint_sample")
         if isinstance(watch, LiveWatch):
-            for name in ("person_sample", "acknowledge"):
-                builder.ExportInput(monitor.GetInputPort(name), name)
+            self._take(monitor, "person_sample", "acknowledge")
         else:
             watcher = builder.AddNamedSystem("people_watcher", watch.watcher)
-            builder.ExportInput(watcher.GetInputPort("image_sample"), "image_sample")
-            builder.ConnectInput(joints, watcher.GetInputPort("joint_sample"))
+            self._take(watcher, "image_sample", "joint_sample")
             builder.Connect(watcher.GetOutputPort("person_sample"), monitor.GetInputPort("person_sample"))
-            builder.ExportOutput(watcher.GetOutputPort("person_sample"), "person_sample")
+            self.outputs["person_sample"] = watcher.GetOutputPort("person_sample")
         for source, port in (
             (self._issued["velocity_command"], monitor.GetInputPort("velocity_command")),
             (self.reference.GetOutputPort("path_time"), monitor.GetInputPort("path_time")),
             (monitor.GetOutputPort("speed_share"), self.reference.GetInputPort("speed_share_separation")),
         ):
             builder.Connect(source, port)
-        for name in ("speed_share", "stop", "separation"):
-            builder.ExportOutput(monitor.GetOutputPort(name), name)
+        self.outputs |= {name: monitor.GetOutputPort(name) for name in ("speed_share", "stop", "separation")}
 
     def path_time(self, root_context: Context) -> float:
         """The time on the path in s at the time of a context; the same unless the path is slowed."""
         if not self.reference.is_slowed:
             return root_context.get_time()
-        return float(self.GetOutputPort("path_time").Eval(self.GetMyContextFromRoot(root_context))[0])
+        return float(self.read(root_context, "path_time")[0])
 
     def path_rate(self, root_context: Context) -> float:
         """How fast the time on the path runs, 1 as planned."""
-        return float(self.GetOutputPort("path_time").Eval(self.GetMyContextFromRoot(root_context))[1])
+        return float(self.read(root_context, "path_time")[1])
 
     def _connect_camera(self, builder: DiagramBuilder) -> dict[str, OutputPort]:
         """The camera to the law; what the law says of it and of its correction, or what stands for that."""
         said = {}
-        is_heard = self.law.HasInputPort("pose_sample")
-        if is_heard:
-            samples = builder.ExportInput(self.law.GetInputPort("pose_sample"), "pose_sample")
+        if self.law.HasInputPort("pose_sample"):
+            self._take(self.law, "pose_sample")
         if self.law.HasOutputPort("measurement"):
             said["measurement"] = self.law.GetOutputPort("measurement")
         else:
             watch = builder.AddNamedSystem("sample_watch", SampleWatch(self.model.period))
             said["measurement"] = watch.get_output_port()
-            if is_heard:
-                builder.ConnectInput(samples, watch.get_input_port())
-            else:
-                builder.ExportInput(watch.get_input_port(), "pose_sample")
+            self._take(watch, "pose_sample")
         if self.law.HasOutputPort("correction"):
             said["correction"] = self.law.GetOutputPort("correction")
         else:
@@ -300,6 +291,26 @@ class Servo(Diagram):
             builder.Connect(commands[name], total.get_input_port(0))
             builder.Connect(ahead.GetOutputPort(offset), total.get_input_port(1))
             commands[name] = total.get_output_port()
+
+
+class Servo(Controller, Diagram):
+    """A controller as a diagram of its own, which exports the ports."""
+
+    def __init__(self, *args: Any, **options: Any) -> None:
+        """Builds it. Arguments and errors are those of `Controller`, without its builder."""
+        Diagram.__init__(self)
+        builder = DiagramBuilder()
+        Controller.__init__(self, builder, *args, **options)
+        for name, (first, *others) in self.inputs.items():
+            index = builder.ExportInput(first, name)
+            for port in others:
+                builder.ConnectInput(index, port)
+        for name, port in self.outputs.items():
+            builder.ExportOutput(port, name)
+        builder.BuildInto(self)
+        self.set_name("servo")
+        self.inputs = {name: [self.GetInputPort(name)] for name in self.inputs}
+        self.outputs = {name: self.GetOutputPort(name) for name in self.outputs}
 
 
 def _issued(builder: DiagramBuilder, guard: CommandGuard) -> dict[str, OutputPort]:
@@ -356,13 +367,13 @@ def _built(law: type[System], model: ControllerModel, config: LawConfig, guard: 
     return built
 
 
-def learnt(servo: Servo, root_context: Context) -> dict[str, Any] | None:
+def learnt(servo: Controller, root_context: Context) -> dict[str, Any] | None:
     """What a law that learns has found out until now, as its ``learnt(context)`` says; None for others."""
     report = getattr(servo.law, "learnt", None)
     return None if report is None else dict(report(servo.law.GetMyContextFromRoot(root_context)))
 
 
-def hear(servo: Servo, root_context: Context) -> None:
+def hear(servo: Controller, root_context: Context) -> None:
     """Tells guard and law of samples that came after their tick, see their ``hear(context)``."""
     for part in (servo.guard, servo.law):
         told = getattr(part, "hear", None)
@@ -370,20 +381,20 @@ def hear(servo: Servo, root_context: Context) -> None:
             told(part.GetMyMutableContextFromRoot(root_context))
 
 
-def learn(servo: Servo, root_context: Context) -> None:
+def learn(servo: Controller, root_context: Context) -> None:
     """Lets a law learn that can do so after its command is out, see its ``learn(context)``."""
     catch_up = getattr(servo.law, "learn", None)
     if catch_up is not None:
         catch_up(servo.law.GetMyMutableContextFromRoot(root_context))
 
 
-def predicted_tip(servo: Servo, root_context: Context) -> Prediction | None:
+def predicted_tip(servo: Controller, root_context: Context) -> Prediction | None:
     """Where a law that predicts it says that the tip was last, see its ``predicted_tip(context)``."""
     predict = getattr(servo.law, "predicted_tip", None)
     return None if predict is None else predict(servo.law.GetMyContextFromRoot(root_context))
 
 
-def calibrated(servo: Servo, root_context: Context, of: str) -> RobotModel | None:
+def calibrated(servo: Controller, root_context: Context, of: str) -> RobotModel | None:
     """The robot as a law knows it that calibrates robots, see its ``calibrated_robot(context, of)``."""
     robot = getattr(servo.law, "calibrated_robot", None)
     return None if robot is None else robot(servo.law.GetMyContextFromRoot(root_context), of)

@@ -17,7 +17,7 @@ from diagrams.record.played import measured_along, path_marks, played
 from diagrams.runs.measurement import MeasurementRun
 from diagrams.scenario.controller_model import controller_model
 from diagrams.scenario.scenario import Scenario, ScenarioError
-from diagrams.servo import Servo, calibrated, law_name, learnt, predicted_tip
+from diagrams.servo import Controller, Servo, calibrated, law_name, learnt, predicted_tip
 from diagrams.station import SimulatedStation, Station
 from diagrams.watching import Watch, make_watch
 from robots.description.calibration import is_same_robot
@@ -84,8 +84,8 @@ class Experiment:
             scenario, robot, seed, plant: as of `run`.
             law: a shipped law by name, ``FILE.py:CLASS``, a class, or any system with the ports of a law.
             watch: what watches for people; None for what the scenario says.
-            is_nested: whether the station is a diagram of its own, as one would draw it. It does the same,
-                but takes longer.
+            is_nested: whether station and servo are diagrams of their own, as one would draw them. That does
+                the same, but takes longer.
         """
         self.scenario, self.law = scenario, law_name(law)
         end = make_path(scenario.reference).duration
@@ -100,7 +100,11 @@ class Experiment:
             watch = make_watch(scenario, robot, drawn)
         self.watch = watch
         standing = self._standing(robot, drawn)
-        servo = Servo(robot, scenario, law, self.watch, standing)
+        of_servo = robot, scenario, law, self.watch, standing
+        self.servo: Controller = (
+            builder.AddNamedSystem("servo", Servo(*of_servo)) if is_nested else Controller(builder, *of_servo)
+        )
+        servo = self.servo
         overview = self.watch.camera if self.watch else None
         parts = drawn, scenario.station, servo.drive, servo.has_torque, None, overview
         self.station: Station = (
@@ -108,18 +112,18 @@ class Experiment:
             if is_nested
             else Station(builder, *parts)
         )
-        self.servo = builder.AddNamedSystem("servo", servo)
         for name, port in self.station.inputs.items():
-            builder.Connect(servo.GetOutputPort(name), port)
+            builder.Connect(servo.outputs[name], port)
         for name in ("joint_sample", "pose_sample", *(("image_sample",) if self.watch else ())):
-            builder.Connect(self.station.outputs[name], servo.GetInputPort(name))
+            for port in servo.inputs[name]:
+                builder.Connect(self.station.outputs[name], port)
         shown = ("position_command", "velocity_command", "correction", "guard_status")
-        ports = {name: self.servo.GetOutputPort(name) for name in shown}
+        ports = {name: servo.outputs[name] for name in shown}
         ports |= {name: self.station.outputs[name] for name in self.station.LOGGED}
         if self.servo.reference.is_slowed:
-            ports["path_time"] = self.servo.GetOutputPort("path_time")
+            ports["path_time"] = servo.outputs["path_time"]
         if self.watch:
-            ports |= {name: self.servo.GetOutputPort(name) for name in OF_WATCH}
+            ports |= {name: servo.outputs[name] for name in OF_WATCH}
         # In one log: what stands in a diagram costs time at every step of the integrator.
         self._log = PackedLog(builder, ports, scenario.station.period)
         self.diagram = builder.Build()

@@ -51,7 +51,6 @@ def setpoints_and_commands(law: str, delay: float) -> tuple[np.ndarray, np.ndarr
     experiment = Experiment(config, law)
     setpoint = experiment.station.setpoint
     context = setpoint.get_system().GetMyContextFromRoot(experiment.context)
-    servo = experiment.servo.GetMyContextFromRoot(experiment.context)
     commands = ("position_command", "velocity_command")
     positions, issued = {}, {}
     for step in range(1, round((0.75 + delay) / 2e-3)):
@@ -59,7 +58,7 @@ def setpoints_and_commands(law: str, delay: float) -> tuple[np.ndarray, np.ndarr
         positions[step] = setpoint.Eval(context)[:6]
         if step % 2 == 0:
             # Issued at the tick before: this tick's update is still to come.
-            issued[step - 2] = [experiment.servo.GetOutputPort(name).Eval(servo) for name in commands]
+            issued[step - 2] = [experiment.servo.read(experiment.context, name) for name in commands]
     steps = np.array(sorted(step for step in issued if 200 <= step <= 350))
     found = np.array([positions[step + round(delay / 2e-3)] for step in steps])
     p, v = np.array([issued[step] for step in steps]).swapaxes(0, 1)

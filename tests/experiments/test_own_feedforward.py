@@ -75,7 +75,7 @@ def test_one_may_prepare_itself_with_or_without_the_robot_that_was_looked_at(tmp
     (tmp_path / "own.py").write_text(OWN + prepare)
     kind = f"servo.feedforward.kind={tmp_path / 'own.py'}:Mine"
     experiment = Experiment(load_scenario("misaligned", [*SETTINGS, kind]), "open_loop")
-    assert experiment.servo.GetSubsystemByName("feedforward").was_asked
+    assert experiment.diagram.GetSubsystemByName("feedforward").was_asked
 
 
 def test_a_class_that_is_none_is_refused_in_one_line(tmp_path: Path):

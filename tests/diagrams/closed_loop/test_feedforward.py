@@ -132,7 +132,7 @@ def test_torque_has_a_port_on_both_sides_only_where_it_is_fed_forward():
     for kind in ("none", "rigid"):
         scenario = load_scenario("nominal", [*SETTINGS, f"servo.feedforward.kind={kind}"])
         experiment = Experiment(scenario, "open_loop")
-        assert experiment.servo.HasOutputPort("torque_feedforward") == (kind != "none")
+        assert ("torque_feedforward" in experiment.servo.outputs) == (kind != "none")
         assert ("torque_feedforward" in experiment.station.inputs) == (kind != "none")
 
 
@@ -167,11 +167,11 @@ def test_its_commands_are_those_of_an_open_loop_with_its_offsets(prefilter: str)
         load_scenario("nominal", [*SETTINGS, *CIRCLE, *STRUCTURE, *settings]), "open_loop"
     )
     experiment.advance(0.8)
-    feedforward = experiment.servo.GetSubsystemByName("feedforward")
+    feedforward = experiment.diagram.GetSubsystemByName("feedforward")
     context = feedforward.GetMyContextFromRoot(experiment.context)
     moving = False
     for name in ("position_command", "velocity_command"):
-        total = experiment.servo.GetSubsystemByName(f"{name}_with_feedforward")
+        total = experiment.diagram.GetSubsystemByName(f"{name}_with_feedforward")
         expected = total.get_output_port().Eval(total.GetMyContextFromRoot(experiment.context))
         found = feedforward.GetOutputPort(name).Eval(context)
         np.testing.assert_allclose(found, expected, atol=1e-6)
