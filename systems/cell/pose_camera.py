@@ -154,12 +154,11 @@ class PoseCamera(SampledSystem):
         for start, end in self._config.dropouts:
             lost = lost or start <= time < end
         pose = self._true_pose(context).GetAsMatrix34()
-        exposure = np.empty(_WIDTH)
+        exposure = discrete_state.get_mutable_value(0)
         exposure[0], exposure[1] = time, not lost
         seen = exposure[2:].reshape(3, 4)
         seen[:, :3] = turns[number].dot(pose[:, :3])
         seen[:, 3] = pose[:, 3] + shifts[number]
-        discrete_state.set_value(0, exposure)
         place = _WIDTH * (tick % self._in_flight)
         discrete_state.get_mutable_value(self._ring)[place : place + _WIDTH] = exposure
 

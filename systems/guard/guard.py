@@ -92,7 +92,7 @@ class CommandGuard(SampledSystem):
                 "guard: stop_time and resume_time must be positive and speed_share in (0, 1], got "
                 f"{config.stop_time} s, {config.resume_time} s and {config.speed_share}"
             )
-        self._config, self._period, self._uses_camera = config, period, uses_camera
+        self._config, self._period = config, period
         self._is_speed_only = is_speed_only
         self._limits = JointLimits(robot, config.speed_share)
         self._rows = self._limits.rows(period)
@@ -104,7 +104,9 @@ class CommandGuard(SampledSystem):
         # A hundred-thousandth below, because a law's own clipping rounds.
         self._correction_limit = (1.0 - 1e-5) * correction_limit
         self._correction_angle = (1.0 - 1e-5) * np.deg2rad(correction_limit_deg)
-        self._correction_limits = self._correction_angle, self._correction_limit
+        limits = self._rows, self._correction_angle, self._correction_limit
+        self._usual = *limits, _ABSURD, is_speed_only, period
+        self._times = uses_camera, config.hold_after, config.stop_after, config.resume
         self._inputs = [
             self.DeclareVectorInputPort(name, size)
             for name, size in (
@@ -145,10 +147,9 @@ class CommandGuard(SampledSystem):
         law = position, velocity, correction
         joints: JointSample = self._joints.Eval(context)
         decision = output.get_mutable_value()
-        if joints.running and not self._jerk.is_given:
-            limits = self._rows, *self._correction_limits, _ABSURD, self._is_speed_only, self._period
-            if self._kernels.decided(state, *law, measurement, joints.position, *limits, decision):
-                return
+        asked = state, *law, measurement, joints.position, *self._usual, decision
+        if joints.running and not self._jerk.is_given and self._kernels.decided(*asked):
+            return
         are_known = math.isfinite(sum(joints.position.tolist()))
         # While the robot runs and has been commanded before, its joints do not matter for what is issued.
         is_in_motion = joints.running and not math.isnan(state[0])
@@ -345,17 +346,14 @@ class CommandGuard(SampledSystem):
 
     def _remember(self, context: Context, discrete_state: DiscreteValues) -> None:
         """Makes the issued command the state and decides from the clocks how the next tick will go."""
-        decision, config = self._decision.Eval(context), self._config
-        times = config.hold_after, config.stop_after, config.resume
-        state, is_usual = self._kernels.remembered(decision, context.get_time(), self._uses_camera, *times)
-        if not is_usual:
+        decision, state = self._decision.Eval(context), discrete_state.get_mutable_value(0)
+        if not self._kernels.remember(decision, context.get_time(), *self._times, state):
             wished = self._inputs[0].Eval(context)
             aside = state[at.ASIDE] if self._is_speed_only else state[at.POSITIONS] - wished
             aside = aside if math.isfinite(sum(aside.tolist())) else _NO_DEVIATION
             state[at.DEVIATES] = float(aside.any())
             discrete_state.set_value(2, aside)
             discrete_state.set_value(1, context.get_discrete_state(1).value() + decision[at.COUNTED])
-        discrete_state.set_value(0, state)
 
 
 def _take_from(state: np.ndarray, joints: JointSample) -> None:

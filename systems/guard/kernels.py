@@ -157,16 +157,21 @@ def decided(
 
 
 @compiled
-def remembered(decision, time, uses_camera, hold_after, stop_after, resume):
-    """The state for the next tick with the mode that the clocks say, and whether nothing is to be noted else.
+def remember(decision, time, uses_camera, hold_after, stop_after, resume, state):
+    """Makes a decision the state for the next tick, with the mode that the clocks say.
 
     Args:
         decision: at this tick.
         time: of this tick in s.
         uses_camera: whether the age of samples matters.
         hold_after, stop_after, resume: of `GuardConfig`.
+        state: the one before, which is changed.
+
+    Returns:
+        Whether nothing else is to be noted.
     """
-    state = decision[: at.WIDTH].copy()
+    for i in range(at.WIDTH):
+        state[i] = decision[i]
     is_usual = state[at.DEVIATES] == 0.0
     for i in range(_COUNTED, at.LAST_SAMPLE):
         is_usual = is_usual and decision[i] == 0.0
@@ -193,7 +198,7 @@ def remembered(decision, time, uses_camera, hold_after, stop_after, resume):
     if not math.isnan(decision[_JOINTS]):
         for i in range(6):
             state[_WERE_AT + i] = decision[_JOINTS + i]
-    return state, is_usual
+    return is_usual
 
 
 def warm_up() -> None:
@@ -204,7 +209,7 @@ def warm_up() -> None:
     for each in (state, locked):
         rows = np.zeros((6, 6))
         decided(each, six, six, six, three, six, rows, 1.0, 1.0, 1.0, False, 1.0, decision)
-    remembered(decision, 0.0, True, 1.0, 1.0, False)
+    remember(decision, 0.0, True, 1.0, 1.0, False, state)
     note_camera(decision, three)
     excess(six, 1.0, 1.0)
     is_command(six, six, 1.0)

@@ -155,8 +155,9 @@ class ServoLaw(SampledSystem):
         ahead: PathAhead = self._reference.Eval(context)
         joints: JointSample = self._joints.Eval(context)
         sample: PoseSample = self._camera.Eval(context)
-        state = context.get_discrete_state()
-        last_used, refused, newest = state.value(_MEASUREMENT).tolist()
+        # They hold what the context has, until they are changed.
+        measurement = discrete_state.get_mutable_value(_MEASUREMENT)
+        last_used, refused, newest = measurement.tolist()
         measured = None
         arrived = sample.valid and sample.time > newest
         # A sample serves until the next one arrives, but not for ever. How late it came does not matter.
@@ -176,7 +177,7 @@ class ServoLaw(SampledSystem):
         exposed_at = math.nan if measured is None else ahead.path_time(sample.time)
         seen = measured, acts_at, exposed_at, arrived
         moment = LawInput(wanted.X_WE, wanted.V_WE, joints.position, *seen)
-        memory = state.value(_MEMORY).copy()
+        memory = discrete_state.get_mutable_value(_MEMORY).copy()
         if self.memory_size and math.isnan(memory[0]):
             memory = self.initial_state(moment)
             self._require_size("initial_state", "", memory, self.memory_size)
@@ -184,8 +185,9 @@ class ServoLaw(SampledSystem):
             step = self.step(moment, memory)
         except (UnreachableError, JointLimitError):
             # No command is an answer too: the guard holds the robot and counts it.
-            step = LawOutput(_NO_COMMAND, _NO_COMMAND, state.value(_CORRECTION), memory)
-        discrete_state.set_value(_MEASUREMENT, np.array((last_used, refused, newest)))
+            correction = discrete_state.get_mutable_value(_CORRECTION)
+            step = LawOutput(_NO_COMMAND, _NO_COMMAND, correction, memory)
+        measurement[:] = last_used, refused, newest
         if not isinstance(step, LawOutput):
             raise OwnClassError(f"class {type(self).__name__}: step must return a LawOutput, got {step!r}")
         try:
@@ -321,5 +323,10 @@ def check_branch_continuity(step: np.ndarray) -> None:
     Raises:
         UnreachableError: if the step is larger.
     """
-    if step @ step > _LARGEST_STEP**2:
+    check_step(step.dot(step))
+
+
+def check_step(squared: float) -> None:
+    """The same for the square of a step in rad^2. Raises UnreachableError."""
+    if squared > _LARGEST_STEP**2:
         raise UnreachableError("the path is out of reach, or goes on only on another branch")

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from systems.servo.law import LawInput, LawOutput, ServoLaw, check_branch_continuity
+from systems.servo.law import LawInput, LawOutput, ServoLaw, check_branch_continuity, check_step
 from systems.servo.law_config import LawConfig
 
 
@@ -47,7 +47,8 @@ class NumericalIk(ServoLaw):
             nominal = kinematics.rows_and_jacobian(memory[:6])
             check_branch_continuity(kernels.follow_path(moment.X_WD, moment.V_WD, *nominal)[:, 0])
             places = nominal, commanded, places[1], closeness
-        following, correction = follow(
+        following, correction = np.empty(24), np.empty(6)
+        step = follow(
             moment.X_WD,
             moment.V_WD,
             *(moment.measured or (moment.X_WD, moment.X_WD)),
@@ -57,6 +58,8 @@ class NumericalIk(ServoLaw):
             (config.rotation, config.translation),
             (self.angle_limit, config.correction_limit),
             self.period,
+            following,
+            correction,
         )
-        check_branch_continuity(following[:6] - memory[:6])
+        check_step(step)
         return LawOutput(following[6:12], following[12:18], correction, following)

@@ -112,7 +112,8 @@ class PositionLevel(ServoLaw):
         """Integrates the correction and commands the joints for the corrected pose."""
         if isinstance(self._orientation, EulerCorrection):
             return self._step_as_written(moment, memory)
-        X_WC, V_WC, kept, correction = self.kernels.corrected_pose(
+        X_WC, V_WC, kept, correction = np.empty((3, 4)), np.empty(6), np.empty(6), np.empty(6)
+        self.kernels.corrected_pose(
             moment.X_WD,
             moment.V_WD,
             *(moment.measured or (moment.X_WD, moment.X_WD)),
@@ -121,6 +122,10 @@ class PositionLevel(ServoLaw):
             (self.config.rotation, self.config.translation),
             (self.angle_limit, self.config.correction_limit),
             self.period,
+            X_WC,
+            V_WC,
+            kept,
+            correction,
         )
         joints = self.joints_at(X_WC, V_WC, memory[_JOINTS])
         return LawOutput(joints[:6], joints[6:12], correction, np.concatenate([kept, joints]))

@@ -178,8 +178,10 @@ def newton_step(X_WD, V_WD, X_WE, J, lower, upper, joints):
 
 
 @compiled
-def numerical_ik(X_WD, V_WD, wanted, seen, is_seen, X_WE, J, memory, gains, limits, period):
-    """The memory of the next tick, (24,), of `systems.servo.numerical_ik.NumericalIk`, and its correction.
+def numerical_ik(
+    X_WD, V_WD, wanted, seen, is_seen, X_WE, J, memory, gains, limits, period, following, correction
+):
+    """One step of `systems.servo.numerical_ik.NumericalIk`.
 
     Args:
         X_WD, V_WD: wanted pose and twist.
@@ -189,9 +191,15 @@ def numerical_ik(X_WD, V_WD, wanted, seen, is_seen, X_WE, J, memory, gains, limi
         gains: of rotation and translation in 1/s.
         limits: of the correction in rad and m.
         period: of a tick in s.
+        following: (24,), which becomes the memory of the next tick.
+        correction: (6,), which becomes the correction.
+
+    Returns:
+        The squared step of the joints on the path in rad^2.
     """
-    correction, twist = np.zeros(6), V_WD.copy()
+    twist = V_WD.copy()
     for i in range(6):
+        correction[i] = 0.0
         for k in range(6):
             correction[i] += J[i, k] * (memory[6 + k] - memory[k])
     if is_seen:
@@ -199,19 +207,33 @@ def numerical_ik(X_WD, V_WD, wanted, seen, is_seen, X_WE, J, memory, gains, limi
         limit_twist(feedback, correction, limits[0], limits[1])
         for i in range(6):
             twist[i] += feedback[i]
-    rates = follow_path(X_WD, twist, X_WE, J)
-    following = np.empty(24)
+    rates, step = follow_path(X_WD, twist, X_WE, J), 0.0
     for i in range(6):
         on_path = memory[18 + i] + rates[i, 0]
+        step += (on_path - memory[i]) ** 2
         commanded = memory[6 + i] + 0.5 * period * (rates[i, 1] + memory[12 + i])
         following[i], following[6 + i], following[12 + i] = on_path, commanded, rates[i, 1]
         following[18 + i] = 0.5 * (commanded + on_path) + period * rates[i, 1]
-    return following, correction
+    return step
 
 
 @compiled
 def numerical_ik_at_singularity(
-    X_WD, V_WD, wanted, seen, is_seen, nominal, commanded, J, closeness, memory, gains, limits, period
+    X_WD,
+    V_WD,
+    wanted,
+    seen,
+    is_seen,
+    nominal,
+    commanded,
+    J,
+    closeness,
+    memory,
+    gains,
+    limits,
+    period,
+    following,
+    correction,
 ):
     """`numerical_ik` where the commanded joints are nearly singular, and those halfway say little of them.
 
@@ -221,9 +243,12 @@ def numerical_ik_at_singularity(
         commanded: pose and Jacobian at the commanded joints.
         J: Jacobian at the joints halfway.
         closeness: of the commanded joints; from a half on they count alone.
-        memory, gains, limits, period: as there.
+        memory, gains, limits, period, following, correction: as there.
+
+    Returns:
+        As there.
     """
-    correction, twist = np.empty(6), V_WD.copy()
+    twist, step = V_WD.copy(), 0.0
     error(commanded[0], X_WD, correction)
     if is_seen:
         feedback = sine_feedback(wanted, seen, V_WD, gains[0], gains[1])
@@ -234,14 +259,14 @@ def numerical_ik_at_singularity(
     back = gains[1] * (memory[:6] - memory[6:12])
     share, halfway = min(1.0, 2.0 * closeness), follow_path(X_WD, twist, X_WD, J)
     rates = share * bounded_rates(commanded[1], twist, back) + (1.0 - share) * halfway[:, 1]
-    following = np.empty(24)
     for i in range(6):
         # One Newton step at its own place, and on to the next tick.
         q_d = memory[i] + on_path[i, 0]
         q_c = memory[6 + i] + period * rates[i]
+        step += (q_d + period * on_path[i, 1] - memory[i]) ** 2
         following[i], following[6 + i], following[12 + i] = q_d + period * on_path[i, 1], q_c, rates[i]
         following[18 + i] = 0.5 * (q_c + q_d) + 0.5 * period * (rates[i] + on_path[i, 1])
-    return following, correction
+    return step
 
 
 @compiled
@@ -257,7 +282,9 @@ def turned_by(turn, out):
 
 
 @compiled
-def corrected_pose(X_WD, V_WD, wanted, seen, is_seen, memory, gains, limits, period):
+def corrected_pose(
+    X_WD, V_WD, wanted, seen, is_seen, memory, gains, limits, period, X_WC, V_WC, kept, correction
+):
     """What `systems.servo.position_level.PositionLevel` commands with rotation vectors.
 
     Args:
@@ -267,12 +294,12 @@ def corrected_pose(X_WD, V_WD, wanted, seen, is_seen, memory, gains, limits, per
         gains: of rotation and translation in 1/s.
         limits: of the correction in rad and m.
         period: of a tick in s.
-
-    Returns:
-        The pose (3, 4) and the twist (6,) to command, the correction that is remembered (6,), and the same
-        in the world (6,).
+        X_WC, V_WC: (3, 4) and (6,), which become the pose and the twist to command.
+        kept, correction: (6,) each, which become the correction that is remembered, and the same in the
+            world.
     """
-    kept, rate, gap = memory[:6].copy(), np.zeros(6), np.empty(6)
+    rate, gap = np.zeros(6), np.empty(6)
+    kept[:] = memory[:6]
     C, step, both = np.zeros((3, 4)), np.empty((3, 3)), np.zeros((3, 4))
     if is_seen:
         error(wanted, seen, gap)
@@ -295,7 +322,7 @@ def corrected_pose(X_WD, V_WD, wanted, seen, is_seen, memory, gains, limits, per
             for i in range(first, first + 3):
                 kept[i] *= limits[part] / size
     turned_by(kept[:3], C[:, :3])
-    X_WC, V_WC, correction = np.zeros((3, 4)), V_WD.copy(), kept.copy()
+    V_WC[:], correction[:] = V_WD, kept
     for i in range(3):
         X_WC[i, 3] = X_WD[i, 3] + kept[3 + i]
         V_WC[3 + i] += rate[3 + i]
@@ -304,7 +331,6 @@ def corrected_pose(X_WD, V_WD, wanted, seen, is_seen, memory, gains, limits, per
             X_WC[i, j] = X_WD[i, 0] * C[0, j] + X_WD[i, 1] * C[1, j] + X_WD[i, 2] * C[2, j]
             V_WC[i] += X_WC[i, j] * rate[j]
             correction[i] += X_WD[i, j] * kept[j]
-    return X_WC, V_WC, kept, correction
 
 
 def warm_up() -> None:
@@ -317,7 +343,9 @@ def warm_up() -> None:
     newton_step(X, V, X, J, V, V, np.zeros(12))
     robust_solve(J, V[:, None])
     error(X, X, np.empty(6))
-    numerical_ik(X, V, X, X, True, X, J, np.zeros(24), (1.0, 1.0), (1.0, 1.0), 1.0)
+    rest = np.zeros(24), (1.0, 1.0), (1.0, 1.0), 1.0, np.zeros(24), V.copy()
+    numerical_ik(X, V, X, X, True, X, J, *rest)
     places = (X, J), (X, J), J, closeness(J)
-    numerical_ik_at_singularity(X, V, X, X, True, *places, np.zeros(24), (1.0, 1.0), (1.0, 1.0), 1.0)
-    corrected_pose(X, V, X, X, True, np.zeros(24), (1.0, 1.0), (1.0, 1.0), 1.0)
+    numerical_ik_at_singularity(X, V, X, X, True, *places, *rest)
+    found = X.copy(), V.copy(), V.copy(), V.copy()
+    corrected_pose(X, V, X, X, True, np.zeros(24), (1.0, 1.0), (1.0, 1.0), 1.0, *found)
