@@ -115,7 +115,7 @@ class PoseCamera(SampledSystem):
         empty = np.concatenate([[-np.inf, 0.0], np.eye(4)[:3].ravel()])
         newest = self.DeclareDiscreteState(empty)
         # All that may not have arrived yet, and one that has, in a ring.
-        self._ring = self.DeclareDiscreteState(np.tile(empty, self._in_flight))
+        self._ring = int(self.DeclareDiscreteState(np.tile(empty, self._in_flight)))
         self.DeclareStateOutputPort("exposure", newest)
         self.DeclareAbstractOutputPort(
             "pose_sample",
@@ -143,7 +143,7 @@ class PoseCamera(SampledSystem):
             off = noise[:, _PER_EXPOSURE:] * (noise[:, -1:] < self._outlier_below)
             turns = _small_rotations(np.deg2rad(self._config.outlier_deg) * off[:, :3]) @ turns
             shifts = shifts + 1e-3 * self._config.outlier_mm * off[:, 3:6]
-        value.set_value((turns, shifts, (noise[:, 6] < self._lost_below).tolist()))
+        value.set_value((list(turns), list(shifts), (noise[:, 6] < self._lost_below).tolist()))
 
     def _expose(self, context: Context, discrete_state: DiscreteValues) -> None:
         time = context.get_time()
@@ -157,8 +157,8 @@ class PoseCamera(SampledSystem):
         exposure = discrete_state.get_mutable_value(0)
         exposure[0], exposure[1] = time, not lost
         seen = exposure[2:].reshape(3, 4)
-        seen[:, :3] = turns[number].dot(pose[:, :3])
-        seen[:, 3] = pose[:, 3] + shifts[number]
+        np.dot(turns[number], pose, out=seen)
+        seen[:, 3] = pose[:, 3] + shifts[number]  # which is shifted alone
         place = _WIDTH * (tick % self._in_flight)
         discrete_state.get_mutable_value(self._ring)[place : place + _WIDTH] = exposure
 

@@ -59,7 +59,7 @@ def declare_tip(system: LeafSystem, tip: Tip) -> Callable[[Context], RigidTransf
     state = system.DeclareVectorInputPort("state", tip.state_size)
 
     def pose(context: Context) -> RigidTransform:
-        return tip.pose(context.get_time(), state.Eval(context))
+        return tip.pose(0.0 if tip.is_constant else context.get_time(), state.Eval(context))
 
     system.DeclareAbstractOutputPort(
         "X_WE",

@@ -63,4 +63,6 @@ class Pbvs(ServoLaw):
     def _feedback(self, wanted: np.ndarray, seen: np.ndarray) -> np.ndarray:
         zyx = zyx_angles(seen.tolist())
         w = angular_velocity(zyx, euler_difference(zyx_angles(wanted.tolist()), zyx))
-        return self.gains * np.concatenate([w, wanted[:, 3] - seen[:, 3]])
+        twist = np.empty(6)
+        twist[:3], twist[3:] = w, wanted[:, 3] - seen[:, 3]
+        return self.gains * twist
