@@ -99,7 +99,7 @@ class Controller:
         self.tick_clock = TickClock()
         if isinstance(law, type):
             law = _built(self.tick_clock.timed(law), self.model, config, scenario.servo.guard)
-        self.law = law
+        self.law: Any = law  # which may say more than a System does
         check_ports(self.law)
         if self.traits.uses_camera:
             _refuse_slow_camera(scenario)
