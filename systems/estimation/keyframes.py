@@ -39,7 +39,7 @@ class Keyframes:
         self._model, self._length, self._batch = model, length, batch
         n = model.size
         self.layout = Layout(
-            rows=(length, SHAPES + 6 * NUM_SHAPES * model.has_gear_errors),
+            rows=(length, SHAPES + 6 * (NUM_SHAPES + 1) * model.has_gear_errors),
             first=(1,),
             end=(1,),
             position=(1,),  # of the pass; below zero for none

@@ -5,7 +5,6 @@ from types import SimpleNamespace
 
 import numpy as np
 
-from robots.kinematics.forward import robust_inverse
 from systems.estimation import kernels
 from systems.estimation.arm_geometry import Constants
 from systems.estimation.camera.camera_moves import CameraMoves
@@ -21,13 +20,13 @@ from systems.estimation.events import (
     Innovations,
 )
 from systems.estimation.gears.gear_errors import NUM_MODELS, NUM_SHAPES
-from systems.estimation.gears.gear_feedback import GearFeedback
+from systems.estimation.gears.gear_feedback import GearFeedback, samples_alike
 from systems.estimation.keyframes import Keyframes, forget_open, open_keyframe
 from systems.estimation.memory import Layout
 from systems.estimation.suppositions import Suppositions
 from systems.estimation.tip_estimator_config import TipEstimatorConfig
 from systems.estimation.tip_model import NO_SHAPES, Pair, Prediction, TipModel
-from systems.estimation.unmodelled import Doubts, Unmodelled
+from systems.estimation.unmodelled import Doubts, Unmodelled, doubts
 
 _AGAIN = 500  # samples, in which a second event says that the first was explained wrongly
 _OF_THE_LOAD = 0.1  # of its spread, when a tool was displaced
@@ -77,7 +76,8 @@ class TipEstimator:
             samples=(1,),
             weight=(1,),
             first_theta=(6,),
-            sums=(31 + 6 * NUM_SHAPES * model.has_gear_errors,),  # theta, gears, motion, twist, time, shapes
+            # theta, gears, motion, twist, time, shapes, by gears
+            sums=(31 + 6 * (NUM_SHAPES + 1) * model.has_gear_errors,),
             first_time=(1,),  # of the camera's clock
             last_time=(1,),
             sum_y=(6,),
@@ -181,7 +181,7 @@ class TipEstimator:
         H, x = self.predict(memory, pair).H[0], self.x_robot(memory)
         covariance = H @ self.covariance_of_robot(memory) @ H.T
         J = self.model.jacobian(self._constants_at(memory, x), x, pair.theta)
-        by_gears = self.model.gear_variances(x, pair.loads, pair.states)
+        by_gears = self.model.gear_variances(x, memory.P, pair.loads, pair.states)
         angles = self._unmodelled.joint_variances(memory.unmodelled, by_gears) + pair.rounding**2
         covariance += (J * angles) @ J.T + np.diag(self._unmodelled.variances(memory.unmodelled))
         if memory.after_step.is_open[0]:
@@ -194,15 +194,14 @@ class TipEstimator:
         config = self._config
         if math.isnan(memory.first_time[0]):
             memory.first_time[0] = pair.time
-        memory.last_time[0] = pair.time
+        period, memory.last_time[0] = pair.time - float(memory.last_time[0]), pair.time
         if memory.is_foreign[0]:
             return None
         model, x, since_first = self.model, self.x(memory), self._since_first(memory, pair.time)
         shapes = model.gear_shapes(pair.theta, pair.states)
         seen = pair.theta, pair.loads, pair.twist, pair.X_WE
         r, H, gears, J = model.innovation(self._constants_at(memory, x), x, seen, shapes, since_first)
-        weight = 1.0 / (1.0 + (pair.unrest / config.calm) ** 2)
-        event, innovations = None, memory.innovations
+        weight, event, innovations = 1.0 / (1.0 + (pair.unrest / config.calm) ** 2), None, memory.innovations
         if memory.count[0] <= config.test_after and since_first <= config.test_at_latest:
             if self._innovations.is_false_start(innovations, r, H, lambda: memory.P @ H.T):
                 return self._look_for_foreign(memory, H)
@@ -240,15 +239,18 @@ class TipEstimator:
                 if found == TOOL_DISPLACED and memory.after_step.is_event[0]:
                     size = self._displacement.size(memory.after_step, found, pair.X_WE[:3, 3])
                     event = Event(found, size, size)
+        by_gears = model.gear_variances(x, memory.P, pair.loads, pair.states)
         if model.has_gear_errors and weight > _CALM_WEIGHT:
-            seen = J, r, memory.noise.weights
-            model.gear_errors.weigh(memory.against, *seen, pair.others)
+            shown = J, r, memory.noise.weights
+            model.gear_errors.weigh(memory.against, *shown, pair.others)
             if self.gear_feedback.acts:
-                by_gears = model.gear_variances(x, pair.loads, pair.states)
-                self.gear_feedback.hear(memory.loose, *seen, by_gears, pair.motion[:6], pair.time)
+                doubts = H @ memory.P @ H.T, by_gears
+                self.gear_feedback.hear(memory.loose, *shown, *doubts, pair.motion[:6], pair.time)
         if self._noise.hear(memory.noise, r, H, memory.xi, pair):
             self._weigh_anew(memory)
-        self._take(memory, (r, gears, H), pair, shapes, weight)
+        seen_of_gears = self._unmodelled.joint_variances(memory.unmodelled, by_gears)[: len(by_gears)]
+        noise = memory.noise.weights, J, samples_alike(period) * seen_of_gears
+        self._take(memory, (r, gears, H), noise, pair, shapes, weight)
         if event is None and memory.count[0] % _LOOK_EVERY == _LOOK_EVERY // 2:
             event = self._look_at_suppositions(memory)
         return event
@@ -257,13 +259,14 @@ class TipEstimator:
         self,
         memory: SimpleNamespace,
         innovation: tuple[np.ndarray, np.ndarray, np.ndarray],
+        noise: tuple[np.ndarray, np.ndarray, np.ndarray],
         pair: Pair,
         shapes: np.ndarray | None,
         weight: float,
     ) -> None:
         """Adds a sample to the open keyframe, closes that if the robot has gone far enough, and solves.
 
-        ``innovation`` is the error, the deflections of the gears and the columns.
+        ``innovation`` is the error, the deflections of the gears and the columns; ``noise`` as of the kernel.
         """
         memory.count[0] += 1.0
         is_long = memory.samples[0] + 1.0 >= self._config.keyframe_samples
@@ -272,7 +275,7 @@ class TipEstimator:
         past, model = memory.keyframes, self.model
         known = memory.P, memory.taken, past.b, past.xi_sum, model.sigma, model.K.start
         limits = -1.0 if is_long or memory.count[0] in _CLOSE_AT else self._config.keyframe_step, _TRUST
-        sample = *innovation, memory.xi, seen, memory.noise.weights, weight
+        sample = *innovation, memory.xi, seen, noise, weight
         if kernels.information.take(*sample, open_keyframe(memory), known, limits):
             self._close(memory)
 
@@ -340,10 +343,8 @@ class TipEstimator:
         memory.is_busy[0] = 1.0
         factor, by_model = self.variance_factor(memory), H @ memory.P @ H.T
         noise, by_model = factor * memory.noise.variances, max(1.0, factor) * by_model
-        if not self.model.has_gear_errors:
-            return Doubts(noise, by_model, np.zeros((6, 6)), np.empty((0, 6)))
-        by_gears = self.model.gear_variances(self.x(memory), pair.loads, pair.states)
-        return Doubts(noise, by_model, (J * by_gears) @ J.T, robust_inverse(J))
+        by_gears = self.model.gear_variances(self.x(memory), memory.P, pair.loads, pair.states)
+        return doubts(noise, by_model, J, by_gears)
 
     def _doubt(self, memory: SimpleNamespace) -> None:
         """What was learnt does not hold where the robot is now: it weighs less, but no less than priors."""

@@ -21,7 +21,7 @@ class TipEstimatorConfig:
     calm: float = positive(0.05, "m/s^2")
     # Of the variance that play of gears admits, the share that is believed in what a camera shows of their
     # teeth, so that it is fed back; 0 feeds nothing back
-    gear_feedback: float = quantity(0.1, 0.0, 1.0)
+    gear_feedback: float = quantity(0.3, 0.0, 1.0)
     # Events are looked for after so many samples, and where a camera is slow after so many seconds
     test_after: int = quantity(250, 1)
     test_at_latest: float = quantity(3.0, 0.0, unit="s")

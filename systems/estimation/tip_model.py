@@ -230,18 +230,23 @@ class TipModel:
             return 0.0
         return (shapes * x[self.E].reshape(NUM_SHAPES, 6)).sum(-2)
 
-    def gear_variances(self, x: np.ndarray, loads: np.ndarray, states: np.ndarray) -> np.ndarray:
-        """What the gears may be off by beyond the uncertainty of x, rad^2, (6,); zero without gear errors.
+    def gear_variances(
+        self, x: np.ndarray, P: np.ndarray, loads: np.ndarray, states: np.ndarray
+    ) -> np.ndarray:
+        """What the gears may be off by beyond the uncertainty of x, rad^2, (6,); (0,) without gear errors.
 
         Args:
             x: the unknowns.
+            P: their covariance in units of their spreads.
             loads: of one instant, (5, 18).
             states: of the gears then, (18,).
         """
         if not self.has_gear_errors:
-            return np.zeros(6)
-        sizes = x[self.E].reshape(NUM_SHAPES, 6)
-        torque = self.total_load(x, loads[None])[0, :6]
+            return np.empty(0)
+        sizes = x[self.E], self.sigma[self.E] ** 2 * P.diagonal()[self.E]
+        by_load = loads[1:, :6] * self.sigma[self.M, None]
+        torque = self.total_load(x, loads[None])[0, :6], (by_load * (P[self.M, self.M] @ by_load)).sum(axis=0)
+        sizes = sizes[0].reshape(NUM_SHAPES, 6), sizes[1].reshape(NUM_SHAPES, 6)
         return self.gear_errors.variances(sizes, states, torque, self._gear_error)
 
     def predict(

@@ -6,6 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from robots.kinematics.forward import robust_inverse
 from systems.estimation.memory import Layout
 
 _BLOCK = 24  # samples of a mean: a tenth of a second at 4 ms, in which a robot hardly changes what it lacks
@@ -23,6 +24,13 @@ class Doubts(NamedTuple):
     by_model: np.ndarray  # (6, 6), by the estimate
     by_gears: np.ndarray  # (6, 6), by what gears may be off by in a whole block
     to_joints: np.ndarray  # (k, 6), from errors of the tip to those of joints; k is 6, or 0 if none are asked
+
+
+def doubts(noise: np.ndarray, by_model: np.ndarray, J: np.ndarray, by_gears: np.ndarray) -> Doubts:
+    """These of a tip with the Jacobian J, (6, 6), whose gears have variances in rad^2, (6,) or (0,)."""
+    if not len(by_gears):
+        return Doubts(noise, by_model, np.zeros((6, 6)), np.empty((0, 6)))
+    return Doubts(noise, by_model, (J * by_gears) @ J.T, robust_inverse(J))
 
 
 class Unmodelled:
@@ -91,10 +99,10 @@ class Unmodelled:
 
         Args:
             memory: of the layout.
-            by_gears: what they are said to be off by, (6,).
+            by_gears: what they are said to be off by, (6,); (0,) if no joints are looked at.
         """
         if not self._joints:
-            return by_gears
+            return np.zeros(6)
         share = 1.0 + memory.excess[2:] / np.maximum(memory.by_joints, 1e-300)
         return by_gears * np.clip(share, _LEAST_OF_GEARS, 1.0) + _mean(memory)[2:]
 

@@ -119,20 +119,25 @@ class GearErrors:
         return likely
 
     def variances(
-        self, sizes: np.ndarray, states: np.ndarray, torque: np.ndarray, spread: float
+        self,
+        sizes: tuple[np.ndarray, np.ndarray],
+        states: np.ndarray,
+        torque: tuple[np.ndarray, np.ndarray],
+        spread: float,
     ) -> np.ndarray:
         """What the shapes may be off by, rad^2, (6,).
 
-        Which side teeth lie against is as uncertain as what pushes them there: the load, and half of what the
-        hysteresis carries, give or take as much as it carries, since how much of it stands beside the teeth
-        is not known, and what its spring takes up while they cross. Their position, between -1 and 1, is
-        expected at e, with the variance 1 - e^2 about it, and is off by (s - e)^2 + 1 - e^2 from where the
-        model has it, s.
+        Which side teeth lie against is as uncertain as what pushes them there: the load, as well as it is
+        known, and half of what the hysteresis carries, give or take as much as it carries, since how much of
+        it stands beside the teeth is not known, and what its spring takes up while they cross. Their
+        position, between -1 and 1, is expected at e, with the variance 1 - e^2 about it, and is off by
+        (s - e)^2 + 1 - e^2 from where the model has it, s. That times the square of half of the gap, which
+        may be wide before teeth have crossed it, since nothing shows it until then.
 
         Args:
-            sizes: of the shapes in rad, (7, 6).
+            sizes: of the shapes in rad, (7, 6), and their variances.
             states: as `step` gave them.
-            torque: of the gears in N m, (6,).
+            torque: of the gears in N m, (6,), and its variances.
             spread: of the sizes, as it was believed before, rad.
         """
         least, out = (_OTHERWISE * spread) ** 2, np.empty(NUM_JOINTS)

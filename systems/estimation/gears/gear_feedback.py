@@ -13,7 +13,7 @@ from systems.estimation.memory import Layout
 # All assumed. Teeth that lie free cross in some tenths of a second, and hardly while nothing moves. And links
 # follow their motors through free teeth with some 40 rad/s; what is fed back faster makes them swing from
 # one side to the other.
-_LASTS, _LASTS_AT_REST = 0.1, 10.0  # s, after which a third is left of what a joint is off by
+_LASTS, _LASTS_AT_REST = 0.1, 30.0  # s, after which a third is left of what a joint is off by
 _AT_REST = 1e-3  # rad/s, of the joints; what is fed back moves them by less
 _FREQUENCY = 40.0  # rad/s, with which joints are led to where it is made up for
 
@@ -55,6 +55,7 @@ class GearFeedback:
         J: np.ndarray,
         r: np.ndarray,
         weights: np.ndarray,
+        by_model: np.ndarray,
         variances: np.ndarray,
         velocity: np.ndarray,
         exposure: float,
@@ -66,13 +67,16 @@ class GearFeedback:
             J: Jacobian of the tip, (6, 6), rotation first.
             r: how far the tip was seen from where it was predicted, (6,).
             weights: of the camera, one over variances, (6,).
+            by_model: covariance of where the tip was predicted, (6, 6).
             variances: of what gears may be off by, rad^2, (6,).
             velocity: of the joints, rad/s, (6,).
             exposure: s, as the camera has it.
         """
         memory.lasts[0] = _LASTS if np.abs(velocity).max() > _AT_REST else _LASTS_AT_REST
-        kept = _kept(memory, exposure - float(memory.exposure[0]))
-        kernels.gears.follow(J, r, weights, USUAL, self._share * variances, kept, memory.off, memory.P)
+        since = exposure - float(memory.exposure[0])
+        # What the model is off by lasts as teeth do.
+        known = samples_alike(since) * by_model, self._share * variances, _kept(memory, since)
+        kernels.gears.follow(J, r, weights, USUAL, *known, memory.off, memory.P)
         memory.exposure[0] = exposure
 
     def lead(self, memory: SimpleNamespace, ahead: float, step: float) -> np.ndarray:
@@ -90,6 +94,18 @@ class GearFeedback:
         rate[:] = (rate + step * w * w * (goal - aside)) / (1.0 + w * step) ** 2
         aside += step * rate
         return np.array((aside, rate, (rate - before) / step))
+
+
+def samples_alike(period: float) -> float:
+    """How many samples in a row say no more than one of where a robot is whose teeth are elsewhere so long.
+
+    With white noise of so many times the variance an Ornstein-Uhlenbeck process says as much. At rest it
+    lasts longer. But there the tip is to be where it is wanted, whatever keeps it from that.
+
+    Args:
+        period: s between two samples.
+    """
+    return 1.0 + 2.0 * _LASTS / period if period > 0.0 else 1.0
 
 
 def _kept(memory: SimpleNamespace, time: float) -> float:

@@ -5,6 +5,7 @@ import math
 import numpy as np
 
 from robots.compiled import compiled
+from systems.estimation.kernels.information import factor, unmix
 
 _LEAST_TORQUE = 1e-6  # N m, so that a gear which nothing holds has a side
 
@@ -140,23 +141,31 @@ def variances(compliance, gap, sizes, states, torque, least, out):
         out: is written.
     """
     n = len(out)
+    sizes, size_variances = sizes
+    torque, torque_variances = torque
     for j in range(n):
-        half, spring = sizes[5, j] + sizes[6, j], gap.held / compliance[j]
+        spring, square = gap.held / compliance[j], (sizes[5, j] + sizes[6, j]) ** 2
+        square += size_variances[5, j] + size_variances[6, j]
         carried = spring * gap.widths[0] * states[j]
-        unsure = max(math.hypot(carried, 2.0 * spring * half), _LEAST_TORQUE)
+        variance = carried**2 + 4.0 * spring**2 * square + torque_variances[j]
+        unsure = max(math.sqrt(variance), _LEAST_TORQUE)
         expected = -math.erf((torque[j] + 0.5 * carried) / (math.sqrt(2.0) * unsure))
-        position = sizes[5, j] * states[n + j] + sizes[6, j] * states[2 * n + j]  # times the gap
-        off = (position - half * expected) ** 2 + half**2 * (1.0 - expected**2)
-        out[j] = off + least
+        off = unknown = 0.0
+        for k in (1, 2):
+            away = states[n * k + j] - expected  # of halves of the gap
+            off += sizes[4 + k, j] * away
+            unknown += size_variances[4 + k, j] * away**2
+        out[j] = off**2 + unknown + square * (1.0 - expected**2) + least
 
 
 @compiled
-def follow(J, r, weights, usual, variances, kept, off, P):
+def follow(J, r, weights, usual, by_model, variances, kept, off, P):
     """Takes one sample into what joints are off by; see `GearFeedback.hear`.
 
     Args:
         J, r, weights, variances: as there.
         usual: standard deviations of the camera beyond which a sample says nothing.
+        by_model: covariance of what else there is of errors in a sample, (6, 6).
         kept: of what joints are off by, since the last sample.
         off: rad, (n,); is renewed, as is its covariance ``P`` (n, n).
     """
@@ -169,19 +178,29 @@ def follow(J, r, weights, usual, variances, kept, off, P):
     for i in range(6):
         if r[i] ** 2 * weights[i] > usual**2:
             return
-    gain = np.empty(n)
-    for i in range(6):  # errors of a camera are independent of each other, so one after the other
-        left, variance = r[i], 1.0 / weights[i]
+    V, z, L = np.empty((6, n)), np.empty(6), np.empty((6, 6))  # L L^T is the covariance of r
+    for i in range(6):
+        z[i] = r[i]
         for j in range(n):
-            gain[j] = 0.0
+            z[i] -= J[i, j] * off[j]
+            V[i, j] = 0.0
             for k in range(n):
-                gain[j] += P[j, k] * J[i, k]
-            left -= J[i, j] * off[j]
-            variance += J[i, j] * gain[j]
+                V[i, j] += J[i, k] * P[k, j]
+    for i in range(6):
+        for h in range(i + 1):
+            L[i, h] = by_model[i, h] + (1.0 / weights[i] if h == i else 0.0)
+            for k in range(n):
+                L[i, h] += V[i, k] * J[h, k]
+    factor(L)
+    unmix(L, V)
+    unmix(L, z.reshape(6, 1))
+    for i in range(6):
         for j in range(n):
-            off[j] += gain[j] * left / variance
-            for k in range(n):
-                P[j, k] -= gain[j] * gain[k] / variance
+            off[j] += V[i, j] * z[i]
+    for j in range(n):
+        for k in range(n):
+            for i in range(6):
+                P[j, k] -= V[i, j] * V[i, k]
 
 
 @compiled

@@ -8,13 +8,14 @@ from robots.compiled import compiled, inner
 
 
 @compiled
-def take(r, gears, H, xi, seen, weights, weight, keyframe, known, limits):
+def take(r, gears, H, xi, seen, noise, weight, keyframe, known, limits):
     """Adds six equations r = H (x - xi) to an open keyframe, and finds the estimate that follows.
 
     Args:
         r: (6,), gears: deflections in rad, (6,), H: (6, n), xi: (n,), renewed by `estimate`.
         seen: theta, motion, twist, s since the first stamp and shapes of the gears' errors of this instant.
-        weights: of the equations, (6,), all times ``weight``.
+        noise: weights of the equations, (6,), all times ``weight``; and J and by_gears as of `whiten`, (6, 6)
+            and (0,) where no gear errs.
         keyframe: `OpenKeyframe`; is renewed, of its A the lower half.
         known: P, (n, n), the covariance without this sample, and how many have been taken into it, (1,), both
             renewed, infinitely many if it is no covariance; b, xi_sum, sigma and g as of `estimate`.
@@ -25,22 +26,29 @@ def take(r, gears, H, xi, seen, weights, weight, keyframe, known, limits):
         Whether the robot is further away than that.
     """
     theta, motion, twist, time, shapes = seen
+    weights, J, by_gears = noise
     P, taken, b, xi_sum, sigma, g = known
     step, trust = limits
     n = len(xi)
     shares, errors, means = np.empty(6), np.empty(6), keyframe.means
-    scaled = np.empty((6, n))
+    scaled, rows = np.empty((6, n)), H.copy()
     for i in range(6):
         y = r[i]
         for k in range(n):
             y += H[i, k] * xi[k]
         keyframe.y[i] += weight * y
         shares[i], errors[i] = weight * weights[i], y
-        scale = math.sqrt(shares[i])
         for j in range(n):
             keyframe.H[i, j] += weight * H[i, j]
-            scaled[i, j] = scale * H[i, j]
-    add_squares(H, shares, errors, keyframe.A, keyframe.b)
+    if len(by_gears):
+        whiten(J, by_gears, weights, rows, errors)
+        for i in range(6):
+            shares[i] = weight
+    for i in range(6):
+        scale = math.sqrt(shares[i])
+        for j in range(n):
+            scaled[i, j] = scale * rows[i, j]
+    add_squares(rows, shares, errors, keyframe.A, keyframe.b)
     taken[0] = taken[0] + 1.0 if narrow(P, scaled) else np.inf
     if keyframe.samples[0] == 0.0:
         for i in range(6):
@@ -59,8 +67,63 @@ def take(r, gears, H, xi, seen, weights, weight, keyframe, known, limits):
     for k in range(len(shapes)):
         for i in range(6):
             means[31 + 6 * k + i] += weight * shapes[k, i]
+    for i in range(len(by_gears)):
+        means[31 + 6 * len(shapes) + i] += weight * by_gears[i]
     estimate(P, b, keyframe.b, xi_sum, sigma, g, trust, xi)
     return is_far
+
+
+@inner
+def whiten(J, by_gears, weights, H, y):
+    """Makes errors of six equations independent of each other, each with a variance of one.
+
+    Args:
+        J: (6, at least 6), columns of joints.
+        by_gears: rad^2, what joints may be off by in a sample beside the camera's noise, (6,).
+        weights: of the camera, one over variances, (6,).
+        H: (6, n), y: (6,), are replaced by L^-1 H and L^-1 y with the covariance L L^T.
+    """
+    L = np.empty((6, 6))
+    for i in range(6):
+        for h in range(i + 1):
+            L[i, h] = 1.0 / weights[i] if h == i else 0.0
+            for j in range(len(by_gears)):
+                L[i, h] += J[i, j] * by_gears[j] * J[h, j]
+    factor(L)
+    unmix(L, H)
+    unmix(L, y.reshape(6, 1))
+
+
+@inner
+def factor(S):
+    """Writes L into the lower half of S = L L^T, (6, 6), of which that is read; says whether there is one."""
+    for i in range(6):
+        for h in range(i + 1):
+            left = S[i, h]
+            for m in range(h):
+                left -= S[i, m] * S[h, m]
+            if h < i:
+                S[i, h] = left / S[h, h]
+            elif left > 0.0:
+                S[i, i] = math.sqrt(left)
+            else:
+                return False
+    return True
+
+
+@inner
+def unmix(L, rows):
+    """Writes L^-1 rows in the place of rows, (6, n), of the lower half of L, (6, 6)."""
+    n = rows.shape[1]
+    for i in range(6):
+        row = rows[i]
+        for h in range(i):
+            share, above = L[i, h], rows[h]
+            for k in range(n):
+                row[k] -= share * above[k]
+        scale = 1.0 / L[i, i]
+        for k in range(n):
+            row[k] *= scale
 
 
 @inner
@@ -75,27 +138,12 @@ def narrow(P, G):
     """
     V = np.dot(G, P)
     S = np.dot(V, G.T)
-    for i in range(6):  # 1 + S = L L^T
-        for h in range(i + 1):
-            left = S[i, h] + (1.0 if h == i else 0.0)
-            for m in range(h):
-                left -= S[i, m] * S[h, m]
-            if h < i:
-                S[i, h] = left / S[h, h]
-            elif left > 0.0:
-                S[i, i] = math.sqrt(left)
-            else:
-                return False
+    for i in range(6):
+        S[i, i] += 1.0
+    if not factor(S):
+        return False
+    unmix(S, V)
     n = len(P)
-    for i in range(6):  # L^-1 V in the place of V
-        row = V[i]
-        for h in range(i):
-            factor, above = S[i, h], V[h]
-            for k in range(n):
-                row[k] -= factor * above[k]
-        scale = 1.0 / S[i, i]
-        for k in range(n):
-            row[k] *= scale
     add_squares(V, np.full(6, -1.0), np.zeros(6), P, np.zeros(n))
     complete(P)
     return True

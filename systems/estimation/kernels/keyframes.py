@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from robots.compiled import compiled
+from robots.compiled import compiled, inner
 from systems.estimation.kernels.arrays import (
     GEARS,
     MOTION,
@@ -14,9 +14,17 @@ from systems.estimation.kernels.arrays import (
     WEIGHT,
     SeenOnce,
 )
-from systems.estimation.kernels.information import add_squares, complete
+from systems.estimation.kernels.information import add_squares, complete, whiten
 from systems.estimation.kernels.poses import error, move
 from systems.estimation.kernels.tip import predict_one_anew
+
+
+@inner
+def _gears(row):
+    """Shapes of gear errors, (7, 6) or (0, 6), and what gears may be off by beside them, (6,) or (0,)."""
+    shapes = row[SHAPES:].reshape((len(row) - SHAPES) // 6, 6)
+    last = max(len(shapes) - 1, 0)
+    return shapes[:last], row[SHAPES + 6 * last :]
 
 
 @compiled
@@ -32,17 +40,23 @@ def read(c, unknowns, masses, xi, keyframes, first, until, weights, A, b):
     """
     length, number = len(keyframes), len(xi)
     X_WE, H, y, shares = np.empty((4, 4)), np.empty((6, number)), np.empty(6), np.empty(6)
+    columns = np.empty((6, len(c.frame)))
     for k in range(first, until):
         row = keyframes[k % length]
-        shapes = row[SHAPES:].reshape((len(row) - SHAPES) // 6, 6)
+        shapes, by_gears = _gears(row)
         seen = SeenOnce(row[TWIST:TIME], row[TIME], shapes)
         moving = row[MOTION:TWIST]
-        predict_one_anew(c, unknowns, masses, row[THETA:GEARS], row[GEARS:MOTION], moving, seen, X_WE, H)
+        arm = row[THETA:GEARS], row[GEARS:MOTION], moving
+        predict_one_anew(c, unknowns, masses, *arm, seen, X_WE, H, columns)
         error(row[POSE:WEIGHT].reshape(3, 4), X_WE, y)
         for i in range(6):
             shares[i] = row[WEIGHT] * weights[i]
             for j in range(number):
                 y[i] += H[i, j] * xi[j]
+        if len(by_gears):
+            whiten(columns, by_gears, weights, H, y)
+            for i in range(6):
+                shares[i] = row[WEIGHT]
         add_squares(H, shares, y, A, b)
     complete(A)
 
@@ -64,10 +78,11 @@ def merge(c, unknowns, masses, xi, opened, row):
         row[SHAPES - POSE + k] = means[k] / total
     row[WEIGHT] = total
     X_WE, H, y = np.empty((4, 4)), np.empty((6, number)), np.empty(6)
-    shapes = row[SHAPES:].reshape((len(row) - SHAPES) // 6, 6)
+    columns, shapes = np.empty((6, len(c.frame))), _gears(row)[0]
     seen = SeenOnce(row[TWIST:TIME], row[TIME], shapes)
     moving = row[MOTION:TWIST]
-    predict_one_anew(c, unknowns, masses, row[THETA:GEARS], row[GEARS:MOTION], moving, seen, X_WE, H)
+    arm = row[THETA:GEARS], row[GEARS:MOTION], moving
+    predict_one_anew(c, unknowns, masses, *arm, seen, X_WE, H, columns)
     for i in range(6):
         y[i] = opened.y[i]
         for j in range(number):

@@ -137,11 +137,11 @@ def innovation(c, unknowns, theta, loads, seen, X_seen, r, H, gears, columns):
 
 
 @inner
-def predict_one_anew(c, unknowns, masses, theta, gears, motion, seen, X_WE, H):
-    """`predict_anew` for one instant, with `SeenOnce`."""
+def predict_one_anew(c, unknowns, masses, theta, gears, motion, seen, X_WE, H, columns):
+    """`predict_anew` for one instant, with `SeenOnce`; writes the columns of the arm, too, (6, C)."""
     g = len(c.chosen)
     unit, yields, q, step = np.empty(18), np.empty(18), np.empty(6), np.empty(6)
-    frames, columns, loads = np.empty((7, 4, 4)), np.empty((6, len(c.frame))), np.empty((5, 18))
+    frames, loads = np.empty((7, 4, 4)), np.empty((5, 18))
     for j in range(6):
         q[j] = theta[j] + gears[j] + _error_of_gear(unknowns, g, seen.shapes, j)
     place(c, q, X_WE, frames, columns)
@@ -168,6 +168,7 @@ def predict_anew(c, unknowns, masses, theta, gears, motion, seen, X_WE, H):
         gears: about by how much the gears yield in rad, (n, 6); is renewed.
         motion: velocities and accelerations of the joints, (n, 12).
     """
+    columns = np.empty((6, len(c.frame)))
     for n in range(len(theta)):
         once = SeenOnce(seen.twist[n], seen.time[n], seen.shapes[n])
-        predict_one_anew(c, unknowns, masses, theta[n], gears[n], motion[n], once, X_WE[n], H[n])
+        predict_one_anew(c, unknowns, masses, theta[n], gears[n], motion[n], once, X_WE[n], H[n], columns)

@@ -138,8 +138,7 @@ def test_the_tip_of_a_realistic_kr_16_is_where_the_law_says(seed):
     prepared = prepare("everything-realistic", drawn, "kr16-realistic")
     log = run(prepared.scenario, "self_calibrating", prepared.robot)
     assert log.learnt is not None
-    # 0.95 of eighty samples, which are alike in turns: they count as half of that, or less
-    assert log.learnt["coverage"]["share"] >= 0.81
+    assert log.learnt["coverage"]["share"] >= 0.9
 
 
 @pytest.mark.slow

@@ -127,19 +127,27 @@ def test_a_camera_shows_which_model_of_a_gear_is_right(robot, right):
 
 
 @pytest.mark.parametrize("load", [-1.5, -0.2, 0.0, 0.4, 3.0])  # of what the hysteresis carries
-def test_gears_may_be_off_by_the_side_of_teeth_that_nearly_nothing_pushes(robot, load):
+@pytest.mark.parametrize("unknown", [0.0, 0.7])  # of the gap, and of what the hysteresis carries
+def test_gears_may_be_off_by_the_side_of_teeth_that_nearly_nothing_pushes(robot, load, unknown):
     """Against teeth whose side is drawn, by a push that is known to no more than what hysteresis does."""
     gears, turned, spring = GearErrors(robot), 0.3, 0.1 * np.asarray(robot.joint_stiffness)
-    carried, crossing = spring * 3.5e-4 * turned, spring * 2.0 * 70e-6  # N m, before and while they cross
-    push = (load + 0.5) * carried
-    drawn = np.random.default_rng(0).normal(size=(20000, 1)) * np.hypot(carried, crossing)
-    sizes, states = np.zeros((7, 6)), np.concatenate((np.full(6, turned), np.full(6, 1.0), np.full(6, -0.4)))
-    sizes[5], sizes[6] = 20e-6, 50e-6
-    teeth = -np.sign(push + drawn) * 70e-6
-    expected = np.mean((teeth - (20e-6 - 0.4 * 50e-6)) ** 2, axis=0)
-    found = gears.variances(sizes, states, load * carried, 0.0)
-    np.testing.assert_allclose(found, expected, rtol=0.03, atol=(1e-6) ** 2)
-    np.testing.assert_allclose(gears.variances(0.0 * sizes, states, load * carried, 5e-5), (5e-6) ** 2)
+    carried = spring * 3.5e-4 * turned  # N m, before they cross
+    sizes, states = (
+        np.zeros((2, 7, 6)),
+        np.concatenate((np.full(6, turned), np.full(6, 1.0), np.full(6, -0.4))),
+    )
+    sizes[0, 5], sizes[0, 6], sizes[1, 6] = 20e-6, 50e-6, (50e-6 * unknown) ** 2
+    crossing = spring * 2.0 * np.sqrt(70e-6**2 + sizes[1, 6])  # N m, while they do
+    torque = load * carried, (unknown * carried) ** 2
+    rng = np.random.default_rng(0)
+    unsure = np.sqrt(carried**2 + crossing**2 + torque[1])
+    push = torque[0] + 0.5 * carried + unsure * rng.normal(size=(20000, 1))
+    held = 50e-6 * (1.0 + unknown * rng.normal(size=(20000, 1)))
+    expected = np.mean((-np.sign(push) * (20e-6 + held) - (20e-6 - 0.4 * held)) ** 2, axis=0)
+    found = gears.variances((sizes[0], sizes[1]), states, torque, 0.0)
+    np.testing.assert_allclose(found, expected, rtol=0.05, atol=(1e-6) ** 2)
+    least = gears.variances((sizes[0] * 0.0, sizes[0] * 0.0), states, torque, 5e-5)
+    np.testing.assert_allclose(least, (5e-6) ** 2)
 
 
 def test_columns_for_gear_errors_find_what_waves_and_gap_do_to_the_tip():

@@ -5,10 +5,11 @@ import pytest
 
 from robots.description.model import load_robot
 from robots.kinematics.forward import Kinematics
-from systems.estimation.gears.gear_feedback import GearFeedback
+from systems.estimation.gears.gear_feedback import GearFeedback, samples_alike
 
 PERIOD = 4e-3  # s
 SIGMA = np.repeat([1.75e-4, 5e-5], 3)  # rad and m, of a camera
+KNOWN = np.zeros((6, 6))  # rad^2 and m^2, what the model of the robot is off by
 FREE, LOADED = 80e-6**2, 5e-6**2  # rad^2, what a gear may be off by between its flanks and under load
 
 MOVING = np.full(6, 0.1)  # rad/s
@@ -33,7 +34,7 @@ def shown(
     rng, rows = np.random.default_rng(0), []
     for k in range(ticks):
         r = J @ off + noise * SIGMA * rng.normal(size=6)
-        feedback.hear(memory, J, r, 1.0 / SIGMA**2, variances, np.full(6, speed), PERIOD * k)
+        feedback.hear(memory, J, r, 1.0 / SIGMA**2, KNOWN, variances, np.full(6, speed), PERIOD * k)
         rows.append(feedback.lead(memory, PERIOD, PERIOD))
     return np.array(rows)
 
@@ -68,21 +69,46 @@ def test_at_rest_nearly_all_of_it_is_made_up_for_and_noise_moves_the_tip_by_a_te
     assert left.std(axis=0).max() < SIGMA[3] / 10.0
 
 
-def test_the_filter_is_that_of_the_textbook(J):
-    """Against a Kalman filter in matrices, whose gain takes the six numbers of a sample at once."""
+@pytest.mark.parametrize("by_model", [0.0, 0.2])  # of the camera's variance
+def test_the_filter_is_that_of_the_textbook(J, by_model):
+    """Against a Kalman filter in matrices; what the model is off by is noise that lasts, of more variance."""
     feedback, memory = started(share=0.3)
     variances, kept = np.linspace(1.0, 2.0, 6) * FREE, np.exp(-PERIOD / 0.1)
     rng, x, P = np.random.default_rng(1), np.zeros(6), np.zeros((6, 6))
+    by_model = by_model * np.outer(SIGMA, SIGMA) * np.corrcoef(rng.normal(size=(6, 20)))
     for k in range(1, 30):
         r = SIGMA * rng.normal(size=6)
         x, P = kept * x, kept**2 * P + np.diag((1.0 - kept**2) * 0.3 * variances)
         if k == 1:
             P = np.diag(0.3 * variances) * (1.0 - np.exp(-2.0 * PERIOD / 0.1))
-        gain = P @ J.T @ np.linalg.inv(J @ P @ J.T + np.diag(SIGMA**2))
+        R = np.diag(SIGMA**2) + (1.0 + 2.0 * 0.1 / PERIOD) * by_model
+        gain = P @ J.T @ np.linalg.inv(J @ P @ J.T + R)
         x, P = x + gain @ (r - J @ x), P - gain @ J @ P
-        feedback.hear(memory, J, r, 1.0 / SIGMA**2, variances, MOVING, PERIOD * k)
+        feedback.hear(memory, J, r, 1.0 / SIGMA**2, by_model, variances, MOVING, PERIOD * k)
         np.testing.assert_allclose(memory.off, x, rtol=1e-9, atol=1e-15)
         np.testing.assert_allclose(memory.P, P, rtol=1e-9, atol=1e-22)
+
+
+def test_little_is_fed_back_while_the_robot_is_little_known(J):
+    """A camera shows what teeth and parameters are off by together; the latter are about to be learnt."""
+    off, aside = np.array([100e-6, 0.0, 0.0, 0.0, 0.0, 0.0]), []
+    for by_model in (0.0, 100e-6**2):  # rad^2, in the same joint
+        feedback, memory = started(share=0.3)
+        for k in range(200):
+            doubt = by_model * np.outer(J[:, 0], J[:, 0])
+            hear = 1.0 / SIGMA**2, doubt, np.full(6, FREE), MOVING, PERIOD * k
+            feedback.hear(memory, J, J @ off, *hear)
+        aside.append(memory.off[0])
+    assert aside[0] > 0.6 * off[0]
+    assert aside[1] < 0.2 * off[0]
+
+
+def test_so_many_samples_say_no_more_than_one_that_their_noise_is_as_that_of_an_angle_that_lasts():
+    """A constant is known from an Ornstein-Uhlenbeck process as well as from such noise."""
+    times, ones = PERIOD * np.arange(1000), np.ones(1000)
+    covariance = np.exp(-np.abs(times[:, None] - times) / 0.1)
+    exact = 1.0 / (ones @ np.linalg.solve(covariance, ones))
+    assert samples_alike(PERIOD) / 1000 == pytest.approx(exact, rel=0.1)  # but for both ends
 
 
 def test_what_was_seen_is_forgotten_where_the_camera_is_blind_and_after_a_dead_time(J):
@@ -98,7 +124,7 @@ def test_what_was_seen_is_forgotten_where_the_camera_is_blind_and_after_a_dead_t
 def test_a_sample_that_no_gear_explains_is_left_alone(J):
     feedback, memory = started()
     r = np.array([0.0, 0.0, 0.0, 5.0 * SIGMA[3], 0.0, 0.0])
-    feedback.hear(memory, J, r, 1.0 / SIGMA**2, np.full(6, FREE), MOVING, PERIOD)
+    feedback.hear(memory, J, r, 1.0 / SIGMA**2, KNOWN, np.full(6, FREE), MOVING, PERIOD)
     assert not memory.off.any()
 
 
