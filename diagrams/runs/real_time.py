@@ -15,8 +15,9 @@ from diagrams.record.played import measured_along, path_marks, played
 from diagrams.record.run_record import RunRecord, marks, write_event
 from diagrams.record.spool import Spool, SpooledLog
 from diagrams.runs.real_time_record import RealTimeRecord, fill_gaps, write_run_tick
-from diagrams.runs.simulation import guard_events, start_position
+from diagrams.runs.simulation import guard_events
 from diagrams.runs.standstill import Standstill
+from diagrams.runs.start import start_position
 from diagrams.runs.tick_ahead import TickAhead
 from diagrams.runs.undisturbed import undisturbed
 from diagrams.scenario.scenario import Scenario, ScenarioError

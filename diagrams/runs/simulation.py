@@ -15,6 +15,7 @@ from diagrams.record.log import GuardEvent, RunLog
 from diagrams.record.packed_log import PackedLog
 from diagrams.record.played import measured_along, path_marks, played
 from diagrams.runs.measurement import MeasurementRun
+from diagrams.runs.start import start_position
 from diagrams.scenario.controller_model import controller_model
 from diagrams.scenario.scenario import Scenario, ScenarioError
 from diagrams.servo import Controller, Servo, calibrated, law_name, learnt, predicted_tip
@@ -22,16 +23,12 @@ from diagrams.station import SimulatedStation, Station
 from diagrams.watching import Watch, make_watch
 from robots.description.calibration import is_same_robot
 from robots.description.model import RobotModel, load_robot
-from robots.dynamics.newton_inverse import InverseSolver, inverse_kinematics
 from systems.cell.events.station_events import check_events
-from systems.controller_model import ControllerModel
 from systems.feedforward import FEEDFORWARDS
 from systems.feedforward.joint_motion import Standing
 from systems.guard.guard import KINDS
-from systems.reference.paths import CartesianPath, make_path
+from systems.reference.paths import make_path
 
-_STEP = 4e-3  # s, between the poses at which a path is tried before it is run
-_SAME = 1e-6  # rad, between joints at the ends of a lap that winds none of them up
 _CHUNK = 0.2  # s of simulated time between two reports of progress
 _FRAME = 1.0 / 30.0  # s of simulated time between two pictures, where somebody looks on
 _LONGEST_HOLD = 30.0  # s, after which a run is over whose path is held
@@ -301,45 +298,6 @@ def nominal_robot(scenario: Scenario, robot: RobotModel | None) -> RobotModel:
             f"--set robot={robot.calibration.of} puts that one there"
         )
     return load_robot(scenario.robot)
-
-
-def start_position(model: ControllerModel, scenario: Scenario, path: CartesianPath) -> np.ndarray:
-    """Motor positions in rad at which the robot, as the controller knows it, is off by the initial error.
-
-    The whole path is tried first, so that an unreachable one is refused before anything moves.
-
-    Raises:
-        ScenarioError: if the start or the path is out of reach.
-    """
-    inverse = inverse_kinematics(model.robot, model.payload)
-    home = np.deg2rad(scenario.home_deg)
-    try:
-        q_path = _followed(inverse, path, home)
-        X_WE = path.sample(0.0)[0].copy()
-        # The error is wanted minus true.
-        X_WE[:3, 3] -= 1e-3 * scenario.initial_error_mm
-        return inverse.nearest(X_WE, q_path[0])
-    except ValueError as error:
-        raise ScenarioError(
-            f"{model.robot.name} cannot follow the path '{scenario.reference.path.kind}': {error}"
-        ) from error
-
-
-def _followed(inverse: InverseSolver, path: CartesianPath, home: np.ndarray) -> np.ndarray:
-    """Joint positions in rad along a path, (n, 6), from the branch nearest to ``home``.
-
-    Of laps only the first one is followed if the joints end it where they began it: the others repeat it.
-
-    Raises:
-        ValueError: if the path is out of reach.
-    """
-    if len(path.lap_starts) > 1:
-        begin = np.arange(0.0, path.path_start, _STEP)
-        times = np.concatenate([begin, np.arange(path.path_start, path.lap_end, _STEP), [path.lap_end]])
-        q = inverse.along(path.sample(times)[0], home)
-        if np.abs(q[-1] - q[len(begin)]).max() < _SAME:
-            return q
-    return inverse.along(path.sample(np.arange(0.0, path.duration, _STEP))[0], home)
 
 
 def guard_events(times: np.ndarray, counts: np.ndarray) -> list[GuardEvent]:

@@ -10,7 +10,7 @@ from pydrake.systems.framework import DiagramBuilder
 
 from diagrams.integration import Integration
 from diagrams.record.packed_log import PackedLog
-from diagrams.runs.simulation import start_position
+from diagrams.runs.start import start_position
 from diagrams.scenario.controller_model import controller_model
 from diagrams.scenario.scenario import Scenario
 from diagrams.station import Station

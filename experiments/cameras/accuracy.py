@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from diagrams.runs.simulation import start_position
+from diagrams.runs.start import start_position
 from diagrams.scenario.controller_model import controller_model
 from diagrams.scenario.scenario import Scenario
 from robots.description.model import RobotModel

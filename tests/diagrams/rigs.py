@@ -6,7 +6,8 @@ import numpy as np
 from pydrake.systems.analysis import Simulator
 from pydrake.systems.framework import DiagramBuilder
 
-from diagrams.runs.simulation import Experiment, start_position
+from diagrams.runs.simulation import Experiment
+from diagrams.runs.start import start_position
 from diagrams.scenario.scenario import Scenario, load_scenario
 from diagrams.servo import Servo
 from robots.description.model import load_robot

@@ -7,7 +7,7 @@ import numpy as np
 from pydrake.systems.analysis import Simulator
 from pydrake.systems.framework import DiagramBuilder
 
-from diagrams.runs.simulation import start_position
+from diagrams.runs.start import start_position
 from diagrams.servo import Servo, learnt
 from experiments.bench.mujoco_cell.arm import Wrong, drawn_arm, true_arm
 from experiments.bench.mujoco_cell.cell import Camera, Drives, MujocoCell

@@ -1,10 +1,12 @@
 """Where a run starts: the path is tried before, all of it, and laps that repeat the first one only once."""
 
 import numpy as np
+import pytest
 
-from diagrams.runs.simulation import start_position
+from diagrams.runs.simulation import run
+from diagrams.runs.start import start_position
 from diagrams.scenario.controller_model import controller_model
-from diagrams.scenario.scenario import Scenario
+from diagrams.scenario.scenario import Scenario, ScenarioError
 from robots.description.model import load_robot
 from systems.reference.cartesian_path import CartesianPath
 from systems.reference.paths import make_path
@@ -32,6 +34,16 @@ def test_laps_that_repeat_the_first_one_are_tried_once():
 
 
 def test_laps_that_wind_a_joint_up_are_all_tried():
-    _, poses = started(scenario("nominal", TURNING))
-    _, of_three = started(scenario("nominal", TURNING, "reference.laps=3"))
-    assert of_three > 2 * poses
+    """From -400 to 400 degrees joint 6 has room for one turn from where the tool is wanted first."""
+    started(scenario("nominal", TURNING))
+    with pytest.raises(ScenarioError, match=r"joint 4 would turn by 180 deg at once"):
+        started(scenario("nominal", TURNING, "reference.laps=2"))
+
+
+def test_a_joint_that_has_to_turn_once_begins_where_it_can():
+    """From where it is nearest to home it would come to its limit halfway."""
+    log = run(scenario("nominal", TURNING, "reference.timing=polynomial"), "open_loop")
+    turned = np.ptp(log.joint_position, axis=0)
+    assert turned[5] == pytest.approx(2.0 * np.pi, rel=0.01)
+    assert turned[:5].max() < 0.1
+    assert log.guard_counts["no_command"] == 0
