@@ -98,10 +98,9 @@ class RealTimeRun:
         self._context: Context = self.diagram.CreateDefaultContext()
         self._ahead = TickAhead(self.diagram, self.station)
         self._joints = JointSample()  # of the newest tick
-        self._next = 0  # the tick that the context stands before
+        self._next, self._last_exposure = 0, -math.inf  # tick that the context stands before; s of the path
         self._reports = Spool(2 + 2 * NUM_JOINTS)  # tick, stamp in s, positions in rad, efforts in N m
         self._exposures = Spool(17)  # s of the path, and the pose
-        self._last_exposure = -math.inf  # s of the path
         self._tool = ToolWatch(self.servo.model.robot)
         self._pauses: list[tuple[float, float]] = []
         self._events: list[GuardEvent] = []

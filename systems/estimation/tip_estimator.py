@@ -201,6 +201,7 @@ class TipEstimator:
         shapes = model.gear_shapes(pair.theta, pair.states)
         seen = pair.theta, pair.loads, pair.twist, pair.X_WE
         r, H, gears, J = model.innovation(self._constants_at(memory, x), x, seen, shapes, since_first)
+        by_gears = model.gear_variances(x, memory.P, pair.loads, pair.states)
         weight, event, innovations = 1.0 / (1.0 + (pair.unrest / config.calm) ** 2), None, memory.innovations
         if memory.count[0] <= config.test_after and since_first <= config.test_at_latest:
             if self._innovations.is_false_start(innovations, r, H, lambda: memory.P @ H.T):
@@ -210,7 +211,7 @@ class TipEstimator:
             if verdict.is_outlier:
                 return None
             if weight > _CALM_WEIGHT and self._innovations.measure_noise(innovations, r):
-                self._unmodelled.add(memory.unmodelled, r, lambda: self._doubts(memory, H, J, pair))
+                self._unmodelled.add(memory.unmodelled, r, lambda: self._doubts(memory, H, J, by_gears))
             if verdict.has_jumped or verdict.has_drifted:
                 self._unmodelled.rest(memory.unmodelled)
             if verdict.is_calm:
@@ -239,7 +240,6 @@ class TipEstimator:
                 if found == TOOL_DISPLACED and memory.after_step.is_event[0]:
                     size = self._displacement.size(memory.after_step, found, pair.X_WE[:3, 3])
                     event = Event(found, size, size)
-        by_gears = model.gear_variances(x, memory.P, pair.loads, pair.states)
         if model.has_gear_errors and weight > _CALM_WEIGHT:
             shown = J, r, memory.noise.weights
             model.gear_errors.weigh(memory.against, *shown, pair.others)
@@ -339,11 +339,10 @@ class TipEstimator:
         if self._keyframes.invert(memory.keyframes, memory.A_open, memory.P):
             memory.taken[0] = 0.0
 
-    def _doubts(self, memory: SimpleNamespace, H: np.ndarray, J: np.ndarray, pair: Pair) -> Doubts:
+    def _doubts(self, memory: SimpleNamespace, H: np.ndarray, J: np.ndarray, by_gears: np.ndarray) -> Doubts:
         memory.is_busy[0] = 1.0
         factor, by_model = self.variance_factor(memory), H @ memory.P @ H.T
         noise, by_model = factor * memory.noise.variances, max(1.0, factor) * by_model
-        by_gears = self.model.gear_variances(self.x(memory), memory.P, pair.loads, pair.states)
         return doubts(noise, by_model, J, by_gears)
 
     def _doubt(self, memory: SimpleNamespace) -> None:

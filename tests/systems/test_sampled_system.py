@@ -47,5 +47,5 @@ def every_system(diagram: Diagram) -> list[System]:
 def test_no_system_of_a_run_is_asked(law):
     diagram = Experiment(scenario("misaligned"), law).diagram
     own = [each for each in every_system(diagram) if type(each).__module__.startswith("systems.")]
-    assert len(own) > 5
+    assert len(own) >= 5
     assert all(isinstance(each, SampledSystem) for each in own)

@@ -67,7 +67,7 @@ def test_ctrl_c_while_python_ends_shows_no_traceback():
 
 
 WORK = """
-import time
+import signal, time
 from experiments.cli.workers import in_processes
 
 def work(job, progress):
@@ -76,6 +76,7 @@ def work(job, progress):
         progress(0.02 * share)
 
 if __name__ == "__main__":
+    signal.signal(signal.SIGINT, signal.default_int_handler)  # which is ignored in the background
     in_processes(work, range(50), 1, lambda share: share and print(share, flush=True))
 """
 
