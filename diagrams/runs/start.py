@@ -5,14 +5,14 @@ from contextlib import suppress
 import numpy as np
 
 from diagrams.scenario.scenario import Scenario, ScenarioError
-from robots.description.model import RobotModel
+from robots.description.model import NUM_JOINTS, RobotModel
 from robots.dynamics.newton_inverse import InverseSolver, inverse_kinematics
 from robots.kinematics.analytic_inverse import UnreachableError
 from systems.controller_model import ControllerModel
 from systems.reference.paths import CartesianPath
+from systems.servo.law import LARGEST_STEP
 
 _STEP = 4e-3  # s, between the poses at which a path is tried before it is run
-_JUMP = 0.4  # rad in such a step, 100 rad/s, where a law refuses to go on, too
 _SAME = 1e-6  # rad, between joints at the ends of a lap that winds none of them up
 
 
@@ -41,17 +41,17 @@ def start_position(model: ControllerModel, scenario: Scenario, path: CartesianPa
 def _followed_in_full(
     inverse: InverseSolver, path: CartesianPath, home: np.ndarray, robot: RobotModel
 ) -> np.ndarray:
-    """`_followed`; where a joint ends up at its limit, from a start at which it is a turn away from that."""
-    turn = 2.0 * np.pi
-    can_turn = np.flatnonzero(robot.upper - robot.lower > turn)[::-1]
+    """`_followed`; where joint 6 ends up at its limit, from a start at which it is a turn away from that."""
     try:
         return _followed(inverse, path, home)
     except UnreachableError:
         raise
     except ValueError:
-        for further in [sign * turn * np.eye(len(home))[j] for j in can_turn for sign in (1.0, -1.0)]:
+        for turn in (2.0 * np.pi, -2.0 * np.pi):
+            start = home + turn * (np.arange(NUM_JOINTS) == NUM_JOINTS - 1)
             with suppress(ValueError):
-                return _followed(inverse, path, home + further)
+                if robot.upper[-1] - robot.lower[-1] > abs(turn):
+                    return _followed(inverse, path, start)
         raise
 
 
@@ -74,7 +74,7 @@ def _followed(inverse: InverseSolver, path: CartesianPath, home: np.ndarray) -> 
 
 def _along(inverse: InverseSolver, path: CartesianPath, times: np.ndarray, home: np.ndarray) -> np.ndarray:
     q = inverse.along(path.sample(times)[0], home)
-    jumps = np.flatnonzero(np.linalg.norm(np.diff(q, axis=0), axis=1) > _JUMP)
+    jumps = np.flatnonzero(np.linalg.norm(np.diff(q, axis=0), axis=1) > LARGEST_STEP)
     if len(jumps):
         k = int(jumps[0])
         turns = np.abs(q[k + 1] - q[k])

@@ -243,10 +243,10 @@ class TipModel:
         """
         if not self.has_gear_errors:
             return np.empty(0)
-        sizes = x[self.E], self.sigma[self.E] ** 2 * P.diagonal()[self.E]
+        known = x[self.E], self.sigma[self.E] ** 2 * P.diagonal()[self.E]
         by_load = loads[1:, :6] * self.sigma[self.M, None]
         torque = self.total_load(x, loads[None])[0, :6], (by_load * (P[self.M, self.M] @ by_load)).sum(axis=0)
-        sizes = sizes[0].reshape(NUM_SHAPES, 6), sizes[1].reshape(NUM_SHAPES, 6)
+        sizes = known[0].reshape(NUM_SHAPES, 6), known[1].reshape(NUM_SHAPES, 6)
         return self.gear_errors.variances(sizes, states, torque, self._gear_error)
 
     def predict(

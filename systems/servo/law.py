@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     from robots.kinematics.compiled import CompiledKinematics
 
 # rad in one tick: ten times what the fastest joint can do, far less than from branch to branch
-_LARGEST_STEP = 0.4
+LARGEST_STEP = 0.4
 _JOINTS_SIZE = 18  # positions, velocities, velocities of the tick before
 _NO_COMMAND = np.full(NUM_JOINTS, np.nan)
 # The groups of the state, each a port but for what the law itself remembers.
@@ -328,5 +328,5 @@ def check_branch_continuity(step: np.ndarray) -> None:
 
 def check_step(squared: float) -> None:
     """The same for the square of a step in rad^2. Raises UnreachableError."""
-    if squared > _LARGEST_STEP**2:
+    if squared > LARGEST_STEP**2:
         raise UnreachableError("the path is out of reach, or goes on only on another branch")

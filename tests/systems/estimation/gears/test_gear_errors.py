@@ -132,10 +132,7 @@ def test_gears_may_be_off_by_the_side_of_teeth_that_nearly_nothing_pushes(robot,
     """Against teeth whose side is drawn, by a push that is known to no more than what hysteresis does."""
     gears, turned, spring = GearErrors(robot), 0.3, 0.1 * np.asarray(robot.joint_stiffness)
     carried = spring * 3.5e-4 * turned  # N m, before they cross
-    sizes, states = (
-        np.zeros((2, 7, 6)),
-        np.concatenate((np.full(6, turned), np.full(6, 1.0), np.full(6, -0.4))),
-    )
+    sizes, states = np.zeros((2, 7, 6)), np.repeat([turned, 1.0, -0.4], 6)
     sizes[0, 5], sizes[0, 6], sizes[1, 6] = 20e-6, 50e-6, (50e-6 * unknown) ** 2
     crossing = spring * 2.0 * np.sqrt(70e-6**2 + sizes[1, 6])  # N m, while they do
     torque = load * carried, (unknown * carried) ** 2
@@ -145,6 +142,7 @@ def test_gears_may_be_off_by_the_side_of_teeth_that_nearly_nothing_pushes(robot,
     held = 50e-6 * (1.0 + unknown * rng.normal(size=(20000, 1)))
     expected = np.mean((-np.sign(push) * (20e-6 + held) - (20e-6 - 0.4 * held)) ** 2, axis=0)
     found = gears.variances((sizes[0], sizes[1]), states, torque, 0.0)
+    # A mean of 20000 draws, of squares that scatter by up to three times their mean
     np.testing.assert_allclose(found, expected, rtol=0.05, atol=(1e-6) ** 2)
     least = gears.variances((sizes[0] * 0.0, sizes[0] * 0.0), states, torque, 5e-5)
     np.testing.assert_allclose(least, (5e-6) ** 2)
