@@ -244,8 +244,8 @@ class TipEstimator:
             shown = J, r, memory.noise.weights
             model.gear_errors.weigh(memory.against, *shown, pair.others)
             if self.gear_feedback.acts:
-                doubts = H @ memory.P @ H.T, by_gears
-                self.gear_feedback.hear(memory.loose, *shown, *doubts, pair.motion[:6], pair.time)
+                unsure = H @ memory.P @ H.T, by_gears
+                self.gear_feedback.hear(memory.loose, *shown, *unsure, pair.motion[:6], pair.time)
         if self._noise.hear(memory.noise, r, H, memory.xi, pair):
             self._weigh_anew(memory)
         seen_of_gears = self._unmodelled.joint_variances(memory.unmodelled, by_gears)[: len(by_gears)]
