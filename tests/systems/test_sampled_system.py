@@ -1,6 +1,8 @@
 """What happens at ticks is left alone by the integrator between them."""
 
+import numpy as np
 import pytest
+from pydrake.common.value import AbstractValue
 from pydrake.systems.analysis import Simulator
 from pydrake.systems.framework import Diagram, DiagramBuilder, LeafSystem, System
 from pydrake.systems.primitives import Integrator
@@ -33,6 +35,35 @@ def test_a_sampled_system_begins_without_ports_and_state():
     system = SampledSystem()
     assert system.num_input_ports() == system.num_output_ports() == 0
     assert system.CreateDefaultContext().num_total_states() == 0
+
+
+@pytest.mark.parametrize("kind", ["vector", "abstract"])
+@pytest.mark.parametrize("said", [True, False], ids=["all sources", "nothing said"])
+def test_an_output_of_all_sources_depends_on_the_inputs(kind: str, said: bool):
+    class Doubled(SampledSystem):
+        def __init__(self):
+            super().__init__()
+            port = self.DeclareVectorInputPort("u", 1)
+            sources = {self.all_sources_ticket()} if said else None
+
+            def calc(context, output):
+                (output.SetFromVector if kind == "vector" else output.set_value)(2 * port.Eval(context))
+
+            if kind == "vector":
+                self.DeclareVectorOutputPort("y", 1, calc, sources)
+            else:
+                self.DeclareAbstractOutputPort("y", lambda: AbstractValue.Make(np.zeros(1)), calc, sources)
+
+    builder = DiagramBuilder()
+    system = builder.AddSystem(Doubled())
+    assert system.HasAnyDirectFeedthrough()
+    builder.ExportInput(system.get_input_port())
+    builder.ExportOutput(system.get_output_port())
+    diagram = builder.Build()
+    context = diagram.CreateDefaultContext()
+    for value in (1.0, 3.0):
+        diagram.get_input_port().FixValue(context, [value])
+        assert diagram.get_output_port().Eval(context) == 2 * value
 
 
 def every_system(diagram: Diagram) -> list[System]:

@@ -51,7 +51,7 @@ class ChangingDelay(SampledSystem):
         self._inputs = [self.DeclareVectorInputPort(name, NUM_JOINTS) for name in names]
         self._ring = self.DeclareDiscreteState(np.full(self._kept * _WIDTH, np.nan))
         for index, name in enumerate(names):
-            self.DeclareVectorOutputPort(name, NUM_JOINTS, self._part(index), {self.all_sources_ticket()})
+            self.DeclareVectorOutputPort(name, NUM_JOINTS, self._part(index))
         self.DeclarePeriodicDiscreteUpdateEvent(period, 0.0, self._keep)
 
     def set_at_rest(self, context: Context, theta: np.ndarray) -> None:
