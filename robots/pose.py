@@ -17,7 +17,7 @@ Floats = tuple[float, float, float]
 Rows = Sequence[Sequence[float]]
 
 # Below this cosine of beta the ZYX angles alpha and gamma cannot be told apart.
-_GIMBAL_LOCK = 1e-13  # far above rounding, far below what anyone measures
+GIMBAL_LOCK = 1e-13  # far above rounding, far below what anyone measures
 # Where the sine of the angle is this small (and the angle not), it no longer shows the axis accurately.
 _HALF_TURN_SINE = 1e-2
 
@@ -83,7 +83,7 @@ def zyx_from_rotation(rotation: np.ndarray) -> np.ndarray:
     r = np.asarray(rotation)
     cos_beta = np.hypot(r[..., 0, 0], r[..., 1, 0])
     regular = np.arctan2(r[..., 1, 0], r[..., 0, 0])
-    alpha = np.where(cos_beta > _GIMBAL_LOCK, regular, np.arctan2(-r[..., 0, 1], r[..., 1, 1]))
+    alpha = np.where(cos_beta > GIMBAL_LOCK, regular, np.arctan2(-r[..., 0, 1], r[..., 1, 1]))
     sa, ca = np.sin(alpha), np.cos(alpha)
     gamma = np.arctan2(sa * r[..., 0, 2] - ca * r[..., 1, 2], ca * r[..., 1, 1] - sa * r[..., 0, 1])
     return np.stack([alpha, np.arctan2(-r[..., 2, 0], cos_beta), gamma], -1)
@@ -93,7 +93,7 @@ def zyx_angles(rows: Rows) -> Floats:
     """`zyx_from_rotation` of one rotation given as rows; what follows in a row, as in a pose, is ignored."""
     (r00, r01, r02, *_), (r10, r11, r12, *_), (r20, *_), *_ = rows
     cos_beta = math.hypot(r00, r10)
-    alpha = math.atan2(r10, r00) if cos_beta > _GIMBAL_LOCK else math.atan2(-r01, r11)
+    alpha = math.atan2(r10, r00) if cos_beta > GIMBAL_LOCK else math.atan2(-r01, r11)
     sa, ca = math.sin(alpha), math.cos(alpha)
     gamma = math.atan2(sa * r02 - ca * r12, ca * r11 - sa * r01)
     return alpha, math.atan2(-r20, cos_beta), gamma

@@ -6,8 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from robots.configuration.quantity import quantity
-from robots.pose import angular_velocity, euler_difference, zyx_angles
-from systems.servo.law import LawInput, LawOutput, ServoLaw, check_branch_continuity
+from systems.servo.law import LawInput, LawOutput, ServoLaw, check_step
 from systems.servo.law_config import LawConfig
 
 
@@ -38,31 +37,25 @@ class Pbvs(ServoLaw):
 
     def step(self, moment: LawInput, memory: np.ndarray) -> LawOutput:
         """A velocity along the path and towards it, from where the joints are."""
-        rows, J = self.kinematics.rows_and_jacobian(memory)
-        rates = self.kernels.follow_path(moment.X_WD, moment.V_WD, rows, J)
-        check_branch_continuity(rates[:, 0])
-        if self.kernels.closeness(J) > 0.0:
-            rates = self.kernels.bounded_path(moment.X_WD, moment.V_WD, rows, J)
-        velocity = rates[:, 1]
-        q_d = memory + rates[:, 0] + self.period * velocity
-        rows, J = self.kinematics.rows_and_jacobian(moment.position)
-        correction = np.empty(6)
-        self.kernels.error(rows, moment.X_WD, correction)
-        if moment.measured is not None:
-            twist = self.within_limits(self._feedback(*moment.measured), correction)
-            if self.kernels.closeness(J) > 0.0:
-                back = self.config.translation * (memory - moment.position)
-                added = self.kernels.bounded_rates(J, twist, back)
-            else:
-                added = self.kernels.robust_solve(J, twist[:, None])[:, 0]
-            fastest = math.radians(self.config.correction_speed_limit_deg_s)
-            largest = max(map(abs, added.tolist()))
-            velocity = velocity + added * min(1.0, fastest / max(largest, 1e-12))
+        config, kinematics, kernels = self.config, self.kinematics, self.kernels
+        nominal = kinematics.rows_and_jacobian(memory)
+        reached = kinematics.rows_and_jacobian(moment.position)
+        q_d, velocity, correction = np.empty(6), np.empty(6), np.empty(6)
+        step = kernels.pbvs(
+            moment.X_WD,
+            moment.V_WD,
+            *(moment.measured or (moment.X_WD, moment.X_WD)),
+            moment.measured is not None,
+            nominal,
+            reached,
+            memory,
+            moment.position,
+            (config.rotation, config.translation),
+            (self.angle_limit, config.correction_limit, math.radians(config.correction_speed_limit_deg_s)),
+            self.period,
+            q_d,
+            velocity,
+            correction,
+        )
+        check_step(step)
         return LawOutput(moment.position + self.period * velocity, velocity, correction, q_d)
-
-    def _feedback(self, wanted: np.ndarray, seen: np.ndarray) -> np.ndarray:
-        zyx = zyx_angles(seen.tolist())
-        w = angular_velocity(zyx, euler_difference(zyx_angles(wanted.tolist()), zyx))
-        twist = np.empty(6)
-        twist[:3], twist[3:] = w, wanted[:, 3] - seen[:, 3]
-        return self.gains * twist

@@ -16,7 +16,7 @@ from systems.guard.guard import GuardConfig
 from systems.reference.paths import ReferenceConfig, make_path
 from systems.samples import PoseSample
 from systems.servo import LAWS, LawConfig
-from systems.servo.kernels.steps import sine_feedback
+from systems.servo.kernels.parts import sine_feedback
 from tests.systems.rigs import PERIOD, LawRig, pose
 
 ROBOT = load_robot("irb1200")
