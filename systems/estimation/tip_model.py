@@ -243,11 +243,11 @@ class TipModel:
         """
         if not self.has_gear_errors:
             return np.empty(0)
-        known = x[self.E], self.sigma[self.E] ** 2 * P.diagonal()[self.E]
-        by_load = loads[1:, :6] * self.sigma[self.M, None]
-        torque = self.total_load(x, loads[None])[0, :6], (by_load * (P[self.M, self.M] @ by_load)).sum(axis=0)
-        sizes = known[0].reshape(NUM_SHAPES, 6), known[1].reshape(NUM_SHAPES, 6)
-        return self.gear_errors.variances(sizes, states, torque, self._gear_error)
+        sizes, torque = np.empty((2, NUM_SHAPES, NUM_JOINTS)), np.empty((2, NUM_JOINTS))
+        kernels.gears.known(x, self.sigma, P, (self.M.start, self.E.start), loads, sizes, torque)
+        return self.gear_errors.variances(
+            (sizes[0], sizes[1]), states, (torque[0], torque[1]), self._gear_error
+        )
 
     def predict(
         self,

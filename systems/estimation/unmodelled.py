@@ -7,6 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from robots.kinematics.forward import robust_inverse
+from systems.estimation import kernels
 from systems.estimation.memory import Layout
 
 _BLOCK = 24  # samples of a mean: a tenth of a second at 4 ms, in which a robot hardly changes what it lacks
@@ -103,8 +104,9 @@ class Unmodelled:
         """
         if not self._joints:
             return np.zeros(6)
-        share = 1.0 + memory.excess[2:] / np.maximum(memory.by_joints, 1e-300)
-        return by_gears * np.clip(share, _LEAST_OF_GEARS, 1.0) + _mean(memory)[2:]
+        sums, out = (memory.excess[2:], memory.weights[2:], memory.by_joints), np.empty(self._joints)
+        kernels.gears.seen(by_gears, *sums, _LEAST_OF_GEARS, out)
+        return out
 
 
 def _rows(to_joints: np.ndarray) -> np.ndarray:

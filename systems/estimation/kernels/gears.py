@@ -159,6 +159,46 @@ def variances(compliance, gap, sizes, states, torque, least, out):
 
 
 @compiled
+def known(x, sigma, P, starts, loads, sizes, torque):
+    """What is known of the shapes' sizes and of what gears carry; see `TipModel.gear_variances`.
+
+    Args:
+        x, P: the unknowns and their covariance in units of their spreads ``sigma``.
+        starts: where the load and the sizes begin among them.
+        loads: of one instant, (m + 1, at least n), the first without the load.
+        sizes: of the shapes in rad and their variances, (2, k, n), are written.
+        torque: of the gears in N m and its variances, (2, n), are written.
+    """
+    load, size = starts
+    for k in range(sizes.shape[1]):
+        for j in range(sizes.shape[2]):
+            i = size + k * sizes.shape[2] + j
+            sizes[0, k, j], sizes[1, k, j] = x[i], sigma[i] ** 2 * P[i, i]
+    for j in range(torque.shape[1]):
+        torque[0, j], torque[1, j] = loads[0, j], 0.0
+        for i in range(len(loads) - 1):
+            torque[0, j] += x[load + i] * loads[1 + i, j]
+            for k in range(len(loads) - 1):
+                both = sigma[load + i] * P[load + i, load + k] * sigma[load + k]
+                torque[1, j] += loads[1 + i, j] * both * loads[1 + k, j]
+
+
+@compiled
+def seen(by_gears, excess, weights, by_joints, least, out):
+    """What gears may be off by, as far as it is seen, rad^2, (n,); see `Unmodelled.joint_variances`.
+
+    Args:
+        by_gears: what they are said to be off by, (n,).
+        excess, weights, by_joints: sums over blocks, (n,) each.
+        least: share of what they are said to be off by that is left.
+        out: is written.
+    """
+    for j in range(len(out)):
+        share = 1.0 + excess[j] / max(by_joints[j], 1e-300)
+        out[j] = by_gears[j] * min(max(share, least), 1.0) + max(excess[j], 0.0) / max(weights[j], 1e-300)
+
+
+@compiled
 def follow(J, r, weights, usual, by_model, variances, kept, off, P):
     """Takes one sample into what joints are off by; see `GearFeedback.hear`.
 
