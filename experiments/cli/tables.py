@@ -10,6 +10,7 @@ from rich.markup import escape
 from rich.table import Table
 
 from experiments.cli.console import print_table
+from experiments.metrics.laps import SLOWED
 from experiments.report.error_rows import AXES, KINDS, error_row, format_cell, is_best, smallest_of_columns
 from experiments.report.style import law_colors, law_title
 
@@ -33,6 +34,8 @@ def print_summary(console: Console, result: Mapping[str, Any]) -> None:
     if any("laps" in run for run in result["runs"].values()):
         print_table(console, lap_table(result))
     for law, run in result["runs"].items():
+        if line := slowed_line(run):
+            console.print(f"[italic]{escape(law_title(law))}: {line}[/italic]")
         for line in learnt_lines(run.get("learnt") or {}):
             console.print(f"[italic]{escape(law_title(law))}: {escape(line)}[/italic]")
     if any(count for run in result["runs"].values() for count in run["guard"].values()):
@@ -87,6 +90,16 @@ def lap_table(result: Mapping[str, Any]) -> Table:
         ]
         table.add_row(f"[{colors[law]}]{escape(law_title(law))}[/]", *cells)
     return table
+
+
+def slowed_line(run: Mapping[str, Any]) -> str:
+    """How many times as long as planned a run took for its path; empty if no longer."""
+    whole = run.get("times_planned")
+    if whole is None or whole <= SLOWED:
+        return ""
+    laps = [lap["times_planned"] for lap in run.get("laps", [])]
+    each = f" (laps: {', '.join(map(format_cell, laps))})" if laps else ""
+    return f"the path took {format_cell(whole)} times as long as planned{each}"
 
 
 def learnt_lines(learnt: Mapping[str, Any]) -> list[str]:

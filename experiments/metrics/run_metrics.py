@@ -15,7 +15,7 @@ import numpy as np
 
 from diagrams.record.log import RunLog
 from experiments.metrics.iso9283 import iso_9283
-from experiments.metrics.laps import lap_metrics
+from experiments.metrics.laps import lap_metrics, times_planned
 from robots.pose import pose_error
 
 STATIC_WINDOW = 0.5  # s, the end of the dwell over which the static error is the mean
@@ -161,6 +161,8 @@ def summary(scenario_name: str, logs: Comparison) -> dict[str, Any]:
         runs[law]["guard"] = {kind: int(first.guard_counts[kind]) for kind in sorted(first.guard_counts)}
         if first.lap_starts:
             runs[law]["laps"] = lap_metrics(first, pose_errors(first, judged_source(first)))
+        if first.path_time is not None:
+            runs[law]["times_planned"] = times_planned(first, first.path_start, first.dwell_start)
         if first.learnt is not None:
             runs[law]["learnt"] = first.learnt
     return _rounded({"scenario": scenario_name, "runs": runs})

@@ -17,7 +17,7 @@ from robots.description.model import RobotModel
 
 MAGNIFICATIONS = (1, 2, 5, 10, 20, 50, 100, 200, 500)
 MAGNIFIED_SHARE = 0.25  # of the path's extent that the largest deviation may fill when the page opens
-LAP_COLUMNS = {"max_norm_mm": "mm", "max_angle_deg": "°", "rms_mm": "rms mm"}
+LAP_COLUMNS = {"max_norm_mm": "mm", "max_angle_deg": "°", "rms_mm": "rms mm", "duration_s": "s"}
 LISTED_EVENTS = 100  # per law
 SOURCES = {
     "true": "True: what a perfect instrument would see",

@@ -14,6 +14,7 @@ from experiments.cli.console import BROKEN_OFF, count, fail, print_note, print_t
 from experiments.cli.json_output import human_console, json_output
 from experiments.cli.option_limits import at_least
 from experiments.cli.options import JobsOption, JsonOption, RobotOption, SchedulerOption, SetOption
+from experiments.metrics.laps import SLOWED
 from experiments.robustness.cases import CASES
 from experiments.robustness.contenders import contenders
 from experiments.robustness.study import Case, judged, run_trials, trials, with_calibrated_robots
@@ -130,14 +131,23 @@ def _print(console: Console, scenario: str, results: list[dict[str, Any]], title
         title_style="italic",
     )
     has_events = any("recovered_mm" in result for result in results)
+    ratios = [lap["times_planned"][0] for result in results for lap in result.get("laps", [])]
+    is_slowed = any(ratio > SLOWED for ratio in ratios)
     table.add_column("case" if only else "case, law", overflow="fold")
-    for name in ("lap", "mm", "°", "at rest mm", *(["mm after event"] if has_events else [])):
-        table.add_column(name, justify="right", no_wrap=name != "mm after event")
+    own = (
+        *(["planned time"] if is_slowed else []),
+        "at rest mm",
+        *(["mm after event"] if has_events else []),
+    )
+    for name in ("lap", "mm", "°", *own):
+        table.add_column(name, justify="right", no_wrap=name not in ("mm after event", "planned time"))
     for result in results:
         laps = result.get("laps", [])
         for number, lap in enumerate(laps, 1):
             is_last = number == len(laps)
             cells = [str(number), pair(lap["max_norm_mm"], 3), pair(lap["max_angle_deg"], 3)]
+            if is_slowed:
+                cells.append(f"× {pair(lap['times_planned'], 2)}")
             cells.append(pair(result["static_mm"], 4) if is_last else "")
             if has_events:
                 cells.append(pair(result["recovered_mm"], 3) if is_last and "recovered_mm" in result else "")

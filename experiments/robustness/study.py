@@ -186,7 +186,8 @@ def judged(rows: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
     """Worst and median of the rows of one law in one case.
 
     Returns:
-        ``laps``: per lap ``max_norm_mm`` and ``max_angle_deg``, then ``static_mm``, as (worst, median) each;
+        ``laps``: per lap ``max_norm_mm``, ``max_angle_deg`` and ``times_planned``, how many times the planned
+        time it took, then ``static_mm``, as (worst, median) each;
         ``recovered_mm``: largest distance after what happens, where something does, likewise;
         ``coverage``: share of samples in which the true tip was within the ellipsoid of 95 % of a law that
         predicts it, as (smallest of a run, of all samples);
@@ -207,7 +208,7 @@ def judged(rows: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
     laps = [
         {
             name: _worst_and_median([row["laps"][lap][name] for row in done])
-            for name in ("max_norm_mm", "max_angle_deg")
+            for name in ("max_norm_mm", "max_angle_deg", "times_planned")
         }
         for lap in range(len(done[0]["laps"]))
     ]

@@ -55,7 +55,7 @@ def test_what_is_set_for_all_outweighs_what_is_drawn():
     assert trial.load().robot == "ur10"
 
 
-def row(seed: int, laps: list[float], failure: str | None = None) -> dict:
+def row(seed: int, laps: list[float], failure: str | None = None, times_planned: float = 1.0) -> dict:
     if failure:
         return {"seed": seed, "path": "circle", "failure": failure}
     return {
@@ -65,7 +65,10 @@ def row(seed: int, laps: list[float], failure: str | None = None) -> dict:
         "max_norm_mm": max(laps),
         "static_mm": 0.1 * seed,
         "static_deg": 0.01 * seed,
-        "laps": [{"max_norm_mm": lap, "max_angle_deg": 0.1 * lap, "rms_mm": lap} for lap in laps],
+        "laps": [
+            {"max_norm_mm": lap, "max_angle_deg": 0.1 * lap, "rms_mm": lap, "times_planned": times_planned}
+            for lap in laps
+        ],
         "guard": {"velocity_limit": seed},
     }
 
@@ -100,6 +103,14 @@ def test_a_law_may_have_an_inverse_model_and_a_calibrated_robot():
     assert (all_of_it.law, all_of_it.feedforward, all_of_it.is_calibrated) == ("open_loop", "rigid", True)
     assert (known.law, known.is_calibrated) == ("pbvs", True)
     assert len({each.title for each in (plain, beside, all_of_it, known)}) == 4
+
+
+@pytest.mark.parametrize(("times", "is_said"), [(2.0, True), (1.001, False)])
+def test_a_table_says_how_much_longer_than_planned_a_lap_took(monkeypatch, times: float, is_said: bool):
+    rows = [row(seed, [2.0], times_planned=times) | {"case": "plain", "law": "open_loop"} for seed in (1, 2)]
+    monkeypatch.setattr(command, "run_trials", lambda *_: rows)
+    result = truetip("robustness", "--laws", "open_loop", "--seeds", 2)
+    assert ("× 2.00 (2.00)" in result.output) == ("planned" in result.output) == is_said
 
 
 def test_another_robot_gets_the_path_and_the_load_of_its_own_size():

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from experiments.bench.accuracy.rows import Row
+from experiments.metrics.laps import SLOWED
 
 HEAD = ("with", "runs", "lap 1, mm and °", "lap 2, mm and °", "at rest, mm", "within the ellipsoid")
 AFTER = "after the event, mm"
@@ -69,7 +70,8 @@ def read_results(file: Path) -> list[dict[str, Any]]:
 
 def _lap(lap: dict[str, tuple[float, float]]) -> str:
     (worst, median), (angle, _) = lap["max_norm_mm"], lap["max_angle_deg"]
-    return f"{worst:.3f} ({median:.3f}), {angle:.3f}"
+    said, (longest, usual) = f"{worst:.3f} ({median:.3f}), {angle:.3f}", lap["times_planned"]
+    return f"{said}, × {longest:.2f} ({usual:.2f})" if longest > SLOWED else said
 
 
 def _both(values: tuple[float, float], digits: int = 3) -> str:

@@ -16,8 +16,8 @@ ROWS = [row for section in SECTIONS.values() for row in section]
 
 def result(**more) -> dict:
     laps = [
-        {"max_norm_mm": (0.0402, 0.02), "max_angle_deg": (0.006, 0.004)},
-        {"max_norm_mm": (0.0099, 0.007), "max_angle_deg": (0.001, 0.001)},
+        {"max_norm_mm": (0.0402, 0.02), "max_angle_deg": (0.006, 0.004), "times_planned": (1.4, 1.2)},
+        {"max_norm_mm": (0.0099, 0.007), "max_angle_deg": (0.001, 0.001), "times_planned": (1.001, 1.0)},
     ]
     found = {"case": "plain", "runs": 20, "failures": [], "laps": laps, "static_mm": (0.0028, 0.0017)}
     return found | {"coverage": (0.944, 0.975)} | more
@@ -53,7 +53,10 @@ def test_a_table_has_a_line_for_each_case_with_the_worst_and_the_median():
         ]
     ).splitlines()
     assert [line.count("|") for line in lines] == [8] * 5
-    assert "`--cases plain`: as it is | 20 | 0.040 (0.020), 0.006 | 0.010 (0.007), 0.001 |" in lines[2]
+    assert (
+        "`--cases plain`: as it is | 20 | 0.040 (0.020), 0.006, × 1.40 (1.20) | 0.010 (0.007), 0.001 |"
+        in lines[2]
+    )
     assert "0.0028 (0.0017) |  | 0.975, 0.944" in lines[2]
     assert lines[3].startswith("| `--cases egm,tool-displaced` egm |")
     assert lines[4].startswith("| tool-displaced | 20 |  | 0.010")  # the first lap has the blow in it

@@ -5,7 +5,7 @@ import io
 import pytest
 from rich.console import Console
 
-from experiments.cli.tables import learnt_lines, print_summary
+from experiments.cli.tables import learnt_lines, print_summary, slowed_line
 
 
 def shown(width: int, law: str, laps: int) -> str:
@@ -33,6 +33,15 @@ def test_no_number_is_cut_off(width: int):
 
 def test_eighty_characters_are_enough_for_the_errors_of_the_law_with_the_longest_name():
     assert shown(80, "disturbance_observer", laps=2).count("Disturbance observer") == 6
+
+
+def test_a_path_that_took_longer_than_planned_is_said_to_have_and_another_one_is_not():
+    laps = [{"times_planned": 1.5}, {"times_planned": 1.0}]
+    said = slowed_line({"times_planned": 1.25, "laps": laps})
+    assert said == "the path took 1.250 times as long as planned (laps: 1.500, 1.000)"
+    assert (
+        slowed_line({"times_planned": 1.001}) == slowed_line({"times_planned": None}) == slowed_line({}) == ""
+    )
 
 
 def test_events_and_what_the_path_needs_are_said_in_units_of_the_trade():

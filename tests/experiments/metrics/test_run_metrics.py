@@ -218,6 +218,8 @@ def test_laps_and_what_was_learnt_stand_in_a_summary_only_where_they_are():
     assert {key: run[key] for key in plain} == plain
     assert [lap["max_norm_mm"] for lap in run["laps"]] == [0.0, 0.0]
     assert run["learnt"] == {"mass_kg": 7.0}
+    slowed = dataclasses.replace(log, path_time=0.5 * time)
+    assert summary("test", {"pbvs": [slowed]})["runs"]["pbvs"]["times_planned"] == pytest.approx(2.0)
 
 
 def test_the_cost_of_a_tick_is_told_beside_what_was_learnt_and_leaves_the_summary_alone():
