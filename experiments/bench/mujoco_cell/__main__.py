@@ -77,7 +77,7 @@ def main() -> None:
     if options.json:
         Path(options.json).write_text(json.dumps({"runs": rows}, indent=1, default=float), encoding="utf-8")
     table = Table(box=box.SIMPLE_HEAD)
-    for name in ("robot", "runs", "lap 1, mm and °", "lap 2, mm and °", "at rest, mm", "guard"):
+    for name in ("robot", "runs", "lap 1: mm, °, × planned time", "lap 2", "at rest, mm", "guard"):
         table.add_column(name, justify="left" if name == "robot" else "right")
     for robot in options.robots.split(","):
         own = [row for row in rows if row["robot"] == robot]

@@ -53,7 +53,8 @@ def run(job: CellRun, progress: Progress) -> dict[str, Any]:
 
     Returns:
         ``robot``, ``seed`` and ``path``; ``laps``, each ``max_norm_mm`` and ``max_angle_deg`` of the true
-        tip; ``static_mm``; ``guard``, how often it intervened; and what was ``learnt``.
+        tip and ``times_planned``, how many times the planned time it took; ``static_mm``; ``guard``, how
+        often it intervened; and what was ``learnt``.
     """
     plain, law = Case("plain", job.settings), Contender(LAW, LAW)
     scenario = Trial("everything", plain, law, job.seed, job.path, LAPS, job.robot).load()
@@ -86,16 +87,24 @@ def run(job: CellRun, progress: Progress) -> dict[str, Any]:
         progress(min(1.0, time / path.duration))
     table = np.array(rows)
     ends = [*path.lap_starts[1:], path.dwell_start]
-    laps = [
-        table[(table[:, 0] >= start) & (table[:, 0] < end), 1:].max(axis=0)
-        for start, end in zip(path.lap_starts, ends, strict=True)
-    ]
+    laps = []
+    for start, end in zip(path.lap_starts, ends, strict=True):
+        lap = table[(table[:, 0] >= start) & (table[:, 0] < end), 1:]
+        distance, angle = lap.max(axis=0)
+        took = len(lap) * station.period / (end - start)
+        laps.append(
+            {
+                "max_norm_mm": 1e3 * distance,
+                "max_angle_deg": float(np.rad2deg(angle)),
+                "times_planned": took,
+            }
+        )
     status = servo.GetOutputPort("guard_status").Eval(servo.GetMyContextFromRoot(context))
     return {
         "robot": job.robot,
         "seed": job.seed,
         "path": job.path,
-        "laps": [{"max_norm_mm": 1e3 * d, "max_angle_deg": float(np.rad2deg(a))} for d, a in laps],
+        "laps": laps,
         "static_mm": 1e3 * float(table[table[:, 0] > path.dwell_start + _SETTLED, 1].max()),
         "guard": int(np.sum(status)),
         "learnt": learnt(servo, context) or {},
