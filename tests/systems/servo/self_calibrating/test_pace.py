@@ -15,13 +15,15 @@ PERIOD, PATH_START = 4e-3, 4.0
 class Known:
     """A law whose path is known ahead as well as is said."""
 
-    def __init__(self, sigma: float) -> None:
+    def __init__(self, sigma: float, has_play: bool = False) -> None:
         self.sigma, self.noise = sigma, 4.0  # times the variance that is believed
         model: Any = SimpleNamespace(period=PERIOD, camera_period=PERIOD)
         estimator = SimpleNamespace(
             sigma=lambda memory, rows: self.sigma, variance_factor=lambda memory: self.noise
         )
-        learning: Any = SimpleNamespace(estimator=estimator)
+        learning: Any = SimpleNamespace(
+            estimator=estimator, tip_model=SimpleNamespace(has_gear_errors=has_play)
+        )
         self.pace, self.time = Pace(model, SelfCalibratingConfig(known_on_path=3e-5), learning), PATH_START
         needs: Any = SimpleNamespace(rows_between=lambda begin, end: np.zeros((1, 6, 1)))
         self.pace.needs = needs
@@ -59,6 +61,12 @@ def test_a_path_that_is_known_is_run_as_it_is_planned():
 def test_a_tip_that_is_known_n_times_less_well_goes_on_at_about_one_nth_and_at_no_less_than_a_quarter(times):
     share = Known(times * 3e-5).after(4.0)[-1]
     assert max(0.85 / times, 0.85 * 0.25) < share <= max(1.0 / times, 0.25)
+
+
+def test_samples_that_are_alike_for_a_while_are_not_waited_for():
+    """Teeth that last 0.1 s make 51 samples say as much as one: the tip is known seven times less well."""
+    assert set(Known(7.0 * 3e-5, has_play=True).after(4.0)) == {1.0}
+    assert Known(20.0 * 3e-5, has_play=True).after(4.0)[-1] < 0.5
 
 
 def test_no_step_is_so_large_that_the_arm_rings_and_none_comes_soon_after_another():
