@@ -58,3 +58,5 @@ class RunLog:
     # s, wall time of each update of the law
     tick_seconds: np.ndarray = field(default_factory=lambda: np.empty(0), compare=False)
     wall_time: float = field(default=0.0, compare=False)  # s, of the simulation alone
+    # of a log from a record: why the run ended before its path did, in words; else empty
+    ended_early: str = field(default="", compare=False)

@@ -5,6 +5,7 @@ from scipy.spatial.transform import Rotation, Slerp
 
 from diagrams.record.log import GuardEvent, RunLog
 from diagrams.record.read_record import Contents, Topic
+from diagrams.record.run_record import PATH
 from diagrams.record.topics import (
     COMMAND,
     CORRECTION,
@@ -78,6 +79,7 @@ def restored(contents: Contents, name: str) -> RunLog:
         path_end=float(run["path_end"]),
         lap_starts=tuple(run.get("lap_starts", ())),
         path_time=_path_time(time, topics.get(PATH_TIME)),
+        ended_early="" if (ended := str(run.get("ended", PATH))) == PATH else ended,
     )
 
 

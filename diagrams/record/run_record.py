@@ -27,6 +27,7 @@ from diagrams.record.topics import (
 
 _FLUSH = 1.0  # s, the longest time until what is logged is on the disk
 SCENARIO, RUN = "scenario.yaml", "run"  # names of the attachment and of the metadata
+PATH = "path"  # what ended a run that came to the end of its path
 
 
 class Viewer(Protocol):
@@ -173,7 +174,7 @@ def marks(log: RunLog, ended: str) -> dict[str, object]:
     return {**{name: getattr(log, name) for name in names}, "ended": ended}
 
 
-def write_log(path: str | Path, scenario: str, log: RunLog, ended: str = "path") -> None:
+def write_log(path: str | Path, scenario: str, log: RunLog, ended: str = PATH) -> None:
     """Writes a run that is over with the same topics, and the truth beside them.
 
     Raises:

@@ -4,12 +4,13 @@ import math
 from collections.abc import Mapping
 from typing import Any
 
+import typer
 from rich import box
 from rich.console import Console
 from rich.markup import escape
 from rich.table import Table
 
-from experiments.cli.console import print_table
+from experiments.cli.console import BROKEN_OFF, print_table
 from experiments.metrics.laps import SLOWED
 from experiments.report.error_rows import AXES, KINDS, error_row, format_cell, is_best, smallest_of_columns
 from experiments.report.style import law_colors, law_title
@@ -29,6 +30,8 @@ def print_summary(console: Console, result: Mapping[str, Any]) -> None:
     """Prints the true and the measured errors of a `metrics.summary`, and what the guard did."""
     console.print()
     console.print(f"[bold]Scenario {escape(result['scenario'])}[/bold]")
+    if early := [law_title(law) for law, run in result["runs"].items() if "unfinished" in run]:
+        console.print(f"[red]Did not come to the end of its path: {escape(', '.join(early))}[/red]")
     for source in SOURCES:
         print_table(console, error_table(result, source))
     if any("laps" in run for run in result["runs"].values()):
@@ -42,6 +45,19 @@ def print_summary(console: Console, result: Mapping[str, Any]) -> None:
         print_table(console, guard_table(result))
     else:
         console.print("[italic]Guard: no intervention[/italic]\n")
+
+
+def conclude(result: Mapping[str, Any]) -> None:
+    """Names on stderr the runs of a summary that did not come to their end, and then ends the command.
+
+    Raises:
+        typer.Exit: with the code of runs that broke off.
+    """
+    endings = {law: run["unfinished"] for law, run in result["runs"].items() if "unfinished" in run}
+    for law, ending in endings.items():
+        typer.echo(f"truetip: law {law}: {ending}", err=True)
+    if endings:
+        raise typer.Exit(BROKEN_OFF)
 
 
 def error_table(result: Mapping[str, Any], source: str) -> Table:

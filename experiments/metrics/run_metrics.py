@@ -16,6 +16,7 @@ import numpy as np
 from diagrams.record.log import RunLog
 from experiments.metrics.iso9283 import iso_9283
 from experiments.metrics.laps import lap_metrics, times_planned
+from experiments.metrics.unfinished import unfinished_cycles
 from robots.pose import pose_error
 
 STATIC_WINDOW = 0.5  # s, the end of the dwell over which the static error is the mean
@@ -165,6 +166,8 @@ def summary(scenario_name: str, logs: Comparison) -> dict[str, Any]:
             runs[law]["times_planned"] = times_planned(first, first.path_start, first.dwell_start)
         if first.learnt is not None:
             runs[law]["learnt"] = first.learnt
+        if ending := unfinished_cycles(cycles):
+            runs[law]["unfinished"] = ending
     return _rounded({"scenario": scenario_name, "runs": runs})
 
 
@@ -208,7 +211,8 @@ def best_law(result: Mapping[str, Any]) -> str:
     """
     runs, source = result["runs"], judged_by(result)
     laws = [law for law in runs if law != "open_loop"] or list(runs)
-    laws = [law for law in laws if None not in runs[law][source]["static_mm"]] or laws
+    came_to_rest = [law for law in laws if None not in runs[law][source]["static_mm"]]
+    laws = [law for law in came_to_rest if "unfinished" not in runs[law]] or came_to_rest or laws
     smallest = min(_sortable(runs[law][source]["max_norm_mm"]) for law in laws)
     alike = [law for law in laws if _sortable(runs[law][source]["max_norm_mm"]) <= 1.001 * smallest]
     return min(alike, key=lambda law: _sortable(runs[law][source]["rms_norm_mm"]))

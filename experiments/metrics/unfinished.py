@@ -1,5 +1,7 @@
 """Runs in which the guard did not let a law lead the tip to the end of its path."""
 
+from collections.abc import Sequence
+
 from diagrams.record.log import RunLog
 
 _SHARE = 0.9  # of a path: a joint that stands at a limit for so long has never been led
@@ -12,6 +14,8 @@ def unfinished(log: RunLog) -> str:
 
     A stop in the dwell is none: the path is over then, and the tip at rest.
     """
+    if log.ended_early:
+        return log.ended_early
     events = log.guard_events
     held = next((event for event in events if event.kind == "path_held"), None)
     if held is not None:
@@ -28,3 +32,11 @@ def unfinished(log: RunLog) -> str:
             f"the guard held a joint at the end of its range from {limit.time:.1f} to {limit.end:.1f} s{unit}"
         )
     return ""
+
+
+def unfinished_cycles(cycles: Sequence[RunLog]) -> str:
+    """As `unfinished`, of the runs of one law; where there are several, each with its number."""
+    endings = {number: ending for number, log in enumerate(cycles, 1) if (ending := unfinished(log))}
+    if len(cycles) == 1:
+        return endings.get(1, "")
+    return "; ".join(f"cycle {number}: {ending}" for number, ending in endings.items())

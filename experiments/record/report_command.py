@@ -17,7 +17,7 @@ from experiments.cli.json_output import human_console, json_output
 from experiments.cli.options import JsonOption, PictureOption
 from experiments.cli.prepare import prepare, with_assumed
 from experiments.cli.staging import PAGE, staged_file
-from experiments.cli.tables import print_summary
+from experiments.cli.tables import conclude, print_summary
 from experiments.metrics.run_metrics import summary
 from experiments.report.report import verdict, write_report
 from robots.description.model import RobotModel
@@ -50,6 +50,7 @@ def report_command(
     print_summary(human, result)
     human.print(escape(verdict(result)))
     print_files(human, report)
+    conclude(result)
 
 
 def _read(records: list[Path], progress: Any) -> tuple[str, dict[str, list[RunLog]]]:

@@ -105,6 +105,7 @@ def runs_below(folder: Path, others: list[Path], progress: Any = None) -> Iterat
                     "static_mm": norm(run[source]["static_mm"]),
                     "max_angle_deg": run[source]["max_angle_deg"],
                     "guard": sum(run["guard"].values()),
+                    "unfinished": run.get("unfinished", ""),
                     "made": time.strftime("%Y-%m-%d %H:%M", time.localtime(file.stat().st_mtime)),
                 }
                 for law, run in result["runs"].items()
@@ -132,7 +133,7 @@ def _row(run: dict[str, Any], folder: Path, beside: Path) -> list[str]:
         law_title(run["law"]),
         run["judged_by"],
         *("–" if value is None else f"{value:.3f}" for value in numbers),
-        str(run["guard"]),
+        f"{run['guard']}{', did not finish' if run['unfinished'] else ''}",
         run["made"],
     ]
 

@@ -4,7 +4,8 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 from diagrams.record.log import RunLog
-from diagrams.record.run_record import write_log
+from diagrams.record.run_record import PATH, write_log
+from experiments.metrics.unfinished import unfinished
 from experiments.report.style import law_file_name
 
 
@@ -21,4 +22,5 @@ def write_records(folder: Path, scenario: str, logs: Mapping[str, Sequence[RunLo
     """
     for law, cycles in logs.items():
         for number, log in enumerate(cycles, 1):
-            write_log(folder / f"{law_file_name(law)}-{number}.mcap", scenario, log)
+            record = folder / f"{law_file_name(law)}-{number}.mcap"
+            write_log(record, scenario, log, unfinished(log) or PATH)

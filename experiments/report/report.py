@@ -94,12 +94,35 @@ _TIPS = {"true": "the true tip", "measured": "the tip, as the camera sees it,"}
 
 
 def verdict(summary: Mapping[str, Any]) -> str:
-    """The result in one or two sentences of plain text."""
+    """The result in one or two sentences of plain text; before them who did not come to the end of a path."""
+    runs = summary["runs"]
+    stops = [
+        f"{law_title(law)} did not come to the end of its path: {run['unfinished']}{_full_stop(run)} "
+        for law, run in runs.items()
+        if "unfinished" in run
+    ]
+    return "".join(stops) + _verdict_of_best(summary)
+
+
+def _is_whole(run: Mapping[str, Any], source: str) -> bool:
+    return "unfinished" not in run and run[source]["max_norm_mm"] is not None
+
+
+def _full_stop(run: Mapping[str, Any]) -> str:
+    return "" if run["unfinished"].endswith("?") else "."
+
+
+def _verdict_of_best(summary: Mapping[str, Any]) -> str:
     best, runs = best_law(summary), summary["runs"]
     source = judged_by(summary)
     numbers, tip = runs[best][source], _TIPS[source]
     if numbers["max_norm_mm"] is None:
         return f"{law_title(best)}: no pose of the tip was seen on the path, so its error is not known."
+    if "unfinished" in runs[best]:
+        return (
+            f"{law_title(best)} let {tip} be up to {_text(numbers['max_norm_mm'])} mm and "
+            f"{_text(numbers['max_angle_deg'])}° from the wanted path."
+        )
     if numbers["settling_s"] is None:
         course = (
             f"keeps {tip} within {_text(numbers['max_norm_mm'])} mm and "
@@ -116,7 +139,7 @@ def verdict(summary: Mapping[str, Any]) -> str:
         rest = "was not seen at rest"
     text = f"{law_title(best)} {course} and {rest}."
     baseline = runs.get("open_loop", {}).get(source)
-    if baseline and best != "open_loop" and baseline["max_norm_mm"] is not None:
+    if baseline and best != "open_loop" and _is_whole(runs["open_loop"], source):
         text += (
             f" Without the camera the tip is off by up to {_text(baseline['max_norm_mm'])} mm and "
             f"{_text(baseline['max_angle_deg'])}°, and by {_text(norm(baseline['static_mm']))} mm at rest."

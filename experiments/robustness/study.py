@@ -13,6 +13,7 @@ from experiments.cli.workers import Executor, LocalProcesses, Progress, in_order
 from experiments.comparison.compare import simulating
 from experiments.metrics.laps import lap_metrics
 from experiments.metrics.run_metrics import error_metrics, pose_errors
+from experiments.metrics.unfinished import unfinished
 from experiments.robustness.calibrated import calibrated_robots
 from experiments.robustness.contenders import Contender
 from experiments.robustness.mixed import Mixture
@@ -149,7 +150,7 @@ def run_trials(
 
 
 def run_trial(trial: Trial, progress: Progress) -> dict[str, Any]:
-    """The numbers of one run; of one that broke off, ``failure`` in place of numbers."""
+    """The numbers of one run; of one that broke off or that the guard ended, ``failure`` in place of them."""
     row: dict[str, Any] = {
         "case": trial.case.name,
         "law": trial.contender.text,
@@ -164,6 +165,8 @@ def run_trial(trial: Trial, progress: Progress) -> dict[str, Any]:
             log = run(trial.load(), trial.contender.law, trial.calibrated, progress=progress)
     except RuntimeError as error:  # a SimulationError; the others shall go on
         return row | {"failure": str(error)}
+    if ending := unfinished(log):  # its figures would be those of another task
+        return row | {"failure": ending}
     errors = error_metrics(log, "true")
     if trial.case.recovered_at is not None:
         e = pose_errors(log, "true")[log.time >= trial.case.recovered_at]
@@ -193,7 +196,7 @@ def judged(rows: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
         predicts it, as (smallest of a run, of all samples);
         ``worst_seed`` and ``worst_path`` of the largest distance, and ``worst_robot`` where seeds draw it;
         ``guard``: interventions of all runs;
-        ``failures``: runs that broke off.
+        ``failures``: runs that broke off, or that the guard ended before their path was over.
     """
     done = [row for row in rows if row["failure"] is None]
     result: dict[str, Any] = {

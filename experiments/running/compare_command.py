@@ -35,13 +35,14 @@ from experiments.cli.options import (
 )
 from experiments.cli.prepare import check, option_settings, prepare
 from experiments.cli.staging import staged_folder
+from experiments.cli.tables import conclude
 from experiments.comparison.compare import compare, compared_laws, named_laws
 from experiments.comparison.learnt_file import WriteOption, check_write, robot_writer
 from experiments.comparison.results import replacing
 from experiments.metrics.run_metrics import timing, with_timing
 from experiments.plan.plan_option import PlanOption, plan_settings
 from experiments.record.simulated import write_records
-from experiments.running.outcome import conclude, print_outcome, write_outcome
+from experiments.running.outcome import print_outcome, write_outcome
 from experiments.station.guided_command import (
     Guided,
     ask_before_moving,
@@ -131,4 +132,4 @@ def compare_command(
     if guided:
         guided.conclude()
     else:
-        conclude(logs)
+        conclude(result)

@@ -4,16 +4,13 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-import typer
 from rich.console import Console
 from rich.markup import escape
 
 from diagrams.record.log import RunLog
-from experiments.cli.console import BROKEN_OFF
 from experiments.cli.prepare import Prepared
 from experiments.cli.tables import print_summary
 from experiments.comparison.results import RESULTS, write_results
-from experiments.metrics.unfinished import unfinished
 from experiments.report.report import verdict
 
 
@@ -23,20 +20,6 @@ def write_outcome(
     """Writes the result files into a folder that exists, and gives the summary."""
     with console.status("Writing the report"):
         return write_results(stage, prepared, logs)
-
-
-def conclude(logs: Mapping[str, Sequence[RunLog]]) -> None:
-    """Says on stderr which simulated runs the guard ended before their path, and ends the command if one did.
-
-    Raises:
-        typer.Exit: with the code of runs that broke off.
-    """
-    endings = {law: next(filter(None, map(unfinished, cycles)), "") for law, cycles in logs.items()}
-    for law, ending in endings.items():
-        if ending:
-            typer.echo(f"truetip: law {law}: {ending}", err=True)
-    if any(endings.values()):
-        raise typer.Exit(BROKEN_OFF)
 
 
 def print_outcome(

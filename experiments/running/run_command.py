@@ -35,12 +35,13 @@ from experiments.cli.options import (
 )
 from experiments.cli.prepare import check, option_settings, prepare
 from experiments.cli.staging import staged_folder
+from experiments.cli.tables import conclude
 from experiments.comparison.compare import simulating
 from experiments.comparison.learnt_file import WriteOption, check_write, robot_writer
 from experiments.comparison.results import replacing
 from experiments.record.simulated import write_records
 from experiments.replay.live import LiveView, advance_live
-from experiments.running.outcome import conclude, print_outcome, write_outcome
+from experiments.running.outcome import print_outcome, write_outcome
 from experiments.station.guided_command import (
     Guided,
     ask_before_moving,
@@ -155,4 +156,4 @@ def run_command(
     if view:
         wait_for_interrupt(console, f"Still at {view.address}; Ctrl-C ends it")
     if not guided:
-        conclude(logs)
+        conclude(result)

@@ -2,7 +2,7 @@
 
 import sys
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -13,7 +13,7 @@ from rich.console import Console
 from diagrams.real_time_priority import real_time_priority
 from diagrams.record.foxglove_server import FoxgloveServer
 from diagrams.record.log import RunLog
-from diagrams.record.run_record import RunRecord
+from diagrams.record.run_record import PATH, RunRecord
 from diagrams.runs.real_time import RealTimeRecord
 from diagrams.scenario.scenario import StationConfig, load_scenario
 from diagrams.scenario.scenario_file import OptionSetting
@@ -191,8 +191,9 @@ def guide(
     endings, known = [], {}
     for law, _, record in records:
         if _has_begun(record):
-            known.setdefault(law, []).append(record.log)
-        if record.ended != "path":
+            early = "" if record.ended == PATH else record.ended
+            known.setdefault(law, []).append(replace(record.log, ended_early=early))
+        if record.ended != PATH:
             when = "before the path had begun"
             if _has_begun(record):
                 when = f"at {record.log.time[-1]:.1f} s of {record.log.path_end:.1f} s"

@@ -48,7 +48,8 @@ from experiments.study.study_file import Study, load_study
 from robots.description.source_notes import assumed_note
 
 _PAGE = "study.html"
-_SHOWN_FAILURES = 20
+_SHOWN_FAILURES = 20  # on the page
+_NAMED_FAILURES = 5  # on the terminal
 
 
 def study_command(
@@ -140,7 +141,10 @@ def _print(human: Console, study: Study, rows: Rows) -> None:
         print_table(human, table)
     failed = int((rows["failure"] != "").sum())
     if failed:
-        human.print(f"[red]{count(failed, 'run')} failed; the reasons are in the report[/red]")
+        for i in np.flatnonzero(rows["failure"] != "")[:_NAMED_FAILURES]:
+            law = law_title(str(rows["law"][i]))
+            human.print(f"[red]run {rows['row'][i]}, {escape(law)}: {escape(rows['failure'][i])}[/red]")
+        human.print(f"[red]{count(failed, 'run')} failed; reasons and commands are in the report[/red]")
     human.print(escape(study_verdict(study, rows)))
 
 

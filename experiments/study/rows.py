@@ -14,6 +14,7 @@ from experiments.cli.prepare import Prepared, prepare
 from experiments.cli.workers import Progress
 from experiments.comparison.compare import simulating
 from experiments.metrics.single_figures import FIGURES, single_figures
+from experiments.metrics.unfinished import unfinished
 from experiments.study.designs import Value, design_points
 from experiments.study.study_file import Study
 from systems.named_classes import place_in_own_file
@@ -76,6 +77,8 @@ def study_rows(study: Study) -> list[StudyRow]:
 def run_row(row: StudyRow, progress: Progress) -> dict[str, Any]:
     """Runs it and gives its line of the table; one that fails has ``failure`` in place of numbers.
 
+    So has one that the guard did not let come to the end of its path.
+
     ``wall_s`` is how long it took, which is not the same in two runs of a study.
     """
     line: dict[str, Any] = {
@@ -94,6 +97,8 @@ def run_row(row: StudyRow, progress: Progress) -> dict[str, Any]:
         prepared = prepare(row.scenario, row.all_settings, is_quick=row.is_quick)
         with simulating(row.law, row.seed):
             log = run(prepared.scenario, row.law, prepared.robot, progress=progress)
+        if ending := unfinished(log):  # its figures would be those of another task
+            return line | {"failure": ending, "wall_s": log.wall_time}
         return line | single_figures(log) | {"wall_s": log.wall_time}
     # A refused combination or a run that broke off is a result of the study; the others shall go on.
     except (ValueError, RuntimeError) as error:

@@ -7,8 +7,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from diagrams.record.log import GuardEvent
 from diagrams.scenario.scenario import load_scenario
-from experiments.robustness import command
+from experiments.robustness import command, study
 from experiments.robustness.cases import CASES
 from experiments.robustness.contenders import contenders
 from experiments.robustness.mixed import ROBOTS
@@ -16,6 +17,7 @@ from experiments.robustness.study import Case, judged, trials
 from systems.reference.paths import make_path
 from systems.reference.shapes import Circle
 from tests.experiments.commands import refusal, truetip
+from tests.experiments.synthetic import comparison
 
 QUICK = ["reference.settle=0", "reference.dwell=0.5", "reference.acceleration=8", "station.elasticity=rigid"]
 OPEN_LOOP = contenders("open_loop")
@@ -81,6 +83,17 @@ def test_worst_and_median_are_taken_over_the_runs_that_came_to_their_end():
     assert "worst_robot" not in result
     assert judged([row(1, [3.0]) | {"robot": "ur10"}])["worst_robot"] == "ur10"
     assert result["failures"] == ["seed 4, circle: ran away"]
+
+
+def test_a_run_that_the_guard_stopped_is_named_and_its_figures_are_left_out(monkeypatch: pytest.MonkeyPatch):
+    """The error of a robot that stands still may be smaller than that of one that runs its path."""
+    (log,) = comparison(period=0.1)["pbvs"]
+    stop = GuardEvent(3.0, "stopped", "", lasted=log.time[-1])
+    monkeypatch.setattr(study, "run", lambda *_, **__: replace(log, guard_events=[stop]))
+    (trial,) = trials("misaligned", [CASES["plain"]], OPEN_LOOP, [3], ["circle"])
+    result = judged([study.run_trial(trial, lambda _: None)])
+    said = "seed 3, circle: the guard stopped the robot at 3.0 s and it did not go on"
+    assert result == {"runs": 1, "failures": [said]}
 
 
 def test_without_a_single_run_there_are_only_failures():

@@ -1,11 +1,12 @@
 """``truetip report`` and ``truetip runs``: what was found stays to be found."""
 
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
-from diagrams.record.log import RunLog
+from diagrams.record.log import GuardEvent, RunLog
 from diagrams.scenario.scenario import load_scenario
 from experiments.comparison.errors_table import read_errors
 from experiments.metrics.run_metrics import summary
@@ -39,6 +40,22 @@ def test_the_report_of_records_is_that_of_the_runs(logs: dict[str, list[RunLog]]
             assert again["runs"][law]["true"][key] == pytest.approx(run["true"][key], rel=1e-6)
         assert again["runs"][law]["true"]["iso_9283"]["cycles"] == 2
     assert (tmp_path / "page.html").stat().st_size < 2.5e6
+
+
+def test_records_say_which_run_the_guard_stopped_and_so_does_their_report(
+    logs: dict[str, list[RunLog]], tmp_path: Path
+):
+    whole, other = logs["pbvs"]
+    stop = GuardEvent(3.0, "stopped", "joint 2 left its path", lasted=whole.time[-1] - 3.0)
+    write_records(tmp_path, "", {"pbvs": [whole, replace(other, guard_events=[stop])]})
+    records = sorted(tmp_path.glob("*.mcap"))
+    said = "cycle 2: the guard stopped the robot at 3.0 s and it did not go on"
+    result = truetip("report", *records, "--report", tmp_path / "page.html")
+    assert result.exit_code == 1
+    assert result.stderr == f"truetip: law pbvs: {said}\n"
+    assert "Did not come to the end of its path: PBVS" in result.stdout
+    assert f"PBVS did not come to the end of its path: {said}." in (tmp_path / "page.html").read_text()
+    assert "the guard stopped the robot at 3.0 s" in truetip("log", records[1]).stdout
 
 
 def test_one_run_twice_is_refused(logs: dict[str, list[RunLog]], tmp_path: Path):

@@ -153,6 +153,20 @@ def test_the_verdict_says_what_was_not_seen():
     assert "–" not in text
 
 
+def test_the_verdict_begins_with_the_laws_that_did_not_come_to_their_end():
+    """One that commanded degrees was said to keep the tip within 733 mm."""
+    stopped = {"true": NUMBERS | {"max_norm_mm": 0.1}, "unfinished": "the guard stopped it: in rad?"}
+    text = verdict({"runs": {"pbvs": stopped, "numerical_ik": {"true": NUMBERS}}})
+    assert text.startswith(
+        "PBVS did not come to the end of its path: the guard stopped it: in rad? Numerical IK keeps the true "
+        "tip within 2.00 mm"
+    )
+    assert verdict({"runs": {"pbvs": stopped}}).endswith(
+        "in rad? PBVS let the true tip be up to 0.10 mm and 0.50° from the wanted path."
+    )
+    assert "Without the camera" not in verdict({"runs": {"open_loop": stopped, "pbvs": {"true": NUMBERS}}})
+
+
 def test_from_the_same_initial_error_the_law_that_settles_well_wins():
     start = {
         "max_norm_mm": 17.3,

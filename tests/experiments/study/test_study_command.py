@@ -10,12 +10,14 @@ import subprocess
 import sys
 import time
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pyarrow.parquet as pq
 import pytest
 
+from diagrams.record.log import GuardEvent
 from experiments.cli.cluster import DaskCluster
 from experiments.cli.console import fail
 from experiments.cli.workers import in_order
@@ -27,6 +29,7 @@ from experiments.study.store import TABLE, alone_in
 from experiments.study.study_file import Factor, Levels, Names, Study, load_study
 from robots.description.model import load_robot
 from tests.experiments.commands import refusal, truetip
+from tests.experiments.synthetic import comparison
 
 pytestmark = pytest.mark.real_time
 
@@ -97,7 +100,9 @@ def test_the_command_of_a_row_repeats_it(study):
 def test_started_again_it_runs_nothing_and_leaves_the_table_as_it_is(study):
     file, out = study
     before = (out / TABLE).read_bytes()
-    assert truetip("study", file, "--out", out).exit_code == 0
+    result = truetip("study", file, "--out", out)
+    assert result.exit_code == 0
+    assert "run 1, Open loop: --set station.payload=2000.0" in " ".join(result.stdout.split())
     assert (out / TABLE).read_bytes() == before
 
 
@@ -280,3 +285,14 @@ def test_a_class_of_ones_own_that_raises_fails_its_row_and_no_other(
     monkeypatch.setattr(rows, "run", raising)
     study = Study(laws=["open_loop"], factors={"station.payload": Levels([1.0])})
     assert run_row(study_rows(study)[0], lambda share: None)["failure"] == reason
+
+
+def test_a_run_that_the_guard_stopped_has_failed_and_has_no_figures(monkeypatch: pytest.MonkeyPatch):
+    """The error of a robot that stands still may be smaller than that of one that runs its path."""
+    (log,) = comparison(period=0.1)["pbvs"]
+    stopped = replace(log, guard_events=[GuardEvent(3.0, "stopped", "", lasted=log.time[-1])])
+    monkeypatch.setattr(rows, "run", lambda *_, **__: stopped)
+    study = Study(laws=["open_loop"], factors={"station.payload": Levels([1.0])})
+    line = run_row(study_rows(study)[0], lambda share: None)
+    assert line["failure"] == "the guard stopped the robot at 3.0 s and it did not go on"
+    assert np.isnan(line["max_norm_mm"])
