@@ -9,8 +9,9 @@ from typing import Any
 
 import numpy as np
 from mcap.exceptions import EndOfFile, InvalidMagic, McapError
-from mcap.records import Attachment, Channel, Footer, Message, Metadata
+from mcap.records import Attachment, Channel, DataEnd, Footer, Message, Metadata
 from mcap.stream_reader import StreamReader
+from mcap.writer import MCAP0_MAGIC
 
 from diagrams.record.run_record import RUN, SCENARIO
 
@@ -31,48 +32,79 @@ class Contents:
     scenario: str = ""
     run: dict[str, Any] = field(
         default_factory=dict
-    )  # law, path marks, why it ended; empty if it was cut off
+    )  # law, path marks, why it ended; may be empty if cut off
     is_complete: bool = False  # whether the writer came to its end
+    cut: str = ""  # where the file ends early or is damaged, in words; empty if all messages are there
+
+    def lacking(self, *topics: str) -> str:
+        """What is missing of these topics, in words; empty if all are there."""
+        missing = ", ".join(topic for topic in topics if topic not in self.topics)
+        because = f": the file {self.cut}" if self.cut else ""
+        return f"no messages of {missing}{because}" if missing else ""
 
 
 def read_record(path: str | Path) -> Contents:
-    """Reads a file up to its end, or as far as it was written.
+    """Reads a file up to its end, or as far as it was written and is whole.
 
     Raises:
         OSError: if it cannot be read.
-        ValueError: if it is no MCAP file, or its messages are not JSON.
+        ValueError: if it is no MCAP file, nothing can be read of it, or its messages are not JSON.
     """
     contents, channels = Contents(), dict[int, str]()
     times: dict[str, list[int]] = {}
     messages: dict[str, list[dict[str, Any]]] = {}
+    size = Path(path).stat().st_size
     with Path(path).open("rb") as file:
+        head = file.read(len(MCAP0_MAGIC))
+        if not head or not MCAP0_MAGIC.startswith(head):
+            raise ValueError(f"{path}: not an MCAP file{'' if head else ', it is empty'}")
+        file.seek(0)
+        damage, has_all = "", False
         try:
-            for record in StreamReader(file).records:
+            for record in StreamReader(file, validate_crcs=True).records:
                 if isinstance(record, Channel):
                     if record.message_encoding != "json":
-                        raise ValueError(f"{path}: messages in {record.message_encoding}, not in JSON")
+                        raise _OtherEncodingError(
+                            f"{path}: messages in {record.message_encoding}, not in JSON"
+                        )
                     channels[record.id] = record.topic
                 elif isinstance(record, Message):
-                    topic = channels[record.channel_id]
+                    topic, row = channels[record.channel_id], json.loads(record.data)
                     times.setdefault(topic, []).append(record.log_time)
-                    messages.setdefault(topic, []).append(json.loads(record.data))
+                    messages.setdefault(topic, []).append(row)
                 elif isinstance(record, Attachment) and record.name == SCENARIO:
                     contents.scenario = record.data.decode()
                 elif isinstance(record, Metadata) and record.name == RUN:
                     contents.run = {name: json.loads(value) for name, value in record.metadata.items()}
-                contents.is_complete = contents.is_complete or isinstance(record, Footer)
-        except InvalidMagic as error:
-            # At the end it is missing where the writer was killed.
-            if not channels and not contents.scenario:
-                raise ValueError(f"{path}: not an MCAP file") from error
-        except (EndOfFile, McapError, struct.error) as error:
-            # Else it is what was being written when the writer was killed.
-            if not channels and not contents.scenario and not contents.run:
-                raise ValueError(f"{path}: not an MCAP file") from error
+                has_all = has_all or isinstance(record, DataEnd)
+                contents.is_complete = isinstance(record, Footer)
+        except _OtherEncodingError:
+            raise
+        except (InvalidMagic, EndOfFile, struct.error):  # of what was written when the writer was killed
+            damage = f"ends early at byte {size}"
+        except (
+            McapError,
+            KeyError,
+            RuntimeError,
+            ValueError,
+        ):  # of the decompression, of JSON, of a checksum
+            damage = f"is damaged before byte {file.tell()}"
+    if damage and not has_all:
+        number = sum(map(len, times.values()))
+        contents.cut = f"{damage}, {f'after {number} messages' if number else 'before its first message'}"
+        if not channels and not contents.scenario and not contents.run:
+            raise ValueError(f"{path}: the MCAP file {contents.cut}")
     for topic, rows in messages.items():
         at = 1e-9 * np.array(times[topic], dtype=float)
-        contents.topics[topic] = Topic(at, _columns(rows))
+        try:
+            contents.topics[topic] = Topic(at, _columns(rows))
+        except (AttributeError, KeyError, TypeError, ValueError) as error:
+            raise ValueError(f"{path}: the messages of {topic} are no rows of one table") from error
     return contents
+
+
+class _OtherEncodingError(ValueError):
+    """Messages that are not JSON."""
 
 
 def _columns(rows: list[dict[str, Any]]) -> dict[str, np.ndarray]:

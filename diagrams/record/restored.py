@@ -35,13 +35,15 @@ def restored(contents: Contents, name: str) -> RunLog:
         name: of the file, for messages.
 
     Raises:
-        ValueError: if the record does not hold a whole run; one line.
+        ValueError: if the record is of no run, or cut off before it says where its path is; one line.
     """
-    if not contents.is_complete or "path_start" not in contents.run:
-        raise ValueError(f"{name}: the record was cut off and does not say where its path is (truetip log)")
-    missing = [topic for topic in _NEEDED if topic not in contents.topics]
-    if missing:
-        raise ValueError(f"{name}: no messages of {', '.join(missing)}")
+    if "path_start" not in contents.run:
+        why = f"{contents.cut}: it" if contents.cut else "is of no run of a law: it"
+        raise ValueError(
+            f"{name}: the record {why} does not say where its path is; truetip log shows the rest"
+        )
+    if lacking := contents.lacking(*_NEEDED):
+        raise ValueError(f"{name}: {lacking}")
     topics = contents.topics
     seen, X_WE_seen = exposures(topics.get(POSE))
     ticks, X_WE_wanted = topics[DESIRED].time, _poses(topics[DESIRED])
@@ -79,8 +81,15 @@ def restored(contents: Contents, name: str) -> RunLog:
         path_end=float(run["path_end"]),
         lap_starts=tuple(run.get("lap_starts", ())),
         path_time=_path_time(time, topics.get(PATH_TIME)),
-        ended_early="" if (ended := str(run.get("ended", PATH))) == PATH else ended,
+        ended_early=_ended_early(contents),
     )
+
+
+def _ended_early(contents: Contents) -> str:
+    if contents.cut:
+        return f"its record {contents.cut}"
+    ended = str(contents.run.get("ended", PATH))
+    return "" if ended == PATH else ended
 
 
 def _path_time(time: np.ndarray, topic: Topic | None) -> np.ndarray | None:

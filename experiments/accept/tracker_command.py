@@ -90,9 +90,10 @@ def _fitted(what: str, first: Followed, second: Followed, window: float) -> Fit:
 
 def _recorded(record: str, contents: Contents, kinematics: Kinematics) -> tuple[Followed, Followed]:
     """What the camera and what the joints say of the tool. Raises ValueError."""
-    missing = [topic for topic in (JOINTS, POSE) if topic not in contents.topics]
-    if missing:
-        raise ValueError(f"record {record}: no messages of {', '.join(missing)}")
+    if lacking := contents.lacking(JOINTS, POSE):
+        raise ValueError(f"record {record}: {lacking}")
+    if contents.cut:
+        typer.echo(f"truetip: record {record} {contents.cut}; what is there is used", err=True)
     exposed, X_WE = exposures(contents.topics[POSE])
     exposed, unique = np.unique(exposed, return_index=True)
     time, rows = np.unique(contents.topics[JOINTS].time, return_index=True)

@@ -3,6 +3,7 @@
 from pathlib import Path
 
 import numpy as np
+import typer
 
 from diagrams.record.read_record import Contents, read_record
 from diagrams.record.restored import exposures
@@ -27,9 +28,10 @@ def recorded_measurements(path: str | Path, robot: RobotModel, rule: DwellRule |
         ValueError: if it is no record, or holds nothing to calibrate with; one line.
     """
     contents = read_record(path)
-    missing = [topic for topic in (JOINTS, POSE) if topic not in contents.topics]
-    if missing:
-        raise ValueError(f"recording {path}: no messages of {', '.join(missing)}")
+    if lacking := contents.lacking(JOINTS, POSE):
+        raise ValueError(f"recording {path}: {lacking}")
+    if contents.cut:
+        typer.echo(f"truetip: recording {path} {contents.cut}; what is there is used", err=True)
     joints = contents.topics[JOINTS]
     time, unique = np.unique(joints.time, return_index=True)
     recording = Recording(time, joints.columns["position"][unique], *exposures(contents.topics[POSE]))

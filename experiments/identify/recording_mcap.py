@@ -8,6 +8,7 @@ stands in its metadata, as in the map of a table. ``/drive_command`` has what th
 from pathlib import Path
 
 import numpy as np
+import typer
 from pydrake.common.yaml import yaml_dump_typed
 from scipy.interpolate import CubicSpline
 
@@ -51,7 +52,9 @@ def read_mcap(path: Path, needs_sensors: bool = True) -> Recording:
     contents = read_record(path)
     joints = contents.topics.get(JOINTS)
     if joints is None:
-        raise RecordingError(f"{path}: no messages of {JOINTS}: the motion of the motors is not known")
+        raise RecordingError(f"{path}: the motion of the motors is not known, {contents.lacking(JOINTS)}")
+    if contents.cut:
+        typer.echo(f"truetip: recording {path} {contents.cut}; what is there is used", err=True)
     plan = _plan(contents, path)
     shown = contents.topics.get(INERTIAL)
     if needs_sensors and (shown is None or not plan.sensors):

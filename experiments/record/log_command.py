@@ -14,6 +14,7 @@ from rich.markup import escape
 from rich.table import Table
 
 from diagrams.record.read_record import Contents, Topic, read_record
+from diagrams.record.run_record import PATH
 from experiments.cli.console import print_files, print_table, refusing
 from experiments.cli.staging import staged_file, staged_folder
 
@@ -44,10 +45,12 @@ def log_command(
     console = Console()
     said = contents.run
     how = str(said.get("ended", "no run of a law"))
-    if how == "path":
+    if how == PATH:
         how = "ran its path to the end"
     if not contents.is_complete:
-        how = "was cut off: what follows is what had been written"
+        how = (
+            f"was cut off: it {contents.cut or 'ends behind its last message'}; what follows is what is there"
+        )
     law = f"law {said['law']}, " if "law" in said else ""
     console.print(escape(f"{file}: {law}{how}"), soft_wrap=True)
     print_table(console, summary_table(contents))

@@ -50,6 +50,24 @@ def test_a_record_that_was_cut_off_is_summarised_and_said_to_be_so(log, tmp_path
     assert "/command" in result.output
 
 
+@pytest.mark.parametrize(
+    ("kept", "says"),
+    [
+        (lambda whole: whole[:5], "run.mcap: the MCAP file ends early at byte 5, before its first message"),
+        (lambda whole: whole[:500], "was cut off: it ends early at byte 500, before its first message"),
+        (lambda whole: whole[:-20_000], "was cut off: it ends early at byte"),
+        (lambda whole: whole[:9000] + b"?" + whole[9001:], "was cut off: it is damaged before byte"),
+    ],
+)
+def test_a_copy_that_broke_off_or_is_damaged_is_told_from_what_is_no_record(kept, says: str, log, tmp_path):
+    """Damage ended in a traceback of the decompression, or passed as other numbers."""
+    path = tmp_path / "run.mcap"
+    write_log(path, "extends: misaligned\n", log)
+    path.write_bytes(kept(path.read_bytes()))
+    result = CliRunner().invoke(app, ["log", str(path)], catch_exceptions=False)
+    assert says in result.output
+
+
 @pytest.mark.parametrize("content", [b"no record, but of some length", b""])
 def test_what_is_no_record_is_refused(content: bytes, tmp_path):
     path = tmp_path / "run.mcap"
