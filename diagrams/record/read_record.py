@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 from mcap.exceptions import EndOfFile, InvalidMagic, McapError
+from mcap.reader import make_reader
 from mcap.records import Attachment, Channel, DataEnd, Footer, Message, Metadata
 from mcap.stream_reader import StreamReader
 from mcap.writer import MCAP0_MAGIC
@@ -101,6 +102,20 @@ def read_record(path: str | Path) -> Contents:
         except (AttributeError, KeyError, TypeError, ValueError) as error:
             raise ValueError(f"{path}: the messages of {topic} are no rows of one table") from error
     return contents
+
+
+def recorded_topics(path: str | Path) -> set[str]:
+    """The topics of a record, without its messages; empty of one that was cut off and of what is none.
+
+    Raises:
+        OSError: if it cannot be read.
+    """
+    with Path(path).open("rb") as file:
+        try:
+            found = make_reader(file).get_summary()
+        except (McapError, OSError, struct.error, ValueError):
+            return set()
+    return {channel.topic for channel in found.channels.values()} if found else set()
 
 
 class _OtherEncodingError(ValueError):

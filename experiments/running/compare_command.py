@@ -41,6 +41,7 @@ from experiments.comparison.learnt_file import WriteOption, check_write, robot_w
 from experiments.comparison.results import replacing
 from experiments.metrics.run_metrics import timing, with_timing
 from experiments.plan.plan_option import PlanOption, plan_settings
+from experiments.record.replaced import replaced_records
 from experiments.record.simulated import write_records
 from experiments.running.outcome import print_outcome, write_outcome
 from experiments.station.guided_command import (
@@ -113,6 +114,7 @@ def compare_command(
         refuse_real_time(prepared, realtime)
     guided: Guided | None = None
     with json_output(json_file) as output, refusing(OSError), ExitStack() as stack:
+        stack.enter_context(replaced_records(out))
         stage = stack.enter_context(staged_folder(out, *replacing(out)))
         keep_robot = robot_writer(stack, write, chosen)
         stack.enter_context(output.staged())

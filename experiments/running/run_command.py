@@ -39,6 +39,7 @@ from experiments.cli.tables import conclude
 from experiments.comparison.compare import simulating
 from experiments.comparison.learnt_file import WriteOption, check_write, robot_writer
 from experiments.comparison.results import replacing
+from experiments.record.replaced import replaced_records
 from experiments.record.simulated import write_records
 from experiments.replay.live import LiveView, advance_live
 from experiments.running.outcome import print_outcome, write_outcome
@@ -124,6 +125,7 @@ def run_command(
     guided: Guided | None = None
     view: LiveView | None = None
     with refusing(OSError), ExitStack() as stack:
+        stack.enter_context(replaced_records(out))
         stage = stack.enter_context(staged_folder(out, *replacing(out)))
         keep_robot = robot_writer(stack, write, [law])
         if is_guided:
