@@ -115,7 +115,9 @@ def simulated(
     """
     rig, believed = load_cell(cell), load_cell(calibration)
     if [each.name for each in rig.cameras] != [each.name for each in believed.cameras]:
-        raise ValueError(f"--calibration {calibration}: its cameras must be those of the cell {cell}")
+        raise ValueError(
+            f"--calibration {calibration}: its cameras must be those of the cell {cell}; --cell names another"
+        )
     cameras, known = rig.camera_model(), believed.camera_model()
     middle, rng, rows = 1e-3 * rig.target_mm, np.random.default_rng(seed), []
 

@@ -121,7 +121,8 @@ def calibrate_cameras_command(
         else:
             run = read_observations(recording, names, len(kit.p_Q), nominal.sensor_px)
         started = time.perf_counter()
-        calibration = calibrate_with_wand(run, kit, start, names, pixel_sigma)
+        with human.status("Adjusting cameras and lenses"):
+            calibration = calibrate_with_wand(run, kit, start, names, pixel_sigma)
         found = CamerasFound(calibration, names, kit, time.perf_counter() - started, truth)
         title = f"{nominal.name}, {'simulated' if truth else Path(recording).name}"
         write_calibration_page(page, title, found)

@@ -105,7 +105,7 @@ class MarkerCamera(SampledSystem):
         if known_names != names:
             raise ValueError(
                 f"marker camera: the calibration {config.calibration} must have the cameras of the cell, "
-                f"{', '.join(names)}, got {', '.join(known_names)}"
+                f"{', '.join(names)}, got {', '.join(known_names)}; station.camera.cell names another cell"
             )
         self._config = config
         # Both are made, so that a wrong number is refused on either level.
