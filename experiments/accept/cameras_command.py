@@ -152,8 +152,8 @@ def read_lengths(path: str) -> np.ndarray:
     missing = [name for name in COLUMNS if head.count(name) != 1]
     if missing:
         raise TextTableError(
-            f"{table.where(0)}: one column {missing[0]} is needed, there are {head.count(missing[0])}; "
-            f"needed are {', '.join(COLUMNS)}"
+            f"{table.where(0)}: {head.count(missing[0]) or 'no'} columns '{missing[0]}'; "
+            f"needed is one each of {', '.join(COLUMNS)}"
         )
     rows = []
     for number, fields in enumerate(table.rows[1:], 1):

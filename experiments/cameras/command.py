@@ -1,5 +1,6 @@
 """``truetip cameras``: calibrate the cameras of a cell, and study what limits accuracy."""
 
+import math
 import time
 from contextlib import ExitStack
 from dataclasses import replace
@@ -45,6 +46,7 @@ from systems.vision.camera_rig import MeasuringCell, load_cell
 from systems.vision.camera_rig_file import cell_text, with_cameras
 
 SIMULATED = "simulated"
+_LEAST_WAND = 10.0  # mm; less is a length in metres
 
 cameras_app = command_app("Calibrate the cameras of a cell, and study what limits the accuracy of a pose.")
 
@@ -97,7 +99,8 @@ def calibrate_cameras_command(
     """Calibrate poses and lenses of the cameras with a wand and an L-frame."""
     human = human_console(json_file)
     with json_output(json_file) as output, refusing(ValueError, OSError), ExitStack() as stack:
-        positive("--wand-length", wand_length)
+        if not _LEAST_WAND <= wand_length < math.inf:
+            raise ValueError(f"--wand-length must be at least {_LEAST_WAND:g} mm, got {wand_length:g}")
         positive("--pixel-sigma", pixel_sigma)
         at_least("--seed", 0, seed)
         if recording != SIMULATED:

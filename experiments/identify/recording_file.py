@@ -53,8 +53,13 @@ def read_recording(path: Path, columns: Path | None = None, needs_sensors: bool 
         if columns is not None:
             raise RecordingError(f"{path}: an MCAP file needs no column map: it says what it holds")
         return read_mcap(path, needs_sensors)
-    path.stat()  # a table that is not there is named before its map
+    with path.open("rb"):  # a table that is not there, or is a folder, is named before its map
+        pass
     mapped = columns or path.with_suffix(".yaml")
+    if columns is None and not mapped.is_file():
+        raise RecordingError(
+            f"{path}: there is no {mapped}, which says what its columns are; --columns names another"
+        )
     node = read_nodes(mapped, f"column map {mapped}")
     plan = typed(node, RecordingMap)
     check_map(plan, node, needs_sensors)

@@ -18,6 +18,7 @@ from robots.description.model import RobotModel, load_robot, robot_of, shipped_r
 from robots.description.robot_file import robot_text
 from robots.description.urdf_in.reader import UrdfRobot, is_urdf, read_urdf
 
+_HEAVIEST = 2.0e4  # kg: the heaviest industrial robots weigh some 12 t; more is a mass in grams
 _WIDE = 1800.0  # deg to a side: no joint but an endless one turns so far
 
 robots_app = command_app(
@@ -62,6 +63,7 @@ def import_command(
         typer.Option(
             metavar="KG",
             min=0.0,
+            max=_HEAVIEST,
             help="Of the whole robot, from its data sheet, where links do not say theirs or all the same.",
         ),
     ] = None,
@@ -70,6 +72,7 @@ def import_command(
         typer.Option(
             metavar="KG",
             min=0.0,
+            max=_HEAVIEST,
             help="The largest that it carries.",
             show_default="a seventh of the mass that moves",
         ),

@@ -75,7 +75,7 @@ def test_two_columns_of_one_name_are_refused(tmp_path: Path):
     table.write_text("line,nominal_mm,measured_mm,measured_mm\n1,200,200.1,205\n")
     out = tmp_path / "c.html"
     found = refusal(truetip("accept", "cameras", "--lengths", table, "--report", out))
-    assert "lengths.csv, line 1: one column measured_mm is needed, there are 2" in found
+    assert "lengths.csv, line 1: 2 columns 'measured_mm'; needed is one each of line, nominal_mm," in found
 
 
 @pytest.mark.slow
