@@ -17,6 +17,7 @@ from typing import Any, NoReturn
 _TOGETHER = (
     1.0  # s between signals that are one request: a terminal and what started the command send one each
 )
+_AGAIN = 0.2  # s, between interrupts of what has swallowed one
 _BASE = 128  # exit codes of what a signal has ended, as shells have them
 
 
@@ -104,6 +105,38 @@ def interrupted_once(end_at_once: Callable[[], None]) -> Iterator[None]:
     try:
         yield
     finally:
+        for number, handler in before.items():
+            signal.signal(number, handler)
+
+
+@contextmanager
+def insisting() -> Iterator[None]:
+    """In this block Ctrl-C and SIGTERM interrupt, and again every fifth of a second until it is left.
+
+    An optimiser in C++ takes an interrupt as meant for itself: it returns what it has found so far, and the
+    work around it would go on.
+    """
+    if threading.current_thread() is not threading.main_thread():  # only that one may set handlers
+        yield
+        return
+    signals = (signal.SIGINT, signal.SIGTERM, signal.SIGALRM)
+    before = {number: signal.getsignal(number) for number in signals}
+    error: type[KeyboardInterrupt] = KeyboardInterrupt
+
+    def interrupt(number: int, frame: FrameType | None) -> NoReturn:
+        nonlocal error
+        if number != signal.SIGALRM:
+            error = TerminatedError if number == signal.SIGTERM else KeyboardInterrupt
+        signal.setitimer(signal.ITIMER_REAL, _AGAIN)
+        raise error
+
+    for number, handler in before.items():
+        if handler != signal.SIG_IGN:
+            signal.signal(number, interrupt)
+    try:
+        yield
+    finally:
+        signal.setitimer(signal.ITIMER_REAL, 0.0)
         for number, handler in before.items():
             signal.signal(number, handler)
 

@@ -256,7 +256,14 @@ def option_settings(
     camera: str | None = None,
     laps: int | None = None,
 ) -> list[str]:
-    """The changes of a scenario that options of their own make, behind those of --set."""
+    """The changes of a scenario that options of their own make, behind those of --set.
+
+    Raises:
+        ValueError: if a class is missing behind its file.
+    """
+    for option, named in (("--law", law), ("--feedforward", feedforward)):
+        if named and named.rstrip().endswith(":"):
+            raise ValueError(f"{option} {named}: the name of the class is missing, as in mine.py:MyClass")
     own = (
         OptionSetting(key, value, option)
         for key, value, option in (

@@ -66,7 +66,9 @@ class Injected:
             raise ValueError(f"--change {text}: the size must be a finite number, got '{rest[-1]}'")
         if kind == "tool" and len(rest) == 1:
             return cls(kind, "", 1e-3 * size)
-        if kind == "joint" and len(rest) == 2 and rest[0] in map(str, range(1, NUM_JOINTS + 1)):
+        if kind == "joint" and len(rest) == 2:
+            if rest[0] not in map(str, range(1, NUM_JOINTS + 1)):
+                raise ValueError(f"--change {text}: the joints are 1 to {NUM_JOINTS}, got '{rest[0]}'")
             return cls(kind, rest[0], float(np.deg2rad(1e-3 * size)))
         if kind == "camera" and len(rest) == 2:
             if rest[0] not in cameras:

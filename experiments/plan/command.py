@@ -11,6 +11,7 @@ from rich.table import Table
 
 from diagrams.scenario.scenario import StationConfig
 from experiments.cli.console import print_files, print_note, print_table, progress_bar, refusing
+from experiments.cli.ending import insisting
 from experiments.cli.json_output import human_console, json_output
 from experiments.cli.options import JsonOption, PayloadOption, StudiedRobotOption
 from experiments.cli.prepare import noted_robot
@@ -141,7 +142,7 @@ def plan_command(
         code = stack.enter_context(staged_folder(report.parent, FILES[program])) if program else None
         written: list[Path] = []
         stack.enter_context(output.staged())
-        with progress_bar(f"{objective}, {dynamics}") as progress:
+        with progress_bar(f"{objective}, {dynamics}") as progress, insisting():
             results = study_plan(plan, progress)
         write_plan_page(page, plan, results)
         if table:

@@ -12,7 +12,7 @@ from rich.table import Table
 from experiments.cli.cluster import executor
 from experiments.cli.console import BROKEN_OFF, count, fail, print_note, print_table, progress_bar, refusing
 from experiments.cli.json_output import human_console, json_output
-from experiments.cli.option_limits import at_least
+from experiments.cli.option_limits import at_least, one_of
 from experiments.cli.options import JobsOption, JsonOption, RobotOption, SchedulerOption, SetOption
 from experiments.metrics.laps import SLOWED
 from experiments.robustness.cases import CASES
@@ -61,8 +61,11 @@ def robustness_command(
         names = list(CASES) if cases == "all" else _each_once("--cases", cases)
         chosen = [_case(name, settings or []) for name in names]
         compared = contenders(laws)
+        shapes = _each_once("--paths", paths)
+        for shape in shapes:
+            one_of("--paths", PATHS, shape)
         drawn = range(first_seed, first_seed + seeds)
-        todo = trials(scenario, chosen, compared, drawn, _each_once("--paths", paths), laps, robot)
+        todo = trials(scenario, chosen, compared, drawn, shapes, laps, robot)
         for trial in todo:
             if trial.seed == first_seed:  # what cannot run is refused before anything does
                 make_path(trial.load().reference)

@@ -200,7 +200,8 @@ def guide(
             endings.append(f"law {law}: {when}: {record.ended}")
     if not known:
         keep_files(stage, out)
-        Guided({}, endings, end.code).conclude()
+        if end.code:
+            Guided({}, endings, end.code).conclude()
         raise SimulationError(f"{'; '.join(endings)}; see {out / 'link.json'}")
     return Guided(known, endings, end.code or (BROKEN_OFF if endings else 0))
 

@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 
 from experiments.cli import ending
-from experiments.cli.ending import asking
+from experiments.cli.ending import TerminatedError, asking, insisting
 from tests.experiments.commands import RESULTS, SHORT, files
 
 
@@ -105,3 +105,25 @@ def test_ctrl_c_that_comes_twice_ends_the_processes_and_does_not_wait_for_ever(g
                 os.killpg(process.pid, signal.SIGKILL)
     assert process.returncode == -signal.SIGINT
     assert said.strip().endswith("KeyboardInterrupt")
+
+
+@pytest.mark.parametrize(
+    ("number", "error"), [(signal.SIGINT, KeyboardInterrupt), (signal.SIGTERM, TerminatedError)]
+)
+def test_who_swallows_an_interrupt_is_interrupted_again(number: int, error: type[BaseException]):
+    """As the optimiser of a plan does, which then went on for minutes."""
+
+    def swallowing() -> None:
+        with insisting():
+            with contextlib.suppress(KeyboardInterrupt):
+                os.kill(os.getpid(), number)
+                time.sleep(5.0)
+            time.sleep(5.0)
+
+    before = [signal.getsignal(each) for each in (number, signal.SIGALRM)]
+    began = time.monotonic()
+    with pytest.raises(error):
+        swallowing()
+    assert time.monotonic() - began < 3.0
+    time.sleep(0.5)  # and not once more
+    assert [signal.getsignal(each) for each in (number, signal.SIGALRM)] == before
