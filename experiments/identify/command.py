@@ -216,17 +216,19 @@ def identify_command(
         if tuned_on_robot and recording is not None and plant is None:
             raise ValueError("--fine-tune needs a robot to drive: say what was recorded by --plant NAME|FILE")
         if recording is None and slow is not None:
-            raise ValueError("--slow says more of what was recorded, and there is no --recording")
+            raise ValueError("--slow adds slow motions to those of a --recording, and there is none")
         if recording is None and columns is not None:
             raise ValueError("--columns says what a --recording has, and there is none")
         model = noted_robot(human, robot)
         if excite is not None:
             slow_table = stack.enter_context(staged_file(excite, *TABLE))
             stack.enter_context(output.staged())
-            excitation = designed_slow_motion(model, seed)
+            with human.status("Designing the motion"):
+                excitation = designed_slow_motion(model, seed)
             write_excitation(slow_table, excitation)
             output.write(excitation_json(excitation))
             human.print(escape(told_of(excitation)))
+            print_files(human, excite)
             return
         truth = _plant(robot, plant, recording is not None)
         where = executor(scheduler, jobs)

@@ -26,8 +26,9 @@ def designed_slow_motion(robot: RobotModel, seed: int) -> Excitation:
 def told_of(excitation: Excitation) -> str:
     """How good a motion is, in a sentence."""
     return (
-        f"Slow motion of {excitation.motion.period:g} s: condition number {excitation.condition:.0f}, of "
-        f"motions that were drawn {excitation.drawn:.0f} (median), {excitation.evaluations} evaluations."
+        f"Slow motion of {excitation.motion.period:g} s with condition number {excitation.condition:.1f}; "
+        f"motions drawn at random have {excitation.drawn:.1f} in the median. "
+        f"{excitation.evaluations} evaluations."
     )
 
 

@@ -113,8 +113,15 @@ def _verdict(
             said.append(f"{law_title(law)} {before:.3g} → {after:.3g} mm")
     fields = {0: "no field", 1: "one field"}.get(changes, f"{changes} fields")
     versions = "the same versions" if same_versions else "other versions"
+    early = [
+        f" {law_title(law)} did not come to the end of its path in {each.folder}."
+        for each in (one, other)
+        for law in laws
+        if "unfinished" in each.summary["runs"].get(law, {})
+    ]
     return (
         f"Largest error: {', '.join(said) or 'no law in both'}; {fields} of the scenario changed, {versions}."
+        + "".join(early)
     )
 
 

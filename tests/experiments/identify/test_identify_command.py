@@ -288,7 +288,7 @@ REFUSED = {
     "recording": (["--recording=none.csv"], "--recording none.csv: no such file"),
     "both": (["--recording=none.csv", "--motions=mine.yaml"], "no --motions"),
     "columns": (["--columns=mine.yaml"], "--columns says what a --recording has"),
-    "slow": (["--slow=slow.csv"], "--slow says more of what was recorded"),
+    "slow": (["--slow=slow.csv"], "--slow adds slow motions to those of a --recording, and there is none"),
     "cases": (["--motions=mine.yaml"], "--motions mine.yaml"),
     "report": (["--report=identify.txt"], "its name must end in .html"),
     "search": (["--search=0"], "--search must be at least 1, got 0"),

@@ -8,7 +8,7 @@ import pytest
 
 from diagrams.record.log import GuardEvent, RunLog
 from diagrams.scenario.scenario import load_scenario
-from experiments.comparison.errors_table import read_errors
+from experiments.comparison.errors_table import read_errors, write_errors
 from experiments.metrics.run_metrics import summary
 from experiments.record.runs_beside import folder_names
 from experiments.record.runs_command import runs_below
@@ -149,6 +149,20 @@ def test_two_runs_side_by_side_show_what_differs_and_by_how_much(tmp_path: Path)
     time, distance, _ = read_errors(tmp_path / "early" / "errors.csv")["pbvs"]
     assert distance[time >= 0.2 - 1e-9].max() == pytest.approx(early, rel=1e-5)
     assert load_scenario(str(tmp_path / "late" / "scenario.yaml")).station.camera.delay == 0.012
+
+
+def test_an_index_says_which_run_did_not_come_to_its_end(logs: dict[str, list[RunLog]], tmp_path: Path):
+    (whole,) = logs["pbvs"][:1]
+    stop = GuardEvent(3.0, "stopped", "joint 2 left its path", lasted=whole.time[-1])
+    for name, log in (("a", whole), ("b", replace(whole, guard_events=[stop]))):
+        (tmp_path / name).mkdir()
+        write_json(tmp_path / name / "summary.json", summary(name, {"pbvs": [log]}))
+        write_errors(tmp_path / name / "errors.csv", {"pbvs": log})
+        (tmp_path / name / "scenario.yaml").write_text("extends: misaligned\n")
+    truetip("runs", tmp_path, "--report", tmp_path / "runs.html")
+    assert (tmp_path / "runs.html").read_text().count(", did not finish") == 1
+    result = truetip("runs", tmp_path / "a", "--beside", tmp_path / "b", "--report", tmp_path / "both.html")
+    assert f"PBVS did not come to the end of its path in {tmp_path / 'b'}." in " ".join(result.stdout.split())
 
 
 @pytest.mark.parametrize(
