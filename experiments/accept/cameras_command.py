@@ -11,7 +11,7 @@ from rich.markup import escape
 
 from experiments.cli.console import print_files, refusing
 from experiments.cli.json_output import human_console, json_output
-from experiments.cli.option_limits import at_least, positive, refuse_given
+from experiments.cli.option_limits import at_least, in_millimetres, positive, refuse_given
 from experiments.cli.options import JsonOption, PictureOption
 from experiments.cli.staging import PAGE, staged_file
 from experiments.report.plot_page import Section, html_table, write_plot_page
@@ -73,8 +73,9 @@ def accept_cameras_command(
     with json_output(json_file) as output, refusing(ValueError, OSError), ExitStack() as stack:
         at_least("--count", LEAST_LENGTHS, count)
         at_least("--seed", 0, seed)
-        for name, value in (("--limit", limit), ("--cube", cube_mm), ("--pixel-sigma", pixel_sigma)):
+        for name, value in (("--limit", limit), ("--pixel-sigma", pixel_sigma)):
             positive(name, value)
+        in_millimetres("--cube", cube_mm)
         probing = None
         if lengths is None:
             table, probing = simulated(cell, calibration or cell, 1e-3 * cube_mm, pixel_sigma, count, seed)

@@ -27,7 +27,7 @@ from experiments.accept.robot_cycle import (
 from experiments.accept.robot_page import Row, table_rows, verdict, write_acceptance_page
 from experiments.cli.console import print_files, print_note, print_table, progress_bar, refusing
 from experiments.cli.json_output import human_console, json_output
-from experiments.cli.option_limits import at_least, positive
+from experiments.cli.option_limits import at_least, in_millimetres, positive
 from experiments.cli.options import (
     AnyScenarioOption,
     JsonOption,
@@ -78,7 +78,8 @@ def accept_robot_command(
     human = human_console(json_file)
     with json_output(json_file) as output, refusing(ValueError, OSError, ChannelError), ExitStack() as stack:
         at_least("--cycles", 2, cycles)
-        for name, value in (("--cube", cube), ("--dwell", dwell), ("--band", band)):
+        in_millimetres("--cube", cube)
+        for name, value in (("--dwell", dwell), ("--band", band)):
             positive(name, value)
         if dwell < 0.2:
             raise ValueError(f"--dwell must be at least 0.2 s, got {dwell:g}")

@@ -11,7 +11,7 @@ from rich.markup import escape
 from experiments.cameras.budget import Budget, budget
 from experiments.cli.console import print_files, progress_bar, refusing
 from experiments.cli.json_output import human_console, json_output
-from experiments.cli.option_limits import at_least
+from experiments.cli.option_limits import at_least, not_negative
 from experiments.cli.options import JsonOption, PictureOption, ScenarioOption, SetOption
 from experiments.cli.prepare import prepare
 from experiments.cli.staging import PAGE, staged_file
@@ -75,6 +75,11 @@ def budget_command(
     human = human_console(json_file)
     with json_output(json_file) as output, refusing(ValueError, OSError), ExitStack() as stack:
         at_least("--draws", 100, draws)
+        for name, value in (
+            ("--pixel-sigma", pixel), ("--camera-mm", camera_mm), ("--camera-urad", camera_urad),
+            ("--tool-mm", tool_mm), ("--time-ms", time_ms), ("--temperature", temperature),
+        ):  # fmt: skip
+            not_negative(name, value)
         given = Uncertainties(
             pixel, 1e-3 * camera_mm, 1e-6 * camera_urad, 1e-3 * tool_mm, _GIVEN.tool_rotation,
             1e-3 * time_ms, temperature,

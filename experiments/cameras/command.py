@@ -1,6 +1,5 @@
 """``truetip cameras``: calibrate the cameras of a cell, and study what limits accuracy."""
 
-import math
 import time
 from contextlib import ExitStack
 from dataclasses import replace
@@ -26,7 +25,7 @@ from experiments.cli.cluster import executor
 from experiments.cli.command_app import command_app
 from experiments.cli.console import print_files, progress_bar, refusing
 from experiments.cli.json_output import human_console, json_output
-from experiments.cli.option_limits import at_least, positive, without_effect
+from experiments.cli.option_limits import at_least, in_millimetres, positive, without_effect
 from experiments.cli.options import (
     JobsOption,
     JsonOption,
@@ -46,7 +45,6 @@ from systems.vision.camera_rig import MeasuringCell, load_cell
 from systems.vision.camera_rig_file import cell_text, with_cameras
 
 SIMULATED = "simulated"
-_LEAST_WAND = 10.0  # mm; less is a length in metres
 
 cameras_app = command_app("Calibrate the cameras of a cell, and study what limits the accuracy of a pose.")
 
@@ -99,8 +97,7 @@ def calibrate_cameras_command(
     """Calibrate poses and lenses of the cameras with a wand and an L-frame."""
     human = human_console(json_file)
     with json_output(json_file) as output, refusing(ValueError, OSError), ExitStack() as stack:
-        if not _LEAST_WAND <= wand_length < math.inf:
-            raise ValueError(f"--wand-length must be at least {_LEAST_WAND:g} mm, got {wand_length:g}")
+        in_millimetres("--wand-length", wand_length)
         positive("--pixel-sigma", pixel_sigma)
         at_least("--seed", 0, seed)
         if recording != SIMULATED:

@@ -7,6 +7,8 @@ import typer
 
 from robots.configuration.suggestion import did_you_mean
 
+_LEAST_LENGTH = 10.0  # mm
+
 
 def one_of(option: str, names: Iterable[str], given: str | None) -> None:
     """Refuses a name that there is not, with the one that was probably meant; None was not given.
@@ -75,3 +77,13 @@ def positive(option: str, given: float | None) -> None:
     """
     if given is not None and not 0.0 < given < math.inf:
         raise ValueError(f"{option} must be positive, got {given:g}")
+
+
+def in_millimetres(option: str, given: float) -> None:
+    """Refuses a length of something large that is less than 10 mm, as one in metres is.
+
+    Raises:
+        ValueError: if it is, or is infinite or NaN.
+    """
+    if not _LEAST_LENGTH <= given < math.inf:
+        raise ValueError(f"{option} must be at least {_LEAST_LENGTH:g} mm, got {given:g}")

@@ -1,5 +1,6 @@
 """A program, corrected and checked: what ``truetip compensate`` computes."""
 
+import codecs
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -65,6 +66,8 @@ def compensate(
     Raises:
         ValueError: if the program cannot be read, or a target cannot be reached: the message has its line.
     """
+    for name in (path, *others):
+        _refuse_wide_characters(Path(name))
     program = _without(read_program(path, others, *frames), keep)
     if payload is not None and not 0.0 <= payload <= nominal.payload.largest_mass:
         raise ValueError(f"--payload must be 0 to {nominal.payload.largest_mass:g} kg, got {payload:g}")
@@ -129,3 +132,10 @@ def _notes(program: Program, compensation: Compensation, payload: float | None) 
     if compensation.is_compliant and payload is None and silent:
         notes.append(f"The load of {len(silent)} targets is not said and taken as zero; --payload says it.")
     return tuple(notes)
+
+
+def _refuse_wide_characters(path: Path) -> None:
+    """Raises ProgramError for a file in UTF-16, in which no target would be found."""
+    with path.open("rb") as file:
+        if file.read(2) in (codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE):
+            raise ProgramError(f"{path}: saved as UTF-16, which controllers do not read; save it as UTF-8")

@@ -115,11 +115,12 @@ def test_a_guided_robot_is_judged_by_what_its_camera_measures(tmp_path: Path):
         (["robot", "--cycles", "1"], "--cycles must be at least 2, got 1"),
         (["robot", "--speeds", "fast"], "--speeds must be numbers such as 0,7, got 'fast'"),
         (["robot", "--loads", "-1"], "--loads must be between 0 and 1000, got -1"),
-        (["robot", "--cube", "0"], "--cube must be positive"),
+        (["robot", "--cube", "0.25"], "--cube must be at least 10 mm, got 0.25"),
         (["robot", "--with-cell", "--loads", "0,7"], "--loads is of a simulated station"),
         (["robot", "--with-cell", "--set", "station.link.has_camera=false"], "accept robot needs a camera"),
         (["robot", "--with-cell", "--scenario", "cell-watched"], "accept robot does not watch for people"),
         (["cameras", "--count", "4"], "--count must be at least 5, got 4"),
+        (["cameras", "--cube", "0.5"], "--cube must be at least 10 mm, got 0.5"),
         (["cameras", "--cube", "1e5"], "a ball is not seen by two cameras"),
         (["cameras", "--lengths", "none.csv"], "none.csv"),
         (

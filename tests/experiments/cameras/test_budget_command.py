@@ -60,7 +60,7 @@ def test_a_record_of_another_robot_is_refused(tmp_path: Path):
 
 def test_what_cannot_be_is_refused_in_one_line(tmp_path: Path):
     for option, value, message in (
-        ("--pixel-sigma", "-1", "uncertainty pixel must be zero or positive, got -1.0"),
+        ("--pixel-sigma", "-1", "--pixel-sigma must be zero or positive, got -1"),
         ("--draws", "3", "--draws must be at least 100"),
         ("--recording", str(tmp_path / "none.mcap"), "no such file"),
     ):

@@ -115,3 +115,13 @@ def test_a_target_with_an_expression_is_left_alone_and_named_and_the_others_are_
     changed = [a for a, b in zip(old, new, strict=True) if a != b]
     assert len(changed) == 20
     assert all(line.startswith("CONST robtarget p") for line in changed)
+
+
+def test_a_program_in_utf_16_is_refused_and_not_written_without_a_correction(folder: Path, tmp_path: Path):
+    wide = tmp_path / "wide.mod"
+    wide.write_text((folder / "m.mod").read_text(), encoding="utf-16")
+    result = truetip(
+        "compensate", wide, *options(folder, out=tmp_path / "new.mod", report=tmp_path / "page.html")
+    )
+    assert "wide.mod: saved as UTF-16, which controllers do not read" in refusal(result)
+    assert files(tmp_path) == {"wide.mod"}
