@@ -210,9 +210,9 @@ def best_law(result: Mapping[str, Any]) -> str:
     did not come to the end of its path has not kept near it; it is the best only if all have not.
     """
     runs, source = result["runs"], judged_by(result)
-    laws = [law for law in runs if law != "open_loop"] or list(runs)
-    came_to_rest = [law for law in laws if None not in runs[law][source]["static_mm"]]
-    laws = [law for law in came_to_rest if "unfinished" not in runs[law]] or came_to_rest or laws
+    finished = [law for law in runs if "unfinished" not in runs[law]] or list(runs)
+    laws = [law for law in finished if law != "open_loop"] or finished
+    laws = [law for law in laws if None not in runs[law][source]["static_mm"]] or laws
     smallest = min(_sortable(runs[law][source]["max_norm_mm"]) for law in laws)
     alike = [law for law in laws if _sortable(runs[law][source]["max_norm_mm"]) <= 1.001 * smallest]
     return min(alike, key=lambda law: _sortable(runs[law][source]["rms_norm_mm"]))

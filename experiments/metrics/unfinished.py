@@ -35,8 +35,14 @@ def unfinished(log: RunLog) -> str:
 
 
 def unfinished_cycles(cycles: Sequence[RunLog]) -> str:
-    """As `unfinished`, of the runs of one law; where there are several, each with its number."""
-    endings = {number: ending for number, log in enumerate(cycles, 1) if (ending := unfinished(log))}
+    """As `unfinished`, of the runs of one law; where there are several, with their numbers."""
+    numbers: dict[str, list[int]] = {}
+    for number, log in enumerate(cycles, 1):
+        if ending := unfinished(log):
+            numbers.setdefault(ending, []).append(number)
     if len(cycles) == 1:
-        return endings.get(1, "")
-    return "; ".join(f"cycle {number}: {ending}" for number, ending in endings.items())
+        return "".join(numbers)
+    return "; ".join(
+        f"cycle{'s' if len(each) > 1 else ''} {', '.join(map(str, each))}: {ending}"
+        for ending, each in numbers.items()
+    )

@@ -58,6 +58,13 @@ def test_records_say_which_run_the_guard_stopped_and_so_does_their_report(
     assert "the guard stopped the robot at 3.0 s" in truetip("log", records[1]).stdout
 
 
+def test_cycles_that_ended_alike_are_named_once(logs: dict[str, list[RunLog]]):
+    stop = GuardEvent(3.0, "stopped", "", lasted=100.0)
+    cycles = [replace(log, guard_events=[stop]) for log in logs["pbvs"]]
+    said = summary("", {"pbvs": cycles})["runs"]["pbvs"]["unfinished"]
+    assert said == "cycles 1, 2: the guard stopped the robot at 3.0 s and it did not go on"
+
+
 def test_one_run_twice_is_refused(logs: dict[str, list[RunLog]], tmp_path: Path):
     write_records(tmp_path, "", {"pbvs": logs["pbvs"][:1]})
     before = files(tmp_path)

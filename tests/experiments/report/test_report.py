@@ -165,6 +165,9 @@ def test_the_verdict_begins_with_the_laws_that_did_not_come_to_their_end():
         "in rad? PBVS let the true tip be up to 0.10 mm and 0.50° from the wanted path."
     )
     assert "Without the camera" not in verdict({"runs": {"open_loop": stopped, "pbvs": {"true": NUMBERS}}})
+    # Of a law that was stopped and an open loop only one has run the path.
+    text = verdict({"runs": {"open_loop": {"true": NUMBERS}, "pbvs": stopped}})
+    assert "in rad? Open loop keeps the true tip within 2.00 mm" in text
 
 
 def test_from_the_same_initial_error_the_law_that_settles_well_wins():
