@@ -53,7 +53,8 @@ def log_command(
         )
     law = f"law {said['law']}, " if "law" in said else ""
     console.print(escape(f"{file}: {law}{how}"), soft_wrap=True)
-    print_table(console, summary_table(contents))
+    if contents.topics:
+        print_table(console, summary_table(contents))
     print_files(console, csv, parquet, npz)
 
 
