@@ -222,7 +222,7 @@ REFUSED = {
     "cameras calibrate --recording words.csv": "words.csv, line 1: needs one column 'exposure' of exposure,",
     "cameras calibrate --cell none": "cell 'none': no file",
     "cameras calibrate --cell text.yaml": "cell file text.yaml, line 1: the file must be a group of name,",
-    "cameras calibrate --wand-length 0": "--wand-length must be positive, got 0",
+    "cameras calibrate --wand-length 0": "--wand-length must be at least 10 mm, got 0",
     "cameras calibrate --pixel-sigma -1": "--pixel-sigma must be positive, got -1",
     "cameras calibrate --places 0": "wand run: places must be at least 1, got 0",
     "cameras calibrate --write cell.txt": "cannot write the file cell.txt: its name must end in .yaml or",
