@@ -25,5 +25,9 @@ def plan_settings(file: str | None) -> list[str]:
     """
     if file is None:
         return []
-    home = ", ".join(f"{angle:.9g}" for angle in np.rad2deg(read_planned(file).q[0]))
+    try:
+        motion = read_planned(file)
+    except ValueError as error:  # of a table of something else, as of targets
+        raise ValueError(f"--plan {error}; it is no motion that truetip plan --write has written") from error
+    home = ", ".join(f"{angle:.9g}" for angle in np.rad2deg(motion.q[0]))
     return [f"reference.path=!Planned {{file: '{file}'}}", f"home_deg=[{home}]"]

@@ -204,6 +204,7 @@ REFUSED = {
     "feedforward --robot none": "robot 'none': no file",
     "feedforward --grid 0": "--grid must be at least 2, got 0",
     "feedforward --jobs 0": "--jobs must be at least 1, got 0",
+    "compare --plan few.csv": "; it is no motion that truetip plan --write has written",
     "feedforward --plant real": "got 'real'",
     "feedforward --stiffness-error -2": "feedforward: stiffness_error must be above -1 and finite, got",
     "feedforward --payload 900": "payload of KUKA KR 16-2 must be between 0 and 16.0 kg, got 900.0 kg",
