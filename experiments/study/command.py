@@ -143,7 +143,7 @@ def _print(human: Console, study: Study, rows: Rows) -> None:
     if failed:
         for i in np.flatnonzero(rows["failure"] != "")[:_NAMED_FAILURES]:
             law = law_title(str(rows["law"][i]))
-            human.print(f"[red]run {rows['row'][i]}, {escape(law)}: {escape(rows['failure'][i])}[/red]")
+            human.print(f"[red]run {rows['row'][i]}, {escape(law)}: {escape(str(rows['failure'][i]))}[/red]")
         human.print(f"[red]{count(failed, 'run')} failed; reasons and commands are in the report[/red]")
     human.print(escape(study_verdict(study, rows)))
 

@@ -45,6 +45,7 @@ def test_feedback_in_euler_angles_is_the_rate_matrix_times_wrapped_differences()
             for _ in range(2)
         )
         zyx = zyx_from_rotation(seen[:, :3])
-        turned = euler_rate_matrix(zyx) @ euler_difference(zyx_from_rotation(wanted[:, :3]), zyx)
+        difference = euler_difference(zyx_from_rotation(wanted[:, :3]).tolist(), zyx.tolist())
+        turned = euler_rate_matrix(zyx) @ difference
         twist = np.concatenate([2.0 * turned, 3.0 * (wanted[:, 3] - seen[:, 3])])
         np.testing.assert_allclose(parts.euler_feedback(wanted, seen, (2.0, 3.0)), twist, atol=1e-12)
