@@ -89,7 +89,6 @@ def interrupted_once(end_at_once: Callable[[], None]) -> Iterator[None]:
         yield
         return
     asked = -math.inf
-    before = {number: signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM)}
 
     def interrupt(number: int, frame: FrameType | None) -> None:
         nonlocal asked
@@ -99,14 +98,8 @@ def interrupted_once(end_at_once: Callable[[], None]) -> Iterator[None]:
         if time.monotonic() - asked > _TOGETHER:
             end_at_once()
 
-    for number, handler in before.items():
-        if handler != signal.SIG_IGN:
-            signal.signal(number, interrupt)
-    try:
+    with _handled(interrupt, signal.SIGINT, signal.SIGTERM):
         yield
-    finally:
-        for number, handler in before.items():
-            signal.signal(number, handler)
 
 
 @contextmanager
@@ -119,8 +112,6 @@ def insisting() -> Iterator[None]:
     if threading.current_thread() is not threading.main_thread():  # only that one may set handlers
         yield
         return
-    signals = (signal.SIGINT, signal.SIGTERM, signal.SIGALRM)
-    before = {number: signal.getsignal(number) for number in signals}
     error: type[KeyboardInterrupt] = KeyboardInterrupt
 
     def interrupt(number: int, frame: FrameType | None) -> NoReturn:
@@ -130,15 +121,25 @@ def insisting() -> Iterator[None]:
         signal.setitimer(signal.ITIMER_REAL, _AGAIN)
         raise error
 
-    for number, handler in before.items():
-        if handler != signal.SIG_IGN:
-            signal.signal(number, interrupt)
+    with _handled(interrupt, signal.SIGINT, signal.SIGTERM, signal.SIGALRM):
+        try:
+            yield
+        finally:
+            signal.setitimer(signal.ITIMER_REAL, 0.0)
+
+
+@contextmanager
+def _handled(handler: Callable[[int, FrameType | None], None], *signals: signal.Signals) -> Iterator[None]:
+    """In this block a handler has those of these signals that were not ignored."""
+    before = {number: signal.getsignal(number) for number in signals}
+    for number, former in before.items():
+        if former != signal.SIG_IGN:
+            signal.signal(number, handler)
     try:
         yield
     finally:
-        signal.setitimer(signal.ITIMER_REAL, 0.0)
-        for number, handler in before.items():
-            signal.signal(number, handler)
+        for number, former in before.items():
+            signal.signal(number, former)
 
 
 class _Stdout:
