@@ -103,8 +103,8 @@ class Pace:
     """The share of the planned speed at which the path may be run with what is known.
 
     Where gears err, n samples in a row say no more than one, and the tip is known sqrt(n) times less well
-    after the same time. It is not waited for n times as long: limits of what is to be known count sqrt(n)
-    times.
+    after the same time. A path would take n times as long for that: it is gone on with where the tip is known
+    as well as it would be if each of them said something new.
     """
 
     needs: PathNeeds | None = None  # once the path is known
@@ -117,7 +117,7 @@ class Pace:
         self._blind_after = _MISSED * max(model.period, model.camera_period)  # s
         has_play = learning.tip_model.has_gear_errors
         alike = samples_alike(max(model.period, model.camera_period)) if has_play else 1.0
-        self._by_teeth = math.sqrt(alike)  # times as large a standard deviation
+        self._known_on_path = math.sqrt(alike) * config.known_on_path
 
     def share(self, memory: SimpleNamespace, reference: PathAhead, time: float) -> float:
         """None of it before the probe is over, a part while motors are not where they should be.
@@ -167,7 +167,7 @@ class Pace:
         beyond = 0.0
         if is_shown:
             rows = self.needs.rows_between(path_time, path_time + _NEXT)
-            beyond = self._sigma(memory, rows) / self._config.known_on_path
+            beyond = self._learning.estimator.sigma(memory.estimator, rows) / self._known_on_path
         share, faster = memory.by_knowledge, memory.by_knowledge[0] / _STEP
         if beyond * share[0] > 1.0 and share[0] > _CAREFUL:
             share[0] *= _STEP
@@ -187,7 +187,8 @@ class Pace:
             return
         repeats.looks[0] += 1.0
         estimator = self._learning.estimator
-        sigma = self._sigma(memory, needs.rows_between(path_start, path_start + _BEGIN))
+        rows = needs.rows_between(path_start, path_start + _BEGIN)
+        sigma = estimator.sigma(memory.estimator, rows)
         is_wanted = sigma > probe.enough and repeats.count[0] < probe.repeats
         is_wanted &= self._rate < _PLENTY * estimator.variance_factor(memory.estimator)
         repeats.sigma[0] = sigma if is_wanted else 0.0
@@ -198,9 +199,4 @@ class Pace:
         if self.needs is None or not self._blind_after < since < self._config.longest_wait:
             return False
         P = self._learning.estimator.covariance(memory.estimator)
-        sigma = self.needs.sigma_between(P, path_time, path_time + _NEXT) / self._by_teeth
-        return sigma > self._config.known_ahead
-
-    def _sigma(self, memory: SimpleNamespace, rows: np.ndarray) -> float:
-        """How well the tip is known in these rows, as it would be if every sample said something new."""
-        return self._learning.estimator.sigma(memory.estimator, rows) / self._by_teeth
+        return self.needs.sigma_between(P, path_time, path_time + _NEXT) > self._config.known_ahead
