@@ -9,6 +9,7 @@ their own. With ``--play`` gears have play, hysteresis and uneven ratios, which 
 
 import argparse
 import json
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 from rich import box
@@ -21,6 +22,7 @@ from experiments.bench.mujoco_cell.gears import Wear
 from experiments.bench.mujoco_cell.run import CellRun, run
 from experiments.cli.console import progress_bar
 from experiments.cli.workers import in_processes
+from experiments.metrics.laps import SLOWED
 
 ROBOTS = ("irb1200", "irb140", "ur10", "crb15000", "crx10ial", "mh5", "tx2_90")
 
@@ -77,17 +79,22 @@ def main() -> None:
     if options.json:
         Path(options.json).write_text(json.dumps({"runs": rows}, indent=1, default=float), encoding="utf-8")
     table = Table(box=box.SIMPLE_HEAD)
-    for name in ("robot", "runs", "lap 1: mm, °, × planned time", "lap 2", "at rest, mm", "guard"):
+    for name in ("robot", "runs", "lap 1, mm and °", "lap 2, mm and °", "at rest, mm", "guard"):
         table.add_column(name, justify="left" if name == "robot" else "right")
     for robot in options.robots.split(","):
         own = [row for row in rows if row["robot"] == robot]
-        laps = [
-            ", ".join(f"{max(row['laps'][lap][key] for row in own):.3f}" for key in own[0]["laps"][lap])
-            for lap in range(len(own[0]["laps"]))
-        ]
+        laps = [_worst([row["laps"][lap] for row in own]) for lap in range(len(own[0]["laps"]))]
         at_rest, guard = max(row["static_mm"] for row in own), sum(row["guard"] for row in own)
         table.add_row(robot, str(len(own)), *laps, f"{at_rest:.4f}", str(guard))
     Console().print(table)
+
+
+def _worst(laps: Sequence[Mapping[str, float]]) -> str:
+    """The largest errors, and how many times as long as planned the longest one took if that is more."""
+    largest = [max(lap[name] for lap in laps) for name in ("max_norm_mm", "max_angle_deg")]
+    longest = max(lap["times_planned"] for lap in laps)
+    slowed = f", × {longest:.2f}" if longest > SLOWED else ""
+    return ", ".join(f"{error:.3f}" for error in largest) + slowed
 
 
 if __name__ == "__main__":
