@@ -107,6 +107,15 @@ def test_ctrl_c_that_comes_twice_ends_the_processes_and_does_not_wait_for_ever(g
     assert said.strip().endswith("KeyboardInterrupt")
 
 
+@pytest.fixture
+def heard():
+    """Ctrl-C is heard as in the foreground; in the background it is ignored."""
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    yield
+    signal.signal(signal.SIGINT, before)
+
+
+@pytest.mark.usefixtures("heard")
 @pytest.mark.parametrize(
     ("number", "error"), [(signal.SIGINT, KeyboardInterrupt), (signal.SIGTERM, TerminatedError)]
 )
