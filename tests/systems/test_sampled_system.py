@@ -44,15 +44,15 @@ def test_an_output_of_all_sources_depends_on_the_inputs(kind: str, said: bool):
         def __init__(self):
             super().__init__()
             port = self.DeclareVectorInputPort("u", 1)
-            sources = {self.all_sources_ticket()} if said else None
+            sources = [{self.all_sources_ticket()}] if said else []
 
             def calc(context, output):
                 (output.SetFromVector if kind == "vector" else output.set_value)(2 * port.Eval(context))
 
             if kind == "vector":
-                self.DeclareVectorOutputPort("y", 1, calc, sources)
+                self.DeclareVectorOutputPort("y", 1, calc, *sources)
             else:
-                self.DeclareAbstractOutputPort("y", lambda: AbstractValue.Make(np.zeros(1)), calc, sources)
+                self.DeclareAbstractOutputPort("y", lambda: AbstractValue.Make(np.zeros(1)), calc, *sources)
 
     builder = DiagramBuilder()
     system = builder.AddSystem(Doubled())
@@ -64,6 +64,16 @@ def test_an_output_of_all_sources_depends_on_the_inputs(kind: str, said: bool):
     for value in (1.0, 3.0):
         diagram.get_input_port().FixValue(context, [value])
         assert diagram.get_output_port().Eval(context) == 2 * value
+
+
+def test_a_diagram_with_one_is_copied_to_no_other_scalar():
+    """A copy would lack what is declared in Python; to make it, or to use it, crashed the process."""
+    builder = DiagramBuilder()
+    builder.AddSystem(SampledSystem())
+    diagram = builder.Build()
+    for convert in (diagram.ToAutoDiffXd, diagram.ToSymbolic):
+        with pytest.raises(RuntimeError, match="does not support scalar conversion"):
+            convert()
 
 
 def every_system(diagram: Diagram) -> list[System]:
