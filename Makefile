@@ -14,6 +14,9 @@ CORES := $(shell getconf _NPROCESSORS_ONLN 2>/dev/null || echo 1)
 # thread each took 34 s with four threads each on four cores.
 export OMP_NUM_THREADS ?= 1
 export OPENBLAS_NUM_THREADS ?= 1
+# Kept bytecode, whatever the environment says: hundreds of processes of a test run would each compile up to
+# 800 modules anew.
+export PYTHONDONTWRITEBYTECODE :=
 # Pyright comes at a pinned version from the package index and need not ask elsewhere for a newer one.
 export PYRIGHT_PYTHON_IGNORE_WARNINGS := 1
 

@@ -69,7 +69,8 @@ def test_without_a_history_a_joint_drifts_behind_the_first_check(tmp_path: Path)
     ("arguments", "message"),
     [
         (["--checks", "0"], "--checks must be at least 1, got 0"),
-        (["--change", "joint:7:1"], "--change must be joint:N:MDEG, tool:MM, camera:NAME:MICRORADIANS"),
+        (["--change", "joint:1"], "--change must be joint:N:MDEG, tool:MM, camera:NAME:MICRORADIANS"),
+        (["--change", "joint:7:1"], "--change joint:7:1: the joints are 1 to 6, got '7'"),
         (["--change", "camera:99:1"], "the cameras are 01, 02"),
         (["--change", "marker:5:nan"], "--change marker:5:nan: the size must be a finite number, got 'nan'"),
         (["--change", "joint:3:inf"], "--change joint:3:inf: the size must be a finite number, got 'inf'"),
