@@ -1,4 +1,4 @@
-"""Every command on a UR10 from its URDF and on a Puma 560, without a further word."""
+"""Every command on a UR10 from its URDF and on a Puma 560, without a further word; what takes long on one."""
 
 import json
 from pathlib import Path
@@ -95,6 +95,7 @@ def test_modes_are_found(robot: str):
 
 
 @pytest.mark.slow
+@pytest.mark.parametrize("robot", ["ur10"], indirect=True)
 def test_feedforwards_are_compared(robot: str):
     """The plant is that of the models, so the model with an elastic structure leaves hardly anything."""
     result = truetip("feedforward", "--robot", robot, "--grid=2", "--json", "-", "--jobs=1")
@@ -104,6 +105,7 @@ def test_feedforwards_are_compared(robot: str):
 
 
 @pytest.mark.slow
+@pytest.mark.parametrize("robot", ["puma560"], indirect=True)
 def test_the_simulated_robot_is_calibrated(robot: str):
     result = truetip("calibrate", "--robot", robot, "--count=30", "--write=found.yaml", "--json=numbers.json")
     assert result.exit_code == 0, result.output

@@ -20,7 +20,6 @@ from robots.description.model import load_robot
 from robots.pose import rotation_vector
 
 LAW = "self_calibrating"
-LAPS = 2
 _GEARS_ERR = "servo.laws.self_calibrating.estimator.spread.gear_error"  # rad
 _SETTLED = 0.5  # s of the dwell, after which the tip is at rest
 _LONGEST = 5.0  # times the planned duration, after which a run is over
@@ -33,6 +32,7 @@ class CellRun:
     robot: str
     seed: int
     path: str = "rectangle"
+    laps: int = 2
     wrong: Wrong = field(default_factory=Wrong)
     drives: Drives = field(default_factory=Drives)
     camera: Camera = field(default_factory=Camera)
@@ -57,7 +57,7 @@ def run(job: CellRun, progress: Progress) -> dict[str, Any]:
         often it intervened; and what was ``learnt``.
     """
     plain, law = Case("plain", job.settings), Contender(LAW, LAW)
-    scenario = Trial("everything", plain, law, job.seed, job.path, LAPS, job.robot).load()
+    scenario = Trial("everything", plain, law, job.seed, job.path, job.laps, job.robot).load()
     robot, station = load_robot(scenario.robot), scenario.station
     servo = Servo(robot, scenario, LAW)
     theta = start_position(servo.model, scenario, servo.reference.path)

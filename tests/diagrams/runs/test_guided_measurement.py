@@ -10,11 +10,8 @@ from diagrams.hardware_link import EndedOnRequest
 from diagrams.runs.guided_measurement import GuidedMeasurement, Row, Visit
 from diagrams.runs.measurement import MeasurementRun
 from diagrams.scenario.scenario import Scenario, load_scenario
-from robots.calibration.identification import identify
 from robots.calibration.measurements import Measurements
 from robots.description.model import load_robot
-from robots.measurement_design.constraints import AdmissibleConfigurations
-from robots.measurement_design.design import design_measurements
 from robots.pose import pose_error
 from tests.diagrams.lockstep import Lockstep
 
@@ -79,17 +76,3 @@ def test_a_slow_camera_gives_no_exposure_from_motion():
     assert not unseen
     expected = simulated(load_scenario("cell", QUIET), PLACES)
     assert np.abs(pose_error(found.X_WE, expected.X_WE)).max() < 5e-5
-
-
-@pytest.mark.slow
-def test_a_calibration_over_a_bad_wire_equals_the_simulated_one_within_its_standard_deviations():
-    scenario = load_scenario("cell", FAULTS)
-    design = design_measurements(ROBOT, 12, admissible=AdmissibleConfigurations(ROBOT))
-    over_wire, _ = recorded(scenario, design.configurations)
-    first, second = (
-        identify(ROBOT, table) for table in (over_wire, simulated(scenario, design.configurations))
-    )
-    assert first.names == second.names
-    off = (first.values - second.values) / np.hypot(first.sigmas, second.sigmas)
-    assert np.abs(off).max() < 3.5  # the largest of 30
-    assert np.sqrt(np.mean(off**2)) < 1.5

@@ -47,8 +47,6 @@ def largest_and_static(log, e: np.ndarray) -> tuple[float, float]:
     [
         ("numerical_ik", []),
         ("pbvs", ["reference.override=[{at: 2.2, share: 0.7}]"]),
-        ("position_level", []),
-        ("open_loop", []),
     ],
 )
 def test_over_the_wire_a_law_is_as_accurate_as_in_simulation(law: str, settings: list[str]):

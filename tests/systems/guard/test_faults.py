@@ -94,7 +94,7 @@ def test_no_sequence_of_faults_moves_a_joint_beyond_its_limits(sequence, share, 
 
 
 @pytest.mark.slow
-@settings(max_examples=500)
+@settings(max_examples=250)
 @drawn
 def test_nor_does_one_of_many_sequences(sequence, share, resume, stops):
     check(sequence, share, resume, stops)

@@ -95,7 +95,7 @@ def test_no_sequence_of_faults_jerks_a_joint(sequence, share, jerk, resume, is_s
 
 
 @pytest.mark.slow
-@settings(max_examples=500, deadline=None)
+@settings(max_examples=200, deadline=None)
 @drawn
 def test_nor_does_one_of_many_sequences(sequence, share, jerk, resume, is_speed_only):
     check(sequence, share, jerk, resume, is_speed_only)

@@ -50,7 +50,7 @@ CONTROLLER = VirtualController(ROBOT, EgmRunConfig())
 RSI_CONTROLLER = RsiController(ROBOT, RsiRunConfig(restart_after=0.0))
 Q = np.array([0.1, 0.2, 0.3, 0.1, 0.5, 0.2])
 QUICK = 400  # datagrams of each decoder in every run of the tests
-MANY = 125_000  # in the slow ones: a million of all together
+MANY = 40_000  # in the slow ones
 CORPUS = Path(__file__).parent / "corpus"  # what has once been a problem, a file each, named by its decoder
 LONGEST = 5e-3  # s of the processor's time
 

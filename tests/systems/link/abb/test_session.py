@@ -184,7 +184,7 @@ def test_random_and_mutated_datagrams_change_nothing(data):
     assert rig.hear(report(2 if taken is None else taken.seqno + 1, time=taken and taken.time + PERIOD))
 
 
-@pytest.mark.parametrize("count", [10_000, pytest.param(500_000, marks=pytest.mark.slow)])
+@pytest.mark.parametrize("count", [10_000, pytest.param(200_000, marks=pytest.mark.slow)])
 def test_spoiled_datagrams_cause_no_error_no_reply_and_no_change(count: int):
     """Twice as many datagrams: one from a stranger, one of garbage from the right port."""
     assert fuzz(count) == 0
