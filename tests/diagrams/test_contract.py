@@ -80,6 +80,7 @@ def test_the_station_is_fed_by_the_servo_alone(experiment: Experiment):
     assert all(system is experiment.servo for system in sources)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("law", LAWS)
 def test_a_run_is_the_same_with_station_and_servo_in_diagrams_of_their_own_and_without(law: str):
     """To the last bit: what is wired is the same, the integrator only reaches it sooner."""

@@ -38,6 +38,7 @@ def test_more_accuracy_moves_the_tip_by_less_than_a_micrometre(law: str, payload
     assert error < 1e-6
 
 
+@pytest.mark.slow
 def test_a_stiff_loop_is_right_to_a_tenth_of_a_micrometre_with_a_noisy_camera():
     duration, scheme = 0.3, "radau3"
     found, accurate = tips("pbvs", duration), tips("pbvs", duration, *ACCURATE[scheme])

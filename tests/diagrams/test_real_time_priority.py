@@ -12,6 +12,7 @@ from diagrams.real_time_priority import real_time_priority
 pytestmark = pytest.mark.real_time
 
 
+@pytest.mark.slow
 def test_inside_the_process_comes_first_and_its_children_do_not():
     try:
         with real_time_priority(3):

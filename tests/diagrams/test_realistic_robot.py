@@ -37,6 +37,7 @@ def test_a_friction_that_is_named_moves_the_robot_like_the_same_friction_in_the_
     np.testing.assert_allclose(again.joint_effort, once.joint_effort, atol=1e-5)
 
 
+@pytest.mark.slow
 def test_a_realistic_robot_comes_to_rest_and_moves_the_same_every_time():
     robot = load_robot("irb1200-realistic")
     rest = ("reference.settle=2.5", "initial_error_mm=[0, 0, 0]")

@@ -92,6 +92,7 @@ def test_a_design_is_nearly_as_good_as_any():
     assert 0.9 * chosen.bound < chosen.b3 <= chosen.bound
 
 
+@pytest.mark.slow
 def test_a_robot_with_known_errors_is_found_and_tried_where_it_was_not_measured():
     robot = load_robot("irb1200")
     model, rng = ErrorModel(robot), np.random.default_rng(3)
@@ -159,6 +160,7 @@ def test_springs_that_are_softer_than_believed_are_found_from_two_motions(
     assert capsys.readouterr() == ("", "")
 
 
+@pytest.mark.slow
 def test_a_recording_that_shows_no_spring_is_refused():
     time = 1e-3 * np.arange(80)
     theta, gyro = np.tile([0.0, -1.0, 0.7, 0.0, 0.5, 0.0], (80, 1)), np.zeros((80, 1, 3))

@@ -203,6 +203,7 @@ def test_a_run_can_be_watched_in_real_time(tmp_path, monkeypatch):
     assert timing["real_time_factor"] < 1.05
 
 
+@pytest.mark.slow
 def test_what_the_readme_shows_can_be_run(tmp_path):
     readme = (Path(main.__file__).parents[1] / "README.md").read_text()
     # Of a robot file only one joint is shown.

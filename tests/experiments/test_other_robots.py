@@ -40,6 +40,7 @@ def test_a_scenario_is_carried_over_unless_it_says_otherwise(tmp_path: Path, mon
     assert free.scenario.reference.path.kind == "rectangle"
 
 
+@pytest.mark.slow
 def test_a_robot_among_the_settings_is_as_one_beside_them():
     """The largest payload of a Puma 560 is a third of the 7 kg that the scenario says for its own robot."""
     beside, among = prepare("misaligned", robot="puma560"), prepare("misaligned", ["robot=puma560"])

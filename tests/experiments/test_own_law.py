@@ -48,6 +48,7 @@ def refused(tmp_path: Path, text: str, name: str = "Mine") -> str:
     return line
 
 
+@pytest.mark.slow
 def test_the_printed_law_is_short_and_brings_the_tip_where_the_open_loop_does_not(my_law: str):
     assert len(printed().splitlines()) <= 40
     scenario = load_scenario("misaligned", LONG_ENOUGH)
@@ -76,6 +77,7 @@ def test_run_and_compare_take_it_beside_the_shipped_ones(my_law: str, tmp_path: 
     assert "summary.json" in files(tmp_path / "alone")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("traits", "said"),
     [
@@ -98,6 +100,7 @@ def test_a_law_that_commands_degrees_is_told_that_the_guard_did_not_follow_it(
     assert "report.html" in files(tmp_path / "out")  # which shows what happened
 
 
+@pytest.mark.slow
 def test_a_file_that_is_edited_between_two_runs_of_a_session_is_read_again(my_law: str):
     scenario = load_scenario("misaligned", LONG_ENOUGH)
     before = simulate(scenario, my_law)

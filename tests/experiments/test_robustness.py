@@ -34,6 +34,7 @@ def test_every_case_is_a_scenario_and_only_the_seed_draws_the_robot():
         assert bool(station.events) == (trial.case.recovered_at is not None)
 
 
+@pytest.mark.slow
 def test_a_mixture_is_a_scenario_and_the_same_whenever_its_seed_is_drawn():
     todo, again = (trials("everything", [CASES["mixed"]], OPEN_LOOP, range(60), ["circle"]) for _ in "12")
     assert [trial.settings for trial in todo] == [trial.settings for trial in again]
@@ -50,6 +51,7 @@ def test_a_mixture_is_a_scenario_and_the_same_whenever_its_seed_is_drawn():
     assert max(late) > 0.1
 
 
+@pytest.mark.slow
 def test_what_is_set_for_all_outweighs_what_is_drawn():
     case = replace(CASES["mixed"], settings=("station.period=0.006", "station.drive.command_delay=0.006"))
     (trial,) = trials("everything", [case], OPEN_LOOP, [3], ["circle"], robot="ur10")

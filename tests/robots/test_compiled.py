@@ -5,6 +5,8 @@ import subprocess
 import sys
 import time
 
+import pytest
+
 from robots.compiled import drop_outdated
 
 INNER = """
@@ -34,6 +36,7 @@ def answer(root) -> str:
     ).stdout
 
 
+@pytest.mark.slow
 def test_what_calls_a_changed_function_is_compiled_anew(tmp_path):
     folder = tmp_path / "robots"
     folder.mkdir()

@@ -104,6 +104,7 @@ def test_the_nominal_scenario_starts_10_mm_off_along_each_axis():
     np.testing.assert_allclose(errors[0], [0.0, 0.0, 0.0, 0.01, 0.01, 0.01], atol=1e-9)
 
 
+@pytest.mark.slow
 def test_the_same_seed_gives_the_same_log_bit_for_bit_and_another_seed_another():
     def log(seed: int) -> RunLog:
         experiment = Experiment(scenario("misaligned", *SHORT), "numerical_ik", seed=seed)

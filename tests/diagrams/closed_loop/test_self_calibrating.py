@@ -58,6 +58,7 @@ def test_the_same_seed_gives_the_same_commands():
     assert np.array_equal(*commands)
 
 
+@pytest.mark.slow
 def test_a_dead_time_that_nobody_told_is_found_before_the_path_begins():
     settings = ["station.drive.dead_time=0.2", "servo.model.command_delay=0.004", "reference.settle=3"]
     experiment = Experiment(load_scenario("misaligned", settings), "self_calibrating")
@@ -118,6 +119,7 @@ def test_a_realistic_robot_whether_its_friction_is_a_number_or_a_curve_to_the_co
     assert not log.learnt["events"]
 
 
+@pytest.mark.slow
 def test_friction_of_a_wrist_that_moves_it_much_is_learnt_before_the_path_begins():
     prepared = prepare("everything-realistic", robot="kr16-realistic")
     experiment = Experiment(prepared.scenario, "self_calibrating", prepared.robot)

@@ -40,6 +40,7 @@ def test_laps_that_wind_a_joint_up_are_all_tried():
         started(scenario("nominal", TURNING, "reference.laps=2"))
 
 
+@pytest.mark.slow
 def test_a_joint_that_has_to_turn_once_begins_where_it_can():
     """From where it is nearest to home it would come to its limit halfway."""
     log = run(scenario("nominal", TURNING, "reference.timing=polynomial"), "open_loop")

@@ -44,6 +44,7 @@ def test_a_dead_time_is_found_to_a_millisecond(dead_time: float):
     assert found.camera == pytest.approx(0.0, abs=3e-4)
 
 
+@pytest.mark.slow
 def test_of_a_robot_that_does_not_follow_no_delay_is_measured():
     with pytest.raises(StationError, match=r"joint 1 was told to move by \d\.\d degrees and moved by 0\.00"):
         measured("station.faults.deaf_at=0", duration=4.0)
@@ -175,6 +176,7 @@ def test_the_delays_become_a_scenario(tmp_path):
     assert scenario.station.interface == "egm"
 
 
+@pytest.mark.slow
 def test_whoever_ends_it_gets_a_smooth_stop():
     scenario = load_scenario("cell")
     wire = Lockstep(scenario)

@@ -129,6 +129,7 @@ def test_a_clock_that_is_set_forward_moves_nothing_and_is_noted(on_path: float):
     assert record.limited_messages == 0  # the path went on along its own time
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("law", ["open_loop", pytest.param("pbvs", marks=pytest.mark.slow)])
 @pytest.mark.parametrize(
     ("fault", "why"),
@@ -146,6 +147,7 @@ def test_what_cannot_be_believed_ends_the_run_by_name_with_a_smooth_stop(law, fa
     assert_stopped(wire, on_path)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("lost", [pytest.param(0.05, marks=pytest.mark.slow), 0.09])
 def test_messages_that_are_lost_for_a_while_cost_time_and_no_jump(lost: float, on_path: float):
     record, wire = guided(faulty(f"station.faults.stall_at={on_path}", f"station.faults.stall_for={lost}"))
@@ -169,6 +171,7 @@ def halted(law: str, seconds: float, catches_up: bool, resume: bool) -> tuple[Re
 HALTS = [(0.03, True), (0.08, False), (0.2, True)]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("law", "seconds", "catches_up", "resume"),
     [
@@ -243,6 +246,7 @@ def test_whatever_comes_no_message_is_further_than_a_robot_gets_in_the_longest_g
         assert (np.abs(np.diff(position, axis=0)) <= ROBOT.speed * LONGEST_STEP).all()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("resume", [pytest.param(False, marks=pytest.mark.slow), True])
 def test_a_camera_that_sees_nothing_any_more_stops_the_robot_and_the_run_says_so(resume: bool):
     """The path is not over when its time is: the robot stands."""
@@ -272,6 +276,7 @@ def test_the_former_name_of_the_switch_is_understood():
     assert not faulty("station.link.on_break=end").servo.guard.resume
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("share", [pytest.param(0.3, marks=pytest.mark.slow), 0.6])
 def test_who_wants_an_end_gets_a_smooth_stop_and_what_was_recorded(share: float):
     wanted: list[float] = []
@@ -298,6 +303,7 @@ def test_an_end_is_heard_on_the_way_to_the_start_too():
     assert not wire.sent
 
 
+@pytest.mark.slow
 def test_joints_that_jump_on_the_way_to_the_start_end_it_with_a_smooth_stop():
     """Who led on from where they are said to be would drive the robot elsewhere."""
     before = Lockstep(faulty())
@@ -313,6 +319,7 @@ def test_joints_that_jump_on_the_way_to_the_start_end_it_with_a_smooth_stop():
     assert_stopped(wire, at)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("law", "settings", "at"),
     [
@@ -329,6 +336,7 @@ def test_a_controller_that_takes_no_commands_ends_the_run_by_name(law: str, sett
     assert_unsurprising(wire)
 
 
+@pytest.mark.slow
 def test_nor_is_it_waited_for_on_the_way_to_the_start():
     wire = Lockstep(faulty("station.faults.deaf_at=0", "reference.path=rectangle"))
     with pytest.raises(StationError, match="the robot does not follow: joint"):

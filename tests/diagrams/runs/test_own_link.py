@@ -97,6 +97,7 @@ class OwnCamera:
         return SimpleNamespace(counters={}, clock=clock, last_error="")
 
 
+@pytest.mark.slow
 def test_a_servo_runs_on_it_as_in_simulation():
     scenario = load_scenario("cell", SHORT)
     link = OwnLink(scenario)
@@ -129,6 +130,7 @@ class Interrupted(Breaks):
     error = KeyboardInterrupt
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("law", [Breaks, Interrupted])
 def test_a_law_that_breaks_on_the_way_leaves_the_robot_at_rest_and_the_record_whole(
     law: type[Breaks], tmp_path: Path

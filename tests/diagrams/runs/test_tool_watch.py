@@ -48,6 +48,7 @@ def events(seed: int, shift: np.ndarray, blind: tuple[float, float] = (0.0, 0.0)
     return found
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", range(3))
 def test_a_fifth_of_a_millimetre_is_named_within_a_second_of_motion(seed: int):
     """The robot is off by millimetres; its size is known to its standard deviation."""
@@ -60,6 +61,7 @@ def test_a_fifth_of_a_millimetre_is_named_within_a_second_of_motion(seed: int):
     assert abs(size - 0.2) < 5.0 * sigma
 
 
+@pytest.mark.slow
 def test_nothing_is_named_without_it_though_the_camera_sees_nothing_for_a_while():
     assert events(4, np.zeros(3), blind=(3.0, 3.6)) == []
 

@@ -33,6 +33,7 @@ def poses(scenario: Scenario) -> tuple[np.ndarray, np.ndarray]:
     return times, path.sample(times)[0]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["ur3_robot.urdf", "ur10_robot.urdf", "puma560", "kr16"])
 def test_the_path_is_followed_on_one_branch_within_limits_and_speeds(name: str):
     robot = robot_of(name)
@@ -48,6 +49,7 @@ def test_the_path_is_followed_on_one_branch_within_limits_and_speeds(name: str):
     assert scenario.station.payload == pytest.approx(robot.payload.largest_mass, rel=1e-3)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["tx2_90", "irb140"])
 def test_a_robot_that_is_off_by_centimetres_reaches_the_path_as_well(name: str):
     """By 4 % of the length of its arm, in whatever direction; a TX2-90 had 30 mm left."""
@@ -62,6 +64,7 @@ def test_a_robot_that_is_off_by_centimetres_reaches_the_path_as_well(name: str):
         assert np.abs(np.diff(q, axis=0)).max() < 1.0
 
 
+@pytest.mark.slow
 def test_slow_joints_get_a_slower_path_unless_its_speed_is_said():
     """A Kinova whose joints turn by 36 degrees a second."""
     robot, scenario = robot_of("kinova.urdf"), load_scenario("misaligned")
@@ -91,6 +94,7 @@ def test_the_path_keeps_its_shape_and_its_turns():
     np.testing.assert_allclose(turns[1], turns[0], atol=1e-6)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("path", ["circle", "figure_eight", "points"])
 def test_every_shape_is_carried_and_can_be_written(path: str, tmp_path: Path):
     scenario, _ = carried_over(
@@ -175,6 +179,7 @@ def test_the_drawing_of_a_file_is_found_beside_it(tmp_path: Path):
     assert load_robot(changed.servo.model.robot).name == load_robot("kr16").name
 
 
+@pytest.mark.slow
 def test_drives_turn_their_motors_as_quickly_as_those_of_the_robot_before():
     """Gains of a motor that turns 260 times as much leave 260 times as much of what it should."""
     before, robot = load_scenario("misaligned"), load_robot("kr210")

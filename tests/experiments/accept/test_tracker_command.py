@@ -46,6 +46,7 @@ def test_the_camera_that_is_wrong_is_named(files, tmp_path):
     assert "Along the motion" in (tmp_path / "t.html").read_text()
 
 
+@pytest.mark.slow
 def test_the_robot_is_that_of_the_record_and_refusals_say_of_what_they_are(tmp_path):
     time = np.arange(0.0, 8.0, 0.01)
     q = 0.3 * np.sin(np.outer(time, [0.9, 1.3, 0.7, 1.1, 1.7, 2.3])) + [0.0, -1.5, 1.7, 0.0, 0.8, 0.0]

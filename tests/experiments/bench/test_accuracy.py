@@ -23,6 +23,7 @@ def result(**more) -> dict:
     return found | {"coverage": (0.944, 0.975)} | more
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("row", ROWS, ids=lambda row: row.name)
 def test_every_row_is_a_command_whose_runs_are_possible(row: Row, monkeypatch):
     begun = []

@@ -53,6 +53,7 @@ def test_what_is_kept_after_the_record_was_emptied_is_the_rest_of_the_record():
     assert np.array_equal(rest.X_WE_true, full.X_WE_true[-len(rest.time) :])
 
 
+@pytest.mark.slow
 def test_a_run_that_was_ended_goes_on_as_if_it_had_not_been(tmp_path):
     scenario = load_scenario("misaligned", ["reference.settle=0"])
     camera = replace(scenario.station.camera, orientation_sigma_deg=0.0, position_sigma=0.0)

@@ -144,6 +144,7 @@ def test_a_controller_before_the_drives_comes_to_its_reference_with_its_gain():
     np.testing.assert_allclose(off[-1], 0.0, atol=1e-5)
 
 
+@pytest.mark.slow
 def test_what_a_step_of_the_physics_changes_is_microns_and_in_proportion_to_it(monkeypatch):
     """Of the same commands, with reversals of all joints; the drives are sampled at each step, too."""
     robot, period, tips = load_robot("irb1200"), 4e-3, []

@@ -37,6 +37,7 @@ def cycle(arm: Arm, gears: WornGears, data: mujoco.MjData, largest: float, durat
     return np.array(rows[len(rows) // 2 :])
 
 
+@pytest.mark.slow
 def test_a_gear_without_load_lies_between_its_flanks_and_under_load_behind_one():
     arm, gears, data = worn(Wear(hysteresis=0.0, unevenness=0.0))
     torque, x = cycle(arm, gears, data, 20.0, 8.0).T
@@ -47,6 +48,7 @@ def test_a_gear_without_load_lies_between_its_flanks_and_under_load_behind_one()
     np.testing.assert_allclose(x[loaded], expected[loaded], atol=3e-6)
 
 
+@pytest.mark.slow
 def test_springs_that_slip_lose_what_friction_takes():
     """4 k w (X - w) a cycle each, with the stretch w at which it slips and the largest deflection X."""
     arm, gears, data = worn(Wear(play=0.0, unevenness=0.0, grease=0.0))

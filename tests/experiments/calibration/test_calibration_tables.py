@@ -132,6 +132,7 @@ def test_a_file_of_known_noise_is_believed(tmp_path: Path):
     assert json.loads(result.stdout)["noise"] == pytest.approx(known)
 
 
+@pytest.mark.slow
 def test_who_measures_positions_need_not_know_how_well_they_turn(tmp_path: Path):
     tables(tmp_path, "irb1200")
     (tmp_path / "noise.yaml").write_text("{joint_deg: 0.01, position_mm: 0.1}")
@@ -169,6 +170,7 @@ def worst_step(robot: Path, true: MatrixRobot, q: np.ndarray, found: dict) -> fl
     return float(np.abs(steps - true_steps).max())
 
 
+@pytest.mark.slow
 def test_a_table_of_targets_and_instruments_becomes_a_robot(tmp_path: Path):
     true, seen = observed(count=40)
     write_lines(tmp_path / "m.csv", seen, range(40))
@@ -198,6 +200,7 @@ def test_a_table_of_targets_and_instruments_becomes_a_robot(tmp_path: Path):
     assert "--position-only has no effect on a table of targets and instruments" in refusal(refused)
 
 
+@pytest.mark.slow
 def test_an_adjustment_is_validated_on_lines_of_its_own_and_written_as_urdf(tmp_path: Path):
     """Noise is known, one line of the fresh ones is bad, a redundant parameter stays zero."""
     true, seen = observed(count=60, noise=5e-5)
@@ -295,6 +298,7 @@ def test_rows_with_the_same_fault_share_a_line():
     ]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["irb1200", "kr210"])
 def test_springs_that_are_taken_for_noise_of_the_joints_are_asked_for(name: str):
     """Sag follows the weight and noise does not; on a long arm little noise of joints is as large."""

@@ -33,6 +33,7 @@ def test_refusals_come_before_the_search(options: list, message: str, tmp_path: 
     assert files(tmp_path) == set()
 
 
+@pytest.mark.slow
 def test_a_table_that_somebody_has_filled_stays(tmp_path: Path):
     """Before the search, where it holds places; after it, where it may hold joints as they were noted."""
     design = ["design", "--count", 9, "--anywhere", "--program", "rapid"]

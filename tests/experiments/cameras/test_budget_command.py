@@ -37,6 +37,7 @@ def test_the_shares_are_a_whole_and_late_stamps_take_over(tmp_path: Path):
 EXACT = ["--pixel-sigma", "--camera-mm", "--camera-urad", "--tool-mm", "--temperature"]
 
 
+@pytest.mark.slow
 def test_where_nothing_is_uncertain_is_no_share_of_anything(tmp_path: Path):
     """Late stamps alone are no uncertainty at the corners, where the tool is at rest."""
     zeros = [word for option in EXACT for word in (option, "0")]
@@ -49,6 +50,7 @@ def test_where_nothing_is_uncertain_is_no_share_of_anything(tmp_path: Path):
     assert not (tmp_path / "c.html").exists()
 
 
+@pytest.mark.slow
 def test_a_record_of_another_robot_is_refused(tmp_path: Path):
     (log,) = comparison(cycles=1, with_joints=True)["pbvs"]
     reached = Kinematics(load_robot("irb1200")).forward(log.joint_position)

@@ -17,6 +17,7 @@ def run(*arguments: object) -> Result:
     return truetip("cameras", *arguments)
 
 
+@pytest.mark.slow
 def test_a_simulated_calibration_finds_the_cell_it_came_from(tmp_path: Path):
     result = run(
         "calibrate",
@@ -63,6 +64,7 @@ def test_a_wand_that_is_millimetres_wrong_is_told_by_the_frame(tmp_path: Path):
     assert "wrong by 2.8" in said
 
 
+@pytest.mark.slow
 def test_the_table_is_that_of_motion_capture(tmp_path: Path):
     result = run("calibrate", "--places=200", f"--report={tmp_path / 'c.html'}")
     assert result.exit_code == 0, result.output

@@ -37,6 +37,7 @@ def test_more_cameras_more_markers_and_a_larger_body_know_more():
     assert rotations == sorted(rotations, reverse=True)
 
 
+@pytest.mark.slow
 def test_farther_away_the_position_is_uncertain_in_proportion():
     """The distance is that on the slant, sqrt(radius^2 + 2^2); more markers touch far away."""
     near, far = swept("distance", 4.0, 8.0)

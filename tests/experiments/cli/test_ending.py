@@ -28,6 +28,7 @@ def test_signals_that_come_together_are_one_request_and_a_later_one_interrupts(m
             os.kill(os.getpid(), signal.SIGINT)
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(not os.path.exists("/dev/full"), reason="no /dev/full")
 @pytest.mark.parametrize("more", [[], ["--json", "-"]])
 def test_a_stdout_that_is_full_costs_no_result(more: list[str], tmp_path: Path):
@@ -48,6 +49,7 @@ def test_a_stdout_that_is_full_costs_no_result(more: list[str], tmp_path: Path):
     assert files(out) == RESULTS
 
 
+@pytest.mark.slow
 def test_a_reader_that_has_seen_enough_ends_a_command_quietly():
     command = [sys.executable, "-m", "experiments.main", "scenarios"]
     with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE) as process:

@@ -38,6 +38,7 @@ def test_the_folder_of_feedforward_holds_its_page():
     assert renamed("feedforward", ["--out=folder", "--grid", "2"]) == [f"--report={page}", "--grid", "2"]
 
 
+@pytest.mark.slow
 def test_a_command_runs_with_them(tmp_path: Path):
     page = tmp_path / "z.html"
     done = truetip("zeros", "--example", "beam", "--out", page, "--json", "-")

@@ -26,6 +26,7 @@ def test_a_copied_robot_file_is_named_and_a_calibrated_robot_is_not(
     assert said == is_noted
 
 
+@pytest.mark.slow
 def test_it_is_said_what_the_controller_knows_of_another_robot():
     prepared = prepare("everything-realistic", robot="kr16-realistic")
     assert prepared.scenario.servo.model.robot == "kr16"
@@ -33,6 +34,7 @@ def test_it_is_said_what_the_controller_knows_of_another_robot():
     assert "the controller knows" not in prepare("everything", robot="kr16").note
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("name", "is_assumed"), [("crx10ial", True), ("kr16", False), (str(published("ur5_robot.urdf")), True)]
 )

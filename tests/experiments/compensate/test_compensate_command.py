@@ -78,6 +78,7 @@ def test_refusals_in_one_line_leave_nothing(folder: Path, tmp_path: Path, change
     assert not files(tmp_path)
 
 
+@pytest.mark.slow
 def test_what_was_calibrated_on_a_calibrated_robot_corrects_nothing(folder: Path, tmp_path: Path):
     written = tmp_path / "robot.yaml"
     robot = load_robot(str(folder / "robot.yaml"))

@@ -137,6 +137,7 @@ def test_where_a_camera_sees_axis_1_rest_half_is_left_of_what_is_left_uncorrecte
     assert seen.tip.largest < 0.5 * alone.tip.largest
 
 
+@pytest.mark.slow
 def test_a_camera_that_sees_nothing_before_the_run_is_named():
     true = load_robot("kr16-realistic")
     of = trial(true, true, "corrected", "motors", resting="seen")

@@ -121,6 +121,7 @@ def test_a_joint_of_a_guided_robot_that_drifts_is_named_and_its_history_is_not_o
     assert "simulated checks cannot be continued on a station, nor the other way round" in told
 
 
+@pytest.mark.slow
 def test_a_history_is_that_of_the_cameras_and_not_of_their_names(tmp_path: Path):
     scenario, robot = load_scenario("nominal"), load_robot("irb1200")
     path = tmp_path / "h.parquet"

@@ -68,6 +68,7 @@ def found(recording) -> RefinedDrives:
     return refined_drives(robot, plant, PAYLOAD, arm_fit(robot), recording, DriveConfig(), TRUE)
 
 
+@pytest.mark.slow
 def test_what_was_asked_before_changes_no_residual(recording):
     """Set-points are kept for a delay: with others, and other gains, they are those of a new start."""
     robot, recorded = load_robot("kr210"), driven_motions(recording)

@@ -80,6 +80,7 @@ def test_a_scenario_that_is_shown_is_read_back_as_it_is(name: str, tmp_path: Pat
     assert scenario_text(load_scenario(str(tmp_path / "shown.yaml"))) == scenario_text(load_scenario(name))
 
 
+@pytest.mark.slow
 def test_shipped_scenarios_and_robots_are_listed(pages: dict[str, Page]):
     page = pages["reference/shipped.md"].text
     assert not [name for name in shipped_scenarios() if f"`{name}`" not in page]

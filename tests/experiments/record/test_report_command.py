@@ -42,6 +42,7 @@ def test_the_report_of_records_is_that_of_the_runs(logs: dict[str, list[RunLog]]
     assert (tmp_path / "page.html").stat().st_size < 2.5e6
 
 
+@pytest.mark.slow
 def test_records_say_which_run_the_guard_stopped_and_so_does_their_report(
     logs: dict[str, list[RunLog]], tmp_path: Path
 ):
@@ -65,6 +66,7 @@ def test_cycles_that_ended_alike_are_named_once(logs: dict[str, list[RunLog]]):
     assert said == "cycles 1, 2: the guard stopped the robot at 3.0 s and it did not go on"
 
 
+@pytest.mark.slow
 def test_one_run_twice_is_refused(logs: dict[str, list[RunLog]], tmp_path: Path):
     write_records(tmp_path, "", {"pbvs": logs["pbvs"][:1]})
     before = files(tmp_path)
@@ -110,6 +112,7 @@ def test_a_summary_of_something_else_is_left_out_and_named(logs: dict[str, list[
     assert {str(tmp_path / name / "summary.json") in result.output for name in "xy"} == {True}
 
 
+@pytest.mark.slow
 def test_words_in_the_filter_hide_the_other_lines(logs: dict[str, list[RunLog]], tmp_path: Path):
     write_json(tmp_path / "summary.json", summary("it", logs))
     truetip("runs", tmp_path, "--report", tmp_path / "runs.html")

@@ -4,6 +4,8 @@ import ast
 from collections.abc import Iterator
 from pathlib import Path
 
+import pytest
+
 import experiments
 
 TABLES = ("html_table", "sortable_table", "_point_table")
@@ -24,6 +26,7 @@ def is_written(content: ast.expr) -> bool:
     return isinstance(content, ast.JoinedStr)
 
 
+@pytest.mark.slow
 def test_every_figure_says_what_one_should_see():
     silent = [
         place

@@ -197,6 +197,7 @@ def test_one_law_alone_makes_a_report(logs, tmp_path):
     assert "No intervention" in html
 
 
+@pytest.mark.slow
 def test_an_error_that_stays_within_a_decade_has_numbers_at_its_axis(logs, tmp_path):
     """From 5 to 8 degrees, where no power of ten lies between."""
     log = logs["pbvs"][0]
@@ -211,6 +212,7 @@ def test_an_error_that_stays_within_a_decade_has_numbers_at_its_axis(logs, tmp_p
     assert {"6", "7"} <= set(labels), labels
 
 
+@pytest.mark.slow
 def test_a_path_of_one_point_shows_the_point_and_where_the_tip_rests(logs, tmp_path):
     """A line that stays on the spot has no pixel."""
     log = logs["open_loop"][0]
@@ -235,6 +237,7 @@ def test_a_report_that_cannot_be_written_leaves_nothing(logs, tmp_path):
     assert list(tmp_path.iterdir()) == []
 
 
+@pytest.mark.slow
 def test_the_replay_opens_in_a_browser_and_names_the_laws(replay, logs):
     opened = open_page(replay)
     assert not [line for line in opened.console if SERIOUS.search(line)]

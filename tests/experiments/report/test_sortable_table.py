@@ -3,6 +3,8 @@
 import re
 from pathlib import Path
 
+import pytest
+
 from experiments.report.plot_page import Section, html_table, sortable_table, write_plot_page
 from tests.experiments.browser import open_page
 
@@ -31,6 +33,7 @@ def shown(folder: Path, table: str, script: str) -> dict[str, str]:
     return dict(re.findall(r'<pre id="(\w+)">(.*?)</pre>', opened.dom, re.DOTALL))
 
 
+@pytest.mark.slow
 def test_a_click_sorts_numbers_as_numbers_and_the_text_is_csv(tmp_path: Path):
     table = sortable_table("poses", ["name", "mm", "remark"], ROWS)
     script = 'click("rising", table("poses"), 1); click("falling", table("poses"), 1); '
@@ -45,6 +48,7 @@ def test_a_click_sorts_numbers_as_numbers_and_the_text_is_csv(tmp_path: Path):
     assert seen["copied"].splitlines()[1] == "p1\t10.5\ta, b"
 
 
+@pytest.mark.slow
 def test_amounts_with_units_sort_by_size_what_is_none_comes_last_and_days_in_their_order(tmp_path: Path):
     table = f"<div class=plain>{html_table(['mm'], AMOUNTS)}{html_table(['day'], DAYS)}</div>"
     clicks = 'click("up", amounts, 0); click("down", amounts, 0); click("days", days, 0)'
@@ -54,6 +58,7 @@ def test_amounts_with_units_sort_by_size_what_is_none_comes_last_and_days_in_the
     assert seen["days"].splitlines()[1:] == ["2026-10-30 09:00", "2026-11-02 10:00"]
 
 
+@pytest.mark.slow
 def test_rows_stay_below_their_heading_and_every_table_can_be_copied_and_saved(tmp_path: Path):
     script = 'click("sorted", table("groups"), 1); document.querySelector(".of-table").id = "buttons"'
     seen = shown(tmp_path, GROUPS, script)

@@ -53,6 +53,7 @@ def ishigami() -> tuple[Study, dict[str, np.ndarray]]:
     return study, {"point": np.arange(len(a)), "max_norm_mm": value, "a": a, "b": b, "c": c}
 
 
+@pytest.mark.slow
 def test_indices_of_sobol_are_those_of_the_closed_form(ishigami):
     study, rows = ishigami
     found = sobol_indices(study, rows, "max_norm_mm")

@@ -62,6 +62,7 @@ def test_every_point_has_its_row_and_a_failure_its_reason(study):
     assert "station.payload must be between 0 and 1000 kg" in rows[1]["failure"]
 
 
+@pytest.mark.slow
 def test_the_robots_of_a_study_are_known_before_it_runs_each_once():
     levels: dict[str, Factor] = {
         "robot": Names(["kr16", "crx10ial"]),
@@ -214,6 +215,7 @@ def test_the_file_that_comes_with_the_documentation_is_a_study():
     assert len(study_rows(load_study("docs/studies/payload_and_dead_time.yaml"))) > 10
 
 
+@pytest.mark.slow
 def test_a_file_that_has_changed_since_makes_another_study(tmp_path, monkeypatch: pytest.MonkeyPatch):
     """The names are the same: rows of two robots would stand in one table."""
     monkeypatch.chdir(tmp_path)

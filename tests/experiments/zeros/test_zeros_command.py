@@ -120,6 +120,7 @@ def test_the_arm_in_space_comes_from_the_command(tmp_path: Path):
     assert lowest[2] - lowest[3] < 0.5 * (lowest[1] - lowest[2])
 
 
+@pytest.mark.slow
 def test_the_page_opens(tmp_path: Path):
     assert run(tmp_path, "--robot=kr16", "--grid=3").exit_code == 0
     opened = open_page(tmp_path / "zeros.html")

@@ -22,6 +22,7 @@ from tests.robots.calibration.matrix_robot import MatrixRobot, homogeneous
 PLAIN = IdentificationConfig(noise=MeasurementNoise(0.0, 1e-9, 1e-9), leave_out_outliers=False)
 
 
+@pytest.mark.slow
 def test_an_unreduced_search_on_54_parameters_finds_the_same_robot():
     """Noisy positions have one minimum, however redundant the parameters; differences find it."""
     drawn, rng = MatrixRobot("irb1200"), np.random.default_rng(0)

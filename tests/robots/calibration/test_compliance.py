@@ -128,6 +128,7 @@ def test_the_compliant_jacobian_is_the_derivative_by_the_motors():
     assert np.abs(J - Kinematics(ROBOT).jacobian(compliant.link_positions(q))).max() > 2e-4
 
 
+@pytest.mark.slow
 def test_sag_is_left_by_the_geometry_and_explained_by_compliances():
     p = TABLE_6_1
     table = sagging(configurations(75, 8), p, 7.0).joined(sagging(configurations(75, 9), p, 0.0))

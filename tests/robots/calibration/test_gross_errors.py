@@ -142,6 +142,7 @@ def yielding_table(rng: np.random.Generator) -> tuple[Measurements, MatrixRobot]
     return table.noisy(quiet, rng), true
 
 
+@pytest.mark.slow
 def test_rows_that_show_what_the_model_lacks_are_no_gross_errors():
     """Wrong parameters of a stiff robot explain the most rows to the noise, and miss the others by far."""
     table, true = yielding_table(np.random.default_rng(5))
@@ -154,6 +155,7 @@ def test_rows_that_show_what_the_model_lacks_are_no_gross_errors():
     assert spoilt_rows.outliers == (5, 41)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", [0, 3])
 def test_the_few_rows_that_show_missing_springs_are_no_gross_errors(seed: int):
     """Three to five of thirty at the corners of the ranges miss by a millimetre, all together."""

@@ -119,6 +119,7 @@ def test_the_48_parameters_are_complete_where_frames_are_turned_about_their_axes
     assert (found.rank, found.covered, found.missed) == (30, 30, ())
 
 
+@pytest.mark.slow
 @settings(max_examples=25)
 @given(st.integers(0, 10**6), st.booleans())
 def test_the_48_parameters_are_complete_however_frames_were_drawn(seed: int, in_right_angles: bool):

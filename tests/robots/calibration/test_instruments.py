@@ -247,6 +247,7 @@ def test_noise_that_lines_say_is_shown_as_they_say_it():
     assert shown["bar"] == pytest.approx(5e-6, rel=0.6)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("count", [9, 11])
 def test_few_lines_are_not_taken_for_exact(count: int):
     """As many numbers as parameters leave nothing over: that shows neither exactness nor gross errors."""

@@ -121,6 +121,7 @@ def test_a_missing_file_is_named(tmp_path: Path):
         read_measurements(tmp_path / "nothing.csv")
 
 
+@pytest.mark.slow
 @given(
     st.text(max_size=300)
     | st.lists(st.sampled_from([JOINTS, "x_m", "1", ",", ";", "\n", '"', "nan"])).map("".join)

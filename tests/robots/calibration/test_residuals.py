@@ -10,6 +10,7 @@ from robots.description.model import load_robot
 from robots.kinematics.forward import Kinematics
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("position_only", [False, True])
 def test_known_noise_makes_standardised_residuals_as_wide_as_expected(position_only: bool):
     """Joint noise makes raw residuals of a row alike; made white they are not. Of 4800 numbers: 2 %."""

@@ -79,6 +79,7 @@ def test_kinds_of_noise_that_rows_cannot_tell_apart_are_said_to_be_unknown(rows:
         assert np.any(spread > found.theta[1:])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", [0, 5, 9])
 def test_springs_that_are_missing_are_no_hindrance(seed: int):
     """Measured at corners of the ranges, the joints seem so noisy that they hide the camera's noise."""

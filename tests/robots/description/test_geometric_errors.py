@@ -15,6 +15,7 @@ def drawn(seed: int) -> np.ndarray:
     return RandomErrors(seed, translation_mm=6.0, rotation_deg=0.9).vector(ROBOT)
 
 
+@pytest.mark.slow
 def test_draws_fill_their_bounds_evenly():
     """1000 robots of 48 errors: the spread of a uniform draw is its bound over the root of three."""
     errors = np.array([drawn(seed) for seed in range(1000)])

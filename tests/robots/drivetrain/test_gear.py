@@ -111,6 +111,7 @@ def test_a_gear_never_gives_more_power_than_it_takes(torque: float, speed: float
     assert exact <= torque * speed + 1e-12
 
 
+@pytest.mark.slow
 @given(torque=st.floats(-300.0, 300.0), speed=st.floats(-3.0, 3.0))
 def test_the_smooth_losses_can_be_undone(torque: float, speed: float):
     t, w = np.array(torque), np.array(speed)

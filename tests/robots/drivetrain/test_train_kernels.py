@@ -84,6 +84,7 @@ def joint_torques(
     return motor, -torque, rates
 
 
+@pytest.mark.slow
 @settings(max_examples=300, deadline=None)
 @given(st.lists(joints, min_size=1, max_size=4), st.integers(0, 2**32 - 1))
 def test_the_compiled_torques_are_those_of_the_parts(trains, seed):

@@ -81,6 +81,7 @@ def sighting(parameters: ElasticParameters, rates: np.ndarray, spread: float = 2
     return Sighting(load_robot("kr210"), PAYLOAD, case, sensors, left, parameters, parameters.start)
 
 
+@pytest.mark.slow
 def test_information_is_of_second_degree_in_motion_over_spread(parameters: ElasticParameters):
     """A motion half as fast tells a quarter: what it shows is linear in it, but for the squares of speeds."""
     rates = np.array([0.2, 0.2, 0.2, 0.0, 0.0, 0.0])

@@ -1,6 +1,7 @@
 """Standard deviations of a fit: how much parts of the data disagree."""
 
 import numpy as np
+import pytest
 
 from robots.identification.arm_fit import condensed, part_of, scatter, widest
 
@@ -27,12 +28,14 @@ def mean_scatter(noise) -> tuple[np.ndarray, np.ndarray]:
     return np.mean(found, axis=0), np.cov(np.transpose(solutions))
 
 
+@pytest.mark.slow
 def test_independent_noise_scatters_as_it_should_even_where_one_part_tells_nearly_all():
     """By the law of large numbers within some hundredths."""
     estimated, true = mean_scatter(lambda rng: rng.normal(size=(PARTS, ROWS)))
     np.testing.assert_allclose(np.diagonal(estimated), np.diagonal(true), rtol=0.1)
 
 
+@pytest.mark.slow
 def test_what_is_wrong_alike_within_a_part_counts():
     """Noise would be thought to average out over the rows of a part; this does not."""
 

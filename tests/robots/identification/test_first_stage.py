@@ -82,6 +82,7 @@ def test_main_springs_are_found_from_a_factor_of_two(arm: ElasticArm, seed: int)
     assert whole.cost(found, spread).sum() < 1.01 * whole.cost(true, spread).sum()
 
 
+@pytest.mark.slow
 def test_a_lag_of_the_sensors_is_found_with_the_dampers(arm: ElasticArm):
     """A tenth of a sample, 0.2 ms: a sixth of what a damper delays."""
     parameters = ElasticParameters(arm, gear_parts=False)
@@ -96,6 +97,7 @@ def test_a_lag_of_the_sensors_is_found_with_the_dampers(arm: ElasticArm):
     assert np.exp(found[gears] - true[gears]) == pytest.approx(1.0, abs=0.25)
 
 
+@pytest.mark.slow
 def test_the_last_stage_ends_where_noise_leaves_much_more_open(arm: ElasticArm):
     """Where it ended earlier, springs of a UR5 were off by six times what noise makes of them."""
     parameters = ElasticParameters(arm, gear_parts=False)
@@ -110,6 +112,7 @@ def test_the_last_stage_ends_where_noise_leaves_much_more_open(arm: ElasticArm):
     assert (np.abs(found - best) < 0.01 * np.sqrt(np.diagonal(noise))).all()
 
 
+@pytest.mark.slow
 def test_readings_count_up_to_a_horizon_that_grows(arm: ElasticArm):
     case = replace(motion(POSITIONS[0]), readings=np.ones((SAMPLES, len(SENSORS), 3)))
     parameters, seen = ElasticParameters(arm, gear_parts=False), []

@@ -16,6 +16,7 @@ def many_minima(x: np.ndarray) -> float:
     return float(np.sum(np.square(x - BEST) + 0.5 * (1.0 - np.cos(2.0 * np.pi * (x - BEST)))))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("search", [BOX.cma, BOX.genetic])
 def test_the_least_minimum_is_found_from_another_one(search):
     start = BEST + np.array([1.0, -1.0, 1.0])

@@ -77,6 +77,7 @@ def needed(
     return found
 
 
+@pytest.mark.slow
 def test_payload_and_counterbalance_are_found_to_a_hundredth(robot: RobotModel, motion: SlowMotion):
     found = identify_slow_motion(robot, BELIEVED_LOAD, motion)
     assert found.payload == pytest.approx(TRUE_LOAD, rel=0.01)
@@ -87,6 +88,7 @@ def test_payload_and_counterbalance_are_found_to_a_hundredth(robot: RobotModel, 
     assert not found.moving[700:760].any()
 
 
+@pytest.mark.slow
 def test_a_flange_without_load_is_one_though_noise_may_make_its_mass_negative(robot: RobotModel):
     found = identify_slow_motion(robot, BELIEVED_LOAD, slow_motion(robot, 0.0))
     assert found.payload == 0.0
@@ -102,6 +104,7 @@ def test_a_load_that_the_robot_cannot_carry_is_refused(robot: RobotModel, motion
         identify_slow_motion(weaker, 90.0, motion)
 
 
+@pytest.mark.slow
 def test_friction_curves_are_found_to_three_hundredths_and_their_kinds_told_apart(
     robot: RobotModel, motion: SlowMotion
 ):

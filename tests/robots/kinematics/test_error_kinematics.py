@@ -59,6 +59,7 @@ def test_the_regressor_is_the_derivative_at_any_errors(robot: RobotModel, size: 
         np.testing.assert_allclose(Theta[..., k], difference, atol=2e-9, err_msg=model.parameters[k].name)
 
 
+@pytest.mark.slow
 @given(st.lists(st.floats(-3.0, 3.0), min_size=NUM_PARAMETERS, max_size=NUM_PARAMETERS))
 @settings(max_examples=50, deadline=None)
 def test_a_robot_file_can_hold_all_errors(scales: list[float]):

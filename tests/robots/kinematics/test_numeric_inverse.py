@@ -125,6 +125,7 @@ def general(tmp_path: Path) -> RobotModel:
     return robot
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", ["ur5", "general"])
 def test_no_branch_is_missed_that_a_dense_sampling_finds(kind: str, tmp_path: Path):
     """Of 1e5 configurations the 150 nearest to the pose are led there by MINPACK; they find nothing new."""

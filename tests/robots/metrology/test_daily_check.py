@@ -61,6 +61,7 @@ def test_a_small_drift_names_all_joints_that_explain_it(joint):
     assert np.mean([len(names) for names in named]) < (2.1 if joint in (1, 2) else 1.2)
 
 
+@pytest.mark.slow
 def test_the_size_of_a_drift_scatters_by_its_standard_deviation():
     """The first check is in it whole, and a mean of those since the onset."""
     offset = np.array([0.0, 0.0, 0.0, 0.0, 0.0, 0.0097])  # some eight standard deviations: known after three

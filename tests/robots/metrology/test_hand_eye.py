@@ -93,6 +93,7 @@ def test_opencv_finds_the_same_and_fits_no_better(method: str):
     assert np.sum((found.residual / sigmas) ** 2) < np.sum((pose_error(X_CD, expected) / sigmas) ** 2)
 
 
+@pytest.mark.slow
 def test_the_predicted_spread_is_the_one_that_occurs():
     rng = np.random.default_rng(3)
     X_BF = flange_poses(rng)

@@ -48,6 +48,7 @@ def test_two_steps_are_two():
     assert second.size[0] < -1e-4
 
 
+@pytest.mark.slow
 def test_neither_noise_nor_bends_nor_vibration_are_steps():
     calm = motion(60.0, 5)
     t = np.arange(len(calm))[:, None] * PERIOD

@@ -26,6 +26,7 @@ def alone(speed: np.ndarray, gear_torque: np.ndarray, gear_torque_rate: np.ndarr
     return MotionLimits(speed, FREE, FREE, FREE, FREE, gear_torque, gear_torque_rate)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("top", [1.5, 3.0])
 def test_axis_1_alone_takes_as_long_as_seven_segments_of_constant_jerk(top):
     robot = load_robot("kr16")
@@ -48,6 +49,7 @@ def test_speed_and_acceleration_alone_have_a_closed_form():
     assert shortest(way, speed, acceleration) == pytest.approx([1.25, 1.0])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("name", "payload"), [("kr16", 16.0), ("kr210", 210.0), ("irb1200", 5.0)])
 def test_no_rigid_arm_is_quicker_on_any_straight_way(name, payload):
     robot, random = load_robot(name), np.random.default_rng(3)

@@ -51,6 +51,7 @@ def inertia(dynamics) -> float:
     return float(dynamics.demand(np.array([[0.5], [0.0], [1.0], [0.0], [0.0]])).gear_torque[0, 0]) / ANGLE
 
 
+@pytest.mark.slow
 def test_with_limited_torque_and_rate_it_takes_as_long_as_the_closed_form(robot):
     dynamics = axis_1(robot)
     acceleration, jerk = 8.0, 100.0  # rad/s^2, rad/s^3
@@ -66,6 +67,7 @@ def test_with_limited_torque_and_rate_it_takes_as_long_as_the_closed_form(robot)
     assert wanted * 0.999 < found.motion.duration < wanted * 1.005
 
 
+@pytest.mark.slow
 def test_with_limited_torque_alone_it_comes_near_bang_bang(robot):
     """2 sqrt(S / a), which no motion with five continuous derivatives reaches."""
     dynamics, acceleration = axis_1(robot), 8.0
@@ -85,6 +87,7 @@ def test_with_limited_torque_alone_it_comes_near_bang_bang(robot):
     assert durations[1] < durations[0] < wanted * 1.03
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("recuperation", [False, True])
 def test_more_time_takes_less_energy(robot, recuperation):
     dynamics, kept = axis_1(robot), motion_limits(robot)
@@ -145,6 +148,7 @@ def test_a_limit_that_is_lower_for_a_while_is_kept_then_and_used_otherwise(robot
     assert used[~is_first].max() == pytest.approx(1.0, abs=0.02)
 
 
+@pytest.mark.slow
 def test_a_slow_tool_takes_little_more_than_the_length_over_its_speed(robot):
     dynamics, speed = axis_1(robot), 0.05
     evenly = np.array([[0.5], [1.0], [0.0], [0.0], [0.0]])
@@ -161,6 +165,7 @@ def test_a_slow_tool_takes_little_more_than_the_length_over_its_speed(robot):
         assert dynamics.demand(motion.rates(motion.times)).tool_speed.max() < 1.005 * speed
 
 
+@pytest.mark.slow
 def test_the_acceleration_of_a_tool_may_be_small(robot):
     """Bang-bang, 2 sqrt(S / a), is the least, but on an arc some of it points to the centre."""
     dynamics, acceleration = axis_1(robot), 0.02

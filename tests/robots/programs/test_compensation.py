@@ -39,6 +39,7 @@ def numbers(line: str) -> list[float]:
     return [float(each) for each in re.findall(r"-?\d+\.?\d*(?:[eE][+-]?\d+)?", line.partition(":=")[2])]
 
 
+@pytest.mark.slow
 def test_the_flange_of_the_true_robot_arrives_at_200_robtargets():
     """A controller that knows nothing of all this solves the numbers of the new text, read by other means."""
     nominal = load_robot("irb1200")

@@ -192,6 +192,7 @@ def test_the_cascade_is_a_position_loop_around_a_pi_velocity_loop():
     assert np.abs(torque).max() > 100.0
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("kind", "config"),
     [

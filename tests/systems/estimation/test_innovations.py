@@ -1,6 +1,7 @@
 """What samples say beyond the estimate: reflections are none of it, a step is."""
 
 import numpy as np
+import pytest
 
 from systems.estimation.events import Innovations
 
@@ -12,6 +13,7 @@ def judged(innovations: Innovations, memory, errors: np.ndarray) -> list:
     return [innovations.judge(memory, r, COLUMNS, lambda: KNOWN) for r in errors]
 
 
+@pytest.mark.slow
 def test_reflections_in_every_third_image_are_outliers_and_a_displaced_tool_is_none():
     rng = np.random.default_rng(3)
     innovations = Innovations(SIGMA**2)

@@ -24,6 +24,7 @@ def compiled() -> dict[str, int]:
     return {name: len(f.signatures) for name, f in functions.items() if hasattr(f, "signatures")}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("interface", ["direct", "egm"])
 def test_everything_is_compiled_before_the_first_tick(interface):
     scenario = load_scenario("everything-realistic", [f"station.interface={interface}"])

@@ -8,6 +8,7 @@ from systems.estimation.tip_model import moved
 from tests.systems.estimation.arms import Session
 
 
+@pytest.mark.slow
 def test_four_seconds_of_motion_are_enough():
     """Of single robots, what is left where they have not been is anything from 0.1 to 0.5 mm."""
     elsewhere, there = [], []
@@ -47,6 +48,7 @@ def test_the_error_is_what_the_covariance_says():
     assert session.squares(np.array([1.0, 2.0, 7.0])).max() < 35.0  # chi squared of six, one in 200000
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("noise", [0.5, 3.0])  # of the camera, in units of the usual one
 def test_the_error_is_what_the_covariance_says_whatever_the_camera_is_believed_to_be(noise):
     squares = []
@@ -81,6 +83,7 @@ def test_what_comes_as_slowly_as_the_robot_moves_is_no_event(seed: int):
     assert session.error(seen=True) < 50e-6
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("turn", "shift"), [((0.0, 0.0, 0.0), (0.5e-3, 0.0, 0.0)), ((1e-3, 0.0, -1e-3), (0.0, 0.4e-3, 0.3e-3))]
 )
@@ -151,6 +154,7 @@ def _joints(pair):
     return pair._replace(theta=pair.theta - np.array([0.0, 0.7e-3, 0.0, 0.0, 0.7e-3, 0.0]))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("change", "name"), [(_tool, "tool displaced"), (_camera, "camera moved"), (_joints, "joints shifted")]
 )
@@ -171,6 +175,7 @@ def test_what_was_displaced_is_told_in_the_end(change, name, seed):
     assert np.linalg.norm(pose_error(truth, x)[3:]) < 60e-6
 
 
+@pytest.mark.slow
 def test_a_camera_that_never_agrees_does_not_widen_without_end_what_is_known():
     """Images that wander by a millimetre: everything may be displaced, and be as little known as at first."""
     session = Session(3)

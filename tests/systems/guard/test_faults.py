@@ -87,6 +87,7 @@ def check(sequence, share: float, resume: bool, stops: bool) -> None:
     swing.check()
 
 
+@pytest.mark.slow
 @settings(max_examples=40)
 @drawn
 def test_no_sequence_of_faults_moves_a_joint_beyond_its_limits(sequence, share, resume, stops):

@@ -26,6 +26,7 @@ def cruise(rig: GuardRig, ticks: int, **measurement) -> tuple[np.ndarray, np.nda
     return np.array([row[0] for row in rows]), np.array([row[1] for row in rows]), rows[-1][2]
 
 
+@pytest.mark.slow
 @pytest.mark.filterwarnings("ignore:overflow")  # numbers up to 1e308
 @given(commands=commands, start=st.lists(st.floats(-1.0, 1.0), min_size=6, max_size=6).map(np.array))
 def test_whatever_is_commanded_the_output_is_finite_in_range_and_within_speed_and_acceleration(
@@ -40,6 +41,7 @@ def test_whatever_is_commanded_the_output_is_finite_in_range_and_within_speed_an
     assert_within_limits(ROBOT, positions, velocities)
 
 
+@pytest.mark.slow
 @pytest.mark.filterwarnings("ignore:overflow")
 @settings(max_examples=30)
 @given(commands=commands)

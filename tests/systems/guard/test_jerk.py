@@ -116,6 +116,7 @@ def test_messages_keep_it_too_and_so_does_their_stop(jerk: float):
     assert_jerk(robot, *(np.array(part) for part in zip(*sent, strict=True)))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("jerk", [300.0, 3000.0])
 def test_however_long_it_is_from_message_to_message_speed_acceleration_and_range_are_kept(jerk: float):
     robot, random = with_jerk(jerk), np.random.default_rng(0)
@@ -135,6 +136,7 @@ def test_however_long_it_is_from_message_to_message_speed_acceleration_and_range
         assert (np.array(sent) <= robot.upper).all()
 
 
+@pytest.mark.slow
 def test_a_joint_brakes_before_the_end_of_its_range():
     """It is led beyond with all its speed, and stops short of the end by less than two degrees."""
     robot = with_jerk(1000.0)

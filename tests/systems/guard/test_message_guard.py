@@ -108,6 +108,7 @@ sequences = st.lists(st.one_of(messages, bursts), min_size=1, max_size=8).map(
 )
 
 
+@pytest.mark.slow
 @settings(max_examples=40)
 @given(sequence=sequences)
 def test_nor_do_bursts_after_gaps_make_it_faster(sequence):
@@ -233,6 +234,7 @@ def test_a_joint_that_is_sent_out_of_its_range_comes_to_rest_at_its_end(share):
 uneven = st.lists(st.floats(5e-4, 0.04), min_size=2, max_size=40)
 
 
+@pytest.mark.slow
 @settings(max_examples=60)
 @given(spans=uneven, share=st.floats(0.1, 1.0), side=st.sampled_from([-1.0, 1.0]))
 def test_so_it_does_however_long_it_is_from_message_to_message(spans, share, side):

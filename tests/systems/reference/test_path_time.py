@@ -27,6 +27,7 @@ def asked(rows, slowing=0.5):
     return time, now
 
 
+@pytest.mark.slow
 @settings(max_examples=60, deadline=None)
 @given(st.lists(st.tuples(waits, shares), min_size=1, max_size=12))
 def test_rate_is_between_the_shares_and_is_the_derivative(rows):

@@ -71,6 +71,7 @@ def test_a_lap_need_not_last_a_whole_number_of_ticks():
     assert not_whole.mean() < 1.06 * whole.mean()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("slow", [(0.7, 1.1), (0.6, 0.7)])
 def test_a_path_that_is_slowed_is_learnt_by_its_own_time(slow: tuple[float, float]):
     """In the first lap; the rest of the path comes later by half as long."""

@@ -65,6 +65,7 @@ def driven(rig: LawRig, path: Path) -> tuple[np.ndarray, np.ndarray, int]:
     return off, np.abs(np.diff(joints, axis=0)[250:]).max() / PERIOD, silent
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("law", ["numerical_ik", "pbvs"])
 @pytest.mark.parametrize("delay", [1, 36])
 def test_where_only_the_true_robot_is_too_short_the_tip_is_off_by_what_is_missing(law: str, delay: int):
@@ -78,6 +79,7 @@ def test_where_only_the_true_robot_is_too_short_the_tip_is_off_by_what_is_missin
     assert off[-1] < 1e-4
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("law", ["numerical_ik", "pbvs"])
 @pytest.mark.parametrize("beyond", [0.02, 0.1])
 def test_beyond_the_reach_of_the_nominal_robot_there_is_no_command_until_the_path_is_back(

@@ -45,6 +45,7 @@ coordinates = st.floats(-1.0, 1.0, width=32)
 points = st.tuples(coordinates, coordinates, coordinates).map(np.array)
 
 
+@pytest.mark.slow
 @given(points, points, points, points)
 def test_a_capsule_hides_exactly_if_its_axis_comes_nearer_than_its_radius(a, b, c, d):
     """The distance of two segments is the minimum of a convex function on the unit square."""

@@ -59,6 +59,7 @@ def left_over(friction: float, is_known: bool) -> float:
     return float(left[500:].std() / off[500:].std())
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("friction", [0.7, 1.4])
 def test_motors_that_friction_pulls_off_their_plan_are_explained_by_how_they_moved(friction):
     """Did friction go by planned speeds, a seventh and more would be left wherever motors turn back."""
@@ -66,6 +67,7 @@ def test_motors_that_friction_pulls_off_their_plan_are_explained_by_how_they_mov
     assert left_over(friction, is_known=False) > 0.1
 
 
+@pytest.mark.slow
 def test_friction_of_motors_off_their_plan_is_learnt():
     model, memory = drives(robot="puma560", following_sigma=1e-5)
     times = PERIOD * np.arange(1500)

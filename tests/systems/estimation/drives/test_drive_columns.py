@@ -1,6 +1,7 @@
 """No two things share a place in the regression of drives, and none is left over."""
 
 import numpy as np
+import pytest
 
 from systems.estimation.drives.drive_model import DriveModel
 from systems.estimation.kernels import drive_columns as at
@@ -18,6 +19,7 @@ def equations(row: int | None, v: float = 0.0, a: float = 0.0) -> np.ndarray:
     return model.features(STILL + v, STILL + a, regressors)
 
 
+@pytest.mark.slow
 def test_each_parameter_stands_for_one_regressor_for_motion_or_for_a_constant():
     """The rate of a command counts as speed does."""
     constant = equations(None)
@@ -29,6 +31,7 @@ def test_each_parameter_stands_for_one_regressor_for_motion_or_for_a_constant():
     np.testing.assert_array_equal(equations(at.ROW_RATE), equations(None, v=1.0))
 
 
+@pytest.mark.slow
 def test_what_a_joint_has_of_its_own_stands_in_its_equation_alone():
     """Dead time, load, smoothing and other gains are those of all joints."""
     motion = np.sum([equations(row, v=1.0, a=1.0) for row in range(at.NUM_ROWS)], axis=0) != 0.0

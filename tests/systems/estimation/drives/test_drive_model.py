@@ -320,6 +320,7 @@ def test_what_is_learnt_does_not_make_the_command_jump():
     np.testing.assert_allclose(added[-1], 20e-3 * v, atol=1e-3 * there)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("velocity", [0.02, 0.06])
 def test_friction_that_is_larger_at_low_speeds_is_made_up_for(velocity):
     # The hump of these motors is Reiner's (2.4), highest at a velocity; that of the model is Tustin's.

@@ -96,6 +96,7 @@ def moved_with_sticking_friction(model, memory, is_hanging_known: bool = True) -
     return farthest
 
 
+@pytest.mark.slow
 def test_what_motors_that_hung_do_after_a_rest_does_not_hide_that_they_stick():
     model, memory = drives()
     model.open_low_speeds(memory)
@@ -104,6 +105,7 @@ def test_what_motors_that_hung_do_after_a_rest_does_not_hide_that_they_stick():
     assert (memory.beta[SHARP] + memory.beta[THIRD] > 0.65).all()
 
 
+@pytest.mark.slow
 def test_motors_that_hung_do_not_start_with_what_their_drives_wound_up_meanwhile():
     farthest = []
     for is_known in (True, False):

@@ -148,6 +148,7 @@ def test_gears_may_be_off_by_the_side_of_teeth_that_nearly_nothing_pushes(robot,
     np.testing.assert_allclose(least, (5e-6) ** 2)
 
 
+@pytest.mark.slow
 def test_columns_for_gear_errors_find_what_waves_and_gap_do_to_the_tip():
     true = tip_model(gear_error=5e-5)
     x = true.mean.copy()

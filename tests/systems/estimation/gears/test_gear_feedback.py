@@ -39,6 +39,7 @@ def shown(
     return np.array(rows)
 
 
+@pytest.mark.slow
 def test_half_of_what_a_joint_is_off_by_whose_teeth_lie_free_is_made_up_for(J):
     off, variances = np.zeros(6), np.full(6, LOADED)
     off[0], variances[0] = 100e-6, FREE

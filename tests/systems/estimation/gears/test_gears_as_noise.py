@@ -48,6 +48,7 @@ def squares(estimator: TipEstimator, memory, arm: MovingArm, times: np.ndarray) 
     return found
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("is_said", "least", "most"), [(True, 2.0, 8.0), (False, 9.0, np.inf)])
 def test_teeth_that_wander_make_a_robot_no_better_known_than_it_is(is_said, least, most):
     """Chi squared of six has a mean of six; noise that lasts and is taken for white makes that far more."""

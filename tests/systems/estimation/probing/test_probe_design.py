@@ -91,6 +91,7 @@ def test_what_a_slow_camera_misses_a_larger_motion_makes_up_for():
     assert limited.sigma > slow.sigma
 
 
+@pytest.mark.slow
 def test_the_longer_the_camera_may_be_blind_the_more_is_shown_before():
     probe = Probe(load_robot("irb1200"), ProbeConfig())
     sees, blind = needs(Rectangle(), late=0.05), needs(Rectangle(), late=0.8)

@@ -26,6 +26,7 @@ def swung() -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     return times, home + turn[:, None] * AXES, speed[:, None] * AXES
 
 
+@pytest.mark.slow
 def test_derivatives_are_those_of_differences():
     """Also through the play of the gears, which axis 1 crosses here: where it does is a matter of course."""
     times, theta, rate = swung()

@@ -41,6 +41,7 @@ def test_the_point_is_on_its_path_to_a_hundredth_of_a_micrometre(point: str):
     assert planned(point).history[-1] < 1e-8
 
 
+@pytest.mark.slow
 def test_motors_are_at_rest_at_both_ends():
     plan = planned("tip")
     end = SETTLE + PROFILE.duration + SETTLE

@@ -40,6 +40,7 @@ def test_what_a_controller_writes_is_read_again(measured, setpoint, pose, late):
     assert (telegram.late, telegram.correction) == (late, None)
 
 
+@pytest.mark.slow
 @given(st.binary(max_size=400))
 @settings(max_examples=300)
 def test_any_bytes_are_a_telegram_or_refused(data):

@@ -76,6 +76,7 @@ def arrays(memory: SimpleNamespace, of: str = "") -> Iterator[tuple[str, np.ndar
             yield of + name, part
 
 
+@pytest.mark.slow
 def test_a_command_that_is_taken_back_leaves_no_trace(law):
     """The robot hangs in friction where a path begins that it hardly knows."""
     path = make_path(replace(load_scenario("misaligned").reference, settle=0.4))

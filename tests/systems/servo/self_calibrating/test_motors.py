@@ -33,6 +33,7 @@ def test_what_is_believed_is_opened_once_by_a_change_that_lasts():
     assert variance[-1] > 10.0 * variance[0]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("kind", "looks"), [("none", False), ("smooth", True)])
 def test_gains_are_looked_for_where_a_probe_shows_them_alone(kind: str, looks: bool):
     """Without one nothing ever asks for what would be summed up at every tick, to the end of the run."""

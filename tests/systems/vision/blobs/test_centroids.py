@@ -42,6 +42,7 @@ def found_in(pixels: np.ndarray, **config) -> np.ndarray:
     return centroids(Picture(pixels, np.array([0, 0])), CentroidConfig(**config))[0]
 
 
+@pytest.mark.slow
 def test_every_marker_that_stands_alone_is_found_within_a_tenth_of_a_pixel():
     """Noise of one percent of full scale; spheres of 5 to 25 px, up to 1500 px from the axis."""
     error = errors(ImageConfig())
@@ -153,6 +154,7 @@ def test_shapes_that_join_late_are_one_component():
     assert is_whole.all()
 
 
+@pytest.mark.slow
 def test_components_are_those_of_opencv_wherever_they_lie():
     """Discs and noise anywhere, also across edges: areas and middles as OpenCV counts them."""
     rng, count = np.random.default_rng(4), 0

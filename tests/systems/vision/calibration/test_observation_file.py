@@ -17,6 +17,7 @@ NAMES = ["left", "right"]
 PIXEL = st.one_of(st.just(np.nan), st.floats(-10.0, 4000.0).map(lambda value: round(value, 5)))
 
 
+@pytest.mark.slow
 @given(arrays(float, (2, 3, 2), elements=PIXEL), arrays(float, (2, 4, 2, 2), elements=PIXEL))
 def test_what_was_written_is_read_back(frame: np.ndarray, wand: np.ndarray):
     for pixels in (frame, wand):

@@ -197,6 +197,7 @@ def seen_by(run: WandRun, cameras: list[int]) -> WandRun:
     return WandRun(run.frame_pixels[cameras], run.frame_exposures[cameras], run.wand_pixels[cameras])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("exposures", "given"), [(100, 601.7), (100, 601.0), (1, 600.0)])
 def test_the_scale_of_the_frame_tells_the_length_of_the_wand(exposures: int, given: float):
     """Whatever length is given; it is called wrong beyond four standard deviations only."""
