@@ -56,6 +56,13 @@ def main() -> None:
         metavar="ARC_MINUTES",
         help="of gears that have hysteresis, uneven ratios and a hump of friction, too; else none of these",
     )
+    parser.add_argument(
+        "--set",
+        action="append",
+        default=[],
+        metavar="NAME=VALUE",
+        help="of the scenario, such as what the law is to do",
+    )
     parser.add_argument("--jobs", type=int, default=None, help="parallel processes; one per core")
     parser.add_argument("--json", metavar="FILE", default="")
     options = parser.parse_args()
@@ -69,7 +76,7 @@ def main() -> None:
     drives = Drives(*options.gains, planner=20.0 if options.egm else 0.0)
     wear = None if options.play is None else Wear(play=options.play)
     jobs = [
-        CellRun(robot, seed, path, wrong, drives, wear=wear)
+        CellRun(robot, seed, path, wrong=wrong, drives=drives, wear=wear, more=tuple(options.set))
         for robot in options.robots.split(",")
         for path in options.paths.split(",")
         for seed in range(options.first_seed, options.first_seed + options.seeds)

@@ -37,12 +37,14 @@ class CellRun:
     drives: Drives = field(default_factory=Drives)
     camera: Camera = field(default_factory=Camera)
     wear: Wear | None = None  # of the gears, which are springs and dampers else
+    more: tuple[str, ...] = ()  # settings of the scenario
 
     @property
     def settings(self) -> tuple[str, ...]:
         """Of the scenario: what is believed of the interface is right, and that gears err is known."""
         interface = ("station.interface=egm",) if self.drives.planner else ()
-        return interface if self.wear is None else (*interface, f"{_GEARS_ERR}=5e-5")
+        gears = () if self.wear is None else (f"{_GEARS_ERR}=5e-5",)
+        return *interface, *gears, *self.more
 
 
 def run(job: CellRun, progress: Progress) -> dict[str, Any]:

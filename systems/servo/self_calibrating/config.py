@@ -24,6 +24,7 @@ class SelfCalibratingConfig(LawConfig):
     lead_acceleration: float = positive(0.5, "m/s^2")  # at most, that this gives the tip
     # Standard deviation: where the tip ahead is known less well, the path waits for a camera that is blind
     known_ahead: float = positive(2e-5, "m")
-    # Likewise: where it is known n times less well, the path goes on at one nth of its speed, or a quarter
+    # Likewise: where it is known n times less well, the path goes on at one nth of its speed, or a quarter.
+    # Where gears err it counts more often, 7 times at 4 ms, see `systems.servo.self_calibrating.ahead.Pace`
     known_on_path: float = positive(3e-5, "m")
     longest_wait: float = quantity(2.0, 0.0, unit="s")  # that it waits
