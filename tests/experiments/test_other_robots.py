@@ -96,7 +96,7 @@ def test_modes_are_found(robot: str):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("robot", ["ur10"], indirect=True)
+@pytest.mark.parametrize("robot", ["puma560"], indirect=True)
 def test_feedforwards_are_compared(robot: str):
     """The plant is that of the models, so the model with an elastic structure leaves hardly anything."""
     result = truetip("feedforward", "--robot", robot, "--grid=2", "--json", "-", "--jobs=1")
@@ -106,7 +106,7 @@ def test_feedforwards_are_compared(robot: str):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("robot", ["puma560"], indirect=True)
+@pytest.mark.parametrize("robot", ["ur10"], indirect=True)
 def test_the_simulated_robot_is_calibrated(robot: str):
     result = truetip("calibrate", "--robot", robot, "--count=30", "--write=found.yaml", "--json=numbers.json")
     assert result.exit_code == 0, result.output
