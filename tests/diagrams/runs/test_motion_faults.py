@@ -130,7 +130,7 @@ def test_a_clock_that_is_set_forward_moves_nothing_and_is_noted(on_path: float):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("law", ["open_loop", pytest.param("pbvs", marks=pytest.mark.slow)])
+@pytest.mark.parametrize("law", ["open_loop", "pbvs"])
 @pytest.mark.parametrize(
     ("fault", "why"),
     [
@@ -148,7 +148,7 @@ def test_what_cannot_be_believed_ends_the_run_by_name_with_a_smooth_stop(law, fa
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("lost", [pytest.param(0.05, marks=pytest.mark.slow), 0.09])
+@pytest.mark.parametrize("lost", [0.05, 0.09])
 def test_messages_that_are_lost_for_a_while_cost_time_and_no_jump(lost: float, on_path: float):
     record, wire = guided(faulty(f"station.faults.stall_at={on_path}", f"station.faults.stall_for={lost}"))
     assert record.ended == "path"
@@ -176,8 +176,8 @@ HALTS = [(0.03, True), (0.08, False), (0.2, True)]
     ("law", "seconds", "catches_up", "resume"),
     [
         ("numerical_ik", 1.0, False, True),
-        *(pytest.param("numerical_ik", *halt, True, marks=pytest.mark.slow) for halt in HALTS),
-        *(pytest.param("pbvs", *halt, False, marks=pytest.mark.slow) for halt in HALTS),
+        *(("numerical_ik", *halt, True) for halt in HALTS),
+        *(("pbvs", *halt, False) for halt in HALTS),
     ],
 )
 def test_a_cell_that_stood_still_is_led_on_from_where_it_was(law, seconds, catches_up, resume):
@@ -247,7 +247,7 @@ def test_whatever_comes_no_message_is_further_than_a_robot_gets_in_the_longest_g
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("resume", [pytest.param(False, marks=pytest.mark.slow), True])
+@pytest.mark.parametrize("resume", [False, True])
 def test_a_camera_that_sees_nothing_any_more_stops_the_robot_and_the_run_says_so(resume: bool):
     """The path is not over when its time is: the robot stands."""
     more = [f"servo.guard.resume={str(resume).lower()}", "servo.guard.stop_after=0.2"]
@@ -277,7 +277,7 @@ def test_the_former_name_of_the_switch_is_understood():
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("share", [pytest.param(0.3, marks=pytest.mark.slow), 0.6])
+@pytest.mark.parametrize("share", [0.3, 0.6])
 def test_who_wants_an_end_gets_a_smooth_stop_and_what_was_recorded(share: float):
     wanted: list[float] = []
     scenario = faulty()

@@ -158,9 +158,7 @@ def _joints(pair):
 @pytest.mark.parametrize(
     ("change", "name"), [(_tool, "tool displaced"), (_camera, "camera moved"), (_joints, "joints shifted")]
 )
-@pytest.mark.parametrize(
-    "seed", [3, pytest.param(5, marks=pytest.mark.slow), pytest.param(7, marks=pytest.mark.slow)]
-)
+@pytest.mark.parametrize("seed", [3, 5, 7])
 def test_what_was_displaced_is_told_in_the_end(change, name, seed):
     session = Session(seed)
     session.learn(6.0)
