@@ -9,13 +9,21 @@ from robots.drivetrain.monotone import monotone_inverse
 from robots.drivetrain.stiffness import GearSpring
 
 
-def contact(beyond: np.ndarray, torque: np.ndarray) -> np.ndarray:
-    """What of a torque teeth can exert: none in the gap, and beyond it none that pulls.
+# rad beyond the gap, within which teeth take up their damping. With a jump the equations of an implicit
+# integrator have no solution in a step that ends at contact, and it makes hundreds of steps in their place;
+# the tip does not notice.
+CONTACT_DEPTH = 1e-7
+
+
+def contact(beyond: np.ndarray, spring: np.ndarray, damper: np.ndarray) -> np.ndarray:
+    """What teeth exert in N m: nothing in the gap, and beyond it nothing that pulls.
 
     Args:
         beyond: how far in rad the deflection is beyond the gap, zero within.
-        torque: of spring and damper in N m.
+        spring: torque of the spring at that deflection in N m.
+        damper: torque of the damper in N m, which acts in full once teeth have met by `CONTACT_DEPTH`.
     """
+    torque = spring + damper * np.minimum(np.abs(beyond) / CONTACT_DEPTH, 1.0)
     return np.where(torque * beyond > 0.0, torque, 0.0)
 
 
@@ -24,8 +32,9 @@ class Backlash:
     """A spring and damper that act only beyond half of the gap, Reiner (2010) eq. (2.12), corrected.
 
     The conditions are on phi_rel - phi_0 like the torques, not on phi_rel. The damping torque jumps at
-    contact, so that the model cannot be inverted. Teeth that part do not pull: where the damping torque
-    would outdo the spring, (2.12) is cut off at zero.
+    contact in (2.12); here it rises within `CONTACT_DEPTH`, which is no less a reason why the model cannot be
+    inverted. Teeth that part do not pull: where the damping torque would outdo the spring, (2.12) is cut off
+    at zero.
     """
 
     spring: GearSpring
@@ -44,7 +53,7 @@ class Backlash:
         """Torques in N m at deflections in rad and their rates in rad/s."""
         offset = np.asarray(deflection) - self.centre
         beyond = offset - np.clip(offset, -0.5 * self.gap, 0.5 * self.gap)
-        return contact(beyond, self.spring.torque(beyond) + self.damping * rate)
+        return contact(beyond, self.spring.torque(beyond), self.damping * np.asarray(rate))
 
 
 @dataclass(frozen=True)

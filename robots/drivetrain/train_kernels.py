@@ -7,6 +7,7 @@ other. `DriveTrains` imports this module when it is asked first, see `robots.com
 import math
 
 from robots.compiled import compiled, inner
+from robots.drivetrain.backlash import CONTACT_DEPTH
 from robots.drivetrain.train_table import (
     EXPONENTIAL,
     LIMITED,
@@ -107,9 +108,13 @@ def torques(table, state, motor, deflection, command, viscous, out):
             x, rate, slope = x - error, rate - change * speed, 1.0 + change
         damping, half_gap, lubricant, soft, damped, soft_damping = table.gears[j]
         beyond = x - min(max(x, -half_gap), half_gap)
-        torque = _spring(table.springs[j], beyond) + damping * rate
-        if half_gap > 0.0 and not torque * beyond > 0.0:
-            torque = 0.0
+        torque = _spring(table.springs[j], beyond)
+        if half_gap > 0.0:
+            torque += damping * rate * min(abs(beyond) / CONTACT_DEPTH, 1.0)
+            if not torque * beyond > 0.0:
+                torque = 0.0
+        else:
+            torque += damping * rate
         torque += lubricant * rate
         if soft_at >= 0:
             stretch = soft * (x - state[soft_at + j])

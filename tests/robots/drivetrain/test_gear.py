@@ -141,6 +141,14 @@ def test_a_gap_transmits_nothing_and_beyond_it_the_spring_acts():
     assert gear.torque(np.array(0.1011), np.array(1.0)) == pytest.approx(2.0 + 10.0)
 
 
+def test_teeth_that_meet_take_up_the_damper_without_a_jump():
+    gear = Backlash(CubicSpring(2e4, 0.0), 10.0, 0.002)
+    beyond = np.linspace(-1e-8, 3e-7, 3101)
+    torque = gear.torque(0.001 + beyond, np.ones_like(beyond))
+    assert np.diff(torque).max() < 0.02  # N m, of 10 at these 1e-10 rad
+    np.testing.assert_allclose(torque[beyond > 1e-7 + 1e-9], 10.0, rtol=1e-3)
+
+
 @pytest.mark.slow
 def test_the_visco_elastic_gear_loses_energy_in_every_cycle_and_can_be_inverted():
     gear = ViscoElasticGear(CubicSpring(500.0, 7e5), 2e3, 1e3, 40.0)

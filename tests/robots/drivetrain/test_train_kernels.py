@@ -60,8 +60,8 @@ def joint_torques(
         error, change = train.ratio.position_error(theta)
         x, rate, slope = x - error, rate - change * speed, 1.0 + change
     beyond = x - np.clip(x, -0.5 * train.gap, 0.5 * train.gap)
-    torque = train.spring.torque(beyond) + train.damping * rate
-    torque = float(contact(beyond, torque)) if train.gap else torque
+    spring, damper = train.spring.torque(beyond), train.damping * rate
+    torque = float(contact(beyond, spring, damper)) if train.gap else spring + damper
     torque += train.lubricant * rate * has_play
     if train.soft:
         stretch = train.soft.soft * (x - state["soft"])
