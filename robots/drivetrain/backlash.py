@@ -8,7 +8,6 @@ import numpy as np
 from robots.drivetrain.monotone import monotone_inverse
 from robots.drivetrain.stiffness import GearSpring
 
-
 # rad beyond the gap, within which teeth take up their damping. With a jump the equations of an implicit
 # integrator have no solution in a step that ends at contact, and it makes hundreds of steps in their place;
 # the tip does not notice.
