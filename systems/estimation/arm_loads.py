@@ -49,3 +49,17 @@ class ArmLoads:
         loads = np.empty((len(frames), NUM_SETS, 18))
         kernels.loads.load_all(self.masses, frames, q, velocity, acceleration, loads)
         return loads
+
+    def inertias(self, frames: np.ndarray, q: np.ndarray, load: np.ndarray) -> np.ndarray:
+        """What each joint turns behind its gear in kg m^2, (6,), while the others stand.
+
+        Args:
+            frames: of one posture, as of `at`, (7, 4, 4).
+            q: of the joints there, (6,).
+            load: mass in kg, and first moment along the axes of the flange in kg m, (4,).
+        """
+        n = len(q)
+        each = np.eye(n + 1)[:, 1:]  # rad/s^2: none, then one joint after the other
+        rows = np.repeat(frames[None], n + 1, axis=0), np.tile(q, (n + 1, 1)), np.zeros((n + 1, n)), each
+        torque = np.append(1.0, load) @ self.at(*rows)[..., :n]
+        return np.diag(torque[1:] - torque[0]).copy()

@@ -134,6 +134,7 @@ class SelfCalibrating(SampledSystem):
         except ValueError:
             return  # out of reach of the nominal robot: whoever starts the run says so
         self._pace.needs, self._reach = self._needs, PathReach(self._needs, path)
+        self._learning.suit(home)
         rate = 1.0 / max(self.period, self._model.camera_period)  # of a tick one sample is taken
         sharp = self._config.probe.sharp
         found = designed(self._needs, self._probe, path.path_start, rate, sharp)

@@ -184,6 +184,13 @@ class Learning:
         gears = then.states, then.others
         return Pair(at.theta, then.loads, then.motion, now.twist, at.X_WE, unrest, *gears, stamp)
 
+    def suit(self, home: np.ndarray) -> None:
+        """Has teeth led as fast as links follow them where the path starts, joints at home in rad, (6,)."""
+        model = self.tip_model
+        frames = model.forward(model.constants(model.mean), model.mean, home[None])[1].frames[0]
+        inertia = model.loads.inertias(frames, home, model.mean[model.M])
+        self.estimator.gear_feedback.suit(model.robot.joint_damping, inertia)
+
     def led_aside(self, memory: SimpleNamespace, instant: float, step: float, is_on_path: bool) -> np.ndarray:
         """Where joints are led beside the path, since their gears' teeth are not where they were expected.
 

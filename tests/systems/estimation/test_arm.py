@@ -62,6 +62,22 @@ def test_loads_are_those_of_inverse_dynamics_with_calibrated_geometry(name):
 
 
 @pytest.mark.parametrize("name", ["irb1200", "kr16", "kr210"])
+def test_joints_turn_what_the_mass_matrix_of_drake_has_on_its_diagonal(name):
+    robot, _, q, *_ = random_case(name, 4)
+    payload = 0.7 * robot.payload.largest_mass
+    geometry = ArmGeometry(robot, np.array([], dtype=int))
+    frames = geometry.arm(geometry.constants(np.zeros(48)), q[:1]).frames[0]
+    found = ArmLoads(robot).inertias(frames, q[0], np.array([payload, 0.0, 0.0, 0.0]))
+    plant = MultibodyPlant(0.0)
+    add_robot(plant, robot, "rigid", payload)
+    plant.Finalize()
+    context = plant.CreateDefaultContext()
+    plant.SetPositions(context, q[0])
+    expected = np.diag(plant.CalcMassMatrix(context)) - robot.reflected_inertia
+    np.testing.assert_allclose(found, expected, rtol=1e-9)
+
+
+@pytest.mark.parametrize("name", ["irb1200", "kr16", "kr210"])
 def test_motors_hold_the_arm_as_in_drake(name):
     robot, _, q, *_ = random_case(name, 3)
     payload = 0.7 * robot.payload.largest_mass

@@ -138,6 +138,12 @@ def test_rates_are_those_of_the_way(J):
     np.testing.assert_allclose(np.diff(rate, axis=0), PERIOD * acceleration[1:], rtol=1e-9, atol=1e-12)
 
 
+def test_heavy_links_with_soft_dampers_are_led_more_slowly():
+    feedback, damping = GearFeedback(0.3), np.array([80.0, 80.0, 80.0, 30.0, 30.0, 30.0])
+    feedback.suit(damping, np.array([10.0, 5.0, 1.0, 1.0, 0.5, 0.5]))
+    np.testing.assert_allclose(feedback.frequency, [8.0 * 0.3 * 80.0 / 10.0, 38.4, 40.0, 40.0, 40.0, 40.0])
+
+
 def test_at_rest_a_dead_time_keeps_nothing_of_it_from_being_made_up_for(J):
     off = np.array([100e-6, 0.0, 0.0, 0.0, 0.0, 0.0])
     made_up_for = []
