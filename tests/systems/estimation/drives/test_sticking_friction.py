@@ -5,7 +5,7 @@ import pytest
 from scipy.signal import lsim
 
 from systems.estimation.drives.drive_model import SHARP, THIRD
-from systems.estimation.kernels.drives import _SHARP_WIDTH, _THIRD_WIDTH
+from systems.estimation.kernels.drives.regression import SHARP_WIDTH, THIRD_WIDTH
 from tests.systems.estimation.drives.motors import LOADS, PERIOD, drives, motion
 
 
@@ -41,10 +41,10 @@ def test_three_shapes_leave_less_than_half_of_what_two_leave_of_any_other():
 
     def left(widths):
         shapes = np.tanh(np.divide.outer(v, widths))
-        others = np.tanh(np.divide.outer(v, np.geomspace(_SHARP_WIDTH, 1.0, 30)))
+        others = np.tanh(np.divide.outer(v, np.geomspace(SHARP_WIDTH, 1.0, 30)))
         return np.sqrt(np.square(others - shapes @ np.linalg.lstsq(shapes, others)[0]).mean(axis=0)).max()
 
-    assert left([1.0, _THIRD_WIDTH, _SHARP_WIDTH]) < 0.5 * left([1.0, _SHARP_WIDTH])
+    assert left([1.0, THIRD_WIDTH, SHARP_WIDTH]) < 0.5 * left([1.0, SHARP_WIDTH])
 
 
 def test_that_friction_sticks_one_joint_shows_for_all():
