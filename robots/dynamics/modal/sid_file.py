@@ -46,7 +46,10 @@ class _Reader:
         self._name, self._lines = name, lines
 
     def body(self) -> FlexibleBody:
-        modal = self._within(self._within(self._tree(), "part"), "modal")
+        tree = self._tree()
+        if not tree.blocks:
+            raise self._error(1, "no flexible body is in the file: it would begin with a line 'part'")
+        modal = self._within(self._within(tree, "part"), "modal")
         about = self._within(modal, "refmod")
         n = int(self._number(about, "nelastq"))
         if n < 1:

@@ -266,6 +266,7 @@ REFUSED = {
     "log nofile.mcap": "nofile.mcap: no such file or directory",
     "log .": ".: is a directory",
     "zeros --body 9": "--body 9: no such file or directory",
+    "zeros --body robot.yaml": "robot.yaml, line 1: no flexible body is in the file: it would begin with a",
     "study nofile.yaml": "study file nofile.yaml: no such file or directory",
     "robots import nofile.urdf": "URDF nofile.urdf: no such file or directory",
     "design --obstacles nofile.yaml": "obstacles nofile.yaml: no such file or directory",
