@@ -17,7 +17,7 @@ from experiments.cli.staging import PAGE, staged_file
 from experiments.compensate.report import compensation_json, verdict, write_compensation_page
 from experiments.compensate.study import CompensationStudy, compensate
 from robots.description.model import RobotModel, load_robot
-from robots.programs.read import SUFFIXES, joints_in_doubt
+from robots.programs.read import SUFFIXES, unit_in_doubt
 
 _SHOWN = 10  # remarks on the terminal
 
@@ -89,7 +89,7 @@ def compensate_command(
         new = stack.enter_context(staged_file(out, *_suffixes(program)))
         page = stack.enter_context(staged_file(report, *PAGE))
         stack.enter_context(output.staged())
-        print_note(human, joints_in_doubt(program))
+        print_note(human, unit_in_doubt(program))
         with progress_bar("targets") as progress:
             study = compensate(
                 program,

@@ -27,7 +27,7 @@ from robots.measurement_design.obstacles import read_obstacles
 from robots.planning.limits import DUTY, RESERVE, motion_limits
 from robots.planning.path_dynamics import DYNAMICS
 from robots.programs.planned_moves import FILES, MOVES
-from robots.programs.read import joints_in_doubt
+from robots.programs.read import unit_in_doubt
 from systems.reference.planned_file import planned_text
 
 
@@ -118,7 +118,7 @@ def plan_command(
             raise ValueError("--obstacles counts on free ways only; give --free too")
         boxes = read_obstacles(obstacles) if obstacles else ()
         model = noted_robot(human, robot)
-        print_note(human, joints_in_doubt(path))
+        print_note(human, unit_in_doubt(path))
         mass = model.payload.largest_mass if payload is None else payload
         limits = motion_limits(model, tool_speed, tool_acceleration, duty).with_reserve(reserve)
         true = None if plant is None else load_robot(plant)

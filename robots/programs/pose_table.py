@@ -14,6 +14,7 @@ from robots.programs.program import (
     DEGREE,
     JOINTS,
     MILLIMETRE,
+    POSITION,
     Literal,
     Move,
     Note,
@@ -26,7 +27,7 @@ from robots.programs.program import (
 )
 
 _UNITS = {"mm": MILLIMETRE, "m": 1.0, "deg": DEGREE, "rad": 1.0}
-_POSITION, _QUATERNION, _EULER = ("x", "y", "z"), ("qw", "qx", "qy", "qz"), ("alpha", "beta", "gamma")
+_QUATERNION, _EULER = ("qw", "qx", "qy", "qz"), ("alpha", "beta", "gamma")
 _NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?")
 _LEFT = ", row left alone"
 _COMMA = re.compile(r"[+-]?(\d+,\d*|,\d+)([eE][+-]?\d+)?")
@@ -74,7 +75,7 @@ def _header(source: Source, line: int, text: str, separator: str) -> dict[str, i
     columns = {name: number for number, name in enumerate(names)}
     of_pose, joints = (
         [name for role in roles for name in _names(role) if name in columns]
-        for roles in (_POSITION + _QUATERNION + _EULER, JOINTS)
+        for roles in (POSITION + _QUATERNION + _EULER, JOINTS)
     )
     if of_pose and joints:
         raise ProgramError(
@@ -94,12 +95,12 @@ def _header(source: Source, line: int, text: str, separator: str) -> dict[str, i
 def _needed(columns: Mapping[str, int]) -> tuple[str, ...]:
     if _column(columns, JOINTS[0]) or JOINTS[0] in columns:  # one without its unit is asked for it
         return JOINTS
-    return _POSITION + (_QUATERNION if "qw" in columns else _EULER)
+    return POSITION + (_QUATERNION if "qw" in columns else _EULER)
 
 
 def _second(columns: Mapping[str, int]) -> str:
     """Two columns of which only one would be corrected: of two units, or both kinds of orientation."""
-    for role in _POSITION + _EULER + JOINTS:
+    for role in POSITION + _EULER + JOINTS:
         there = [name for name in _names(role) if name in columns]
         if len(there) > 1:
             return " and ".join(there)
@@ -112,7 +113,7 @@ def _names(role: str) -> dict[str, float]:
     """Names that a column may have, with the unit of each."""
     if role in _QUATERNION:
         return {role: 1.0}
-    units = ("mm", "m") if role in _POSITION else ("deg", "rad")
+    units = ("mm", "m") if role in POSITION else ("deg", "rad")
     return {f"{role}_{unit}": _UNITS[unit] for unit in units}
 
 
@@ -131,8 +132,10 @@ def _row(
         place, unit = column
         literal = _literal(*fields[place], unit, separator) if place < len(fields) else None
         if literal is None:
-            text = fields[place][1] if place < len(fields) else ""
-            return Note(line, f"{role} is not a number: '{text.strip()}'{_LEFT}")
+            text = fields[place][1].strip().strip('"').strip() if place < len(fields) else ""
+            name = next(name for name in _names(role) if name in columns)
+            problem = f"{name} is not a number: '{text}'" if text else f"the number of {name} is missing"
+            return Note(line, f"{problem}{_LEFT}")
         numbers[role] = literal
     problem = quaternion_problem(numbers) or _surplus(fields, columns)
     if problem:

@@ -17,7 +17,7 @@ from robots.pose import rotation_from_zyx, zyx_from_rotation
 
 MILLIMETRE, DEGREE = 1e-3, float(np.pi / 180.0)
 _DECIMALS = {1.0: 13, MILLIMETRE: 9, DEGREE: 11}  # all worth less than 1e-9 mm at the tip of a robot
-_POSITION, _QUATERNION = ("x", "y", "z"), ("qw", "qx", "qy", "qz")
+POSITION, _QUATERNION = ("x", "y", "z"), ("qw", "qx", "qy", "qz")
 _UNIT = 0.01  # of the length of a quaternion, which two decimals leave
 _EULER = ("alpha", "beta", "gamma")
 JOINTS = tuple(f"q{number}" for number in range(1, 7))
@@ -123,7 +123,7 @@ class Target:
     def X_BT(self) -> np.ndarray:
         """Pose of the tool in the base, (4, 4)."""
         X = np.eye(4)
-        X[:3, 3] = [self.numbers[role].si for role in _POSITION]
+        X[:3, 3] = [self.numbers[role].si for role in POSITION]
         if "qw" in self.numbers:
             quaternion = [self.numbers[role].value for role in _QUATERNION]
             X[:3, :3] = Rotation.from_quat(quaternion, scalar_first=True).as_matrix()
@@ -141,7 +141,7 @@ class Target:
     def moved(self, X: np.ndarray) -> dict[Literal, str]:
         """How its numbers are to be written for another pose (4, 4) in the same base."""
         edits = {}
-        for role, value in zip(_POSITION, X[:3, 3].tolist(), strict=True):
+        for role, value in zip(POSITION, X[:3, 3].tolist(), strict=True):
             if abs(value - self.numbers[role].si) > _SAME_PLACE:
                 edits[self.numbers[role]] = self.numbers[role].spelled(value)
         turn = Rotation.from_matrix(X[:3, :3] @ self.X_BT[:3, :3].T)

@@ -40,6 +40,7 @@ from robots.programs.rapid_text import (
     literals,
     split,
     statements,
+    why_unread,
     without_heading,
     without_short_condition,
 )
@@ -174,7 +175,7 @@ class _Reader:
                 for number, part in enumerate(tree, 1)
                 for place in self._places_of(f"{name}{{{number}}}", line, part)
             ]
-        self._note(self._source, line, f"{name} has expressions in place of numbers, left alone")
+        self._note(self._source, line, f"{name} {why_unread(tree)}, left alone")
         return []
 
     def _frame(self, name: str, where: str) -> Frame:
@@ -327,7 +328,7 @@ class _Reader:
             if has_shape(tree, 3, 4, 4, 6) or has_shape(tree, 6, 6):
                 numbers = _target_numbers(tree)
                 if numbers is None:
-                    self._note(source, line, f"the target of {name} has expressions, left alone")
+                    self._note(source, line, f"the target of {name} {why_unread(tree)}, left alone")
                 elif source is self._source:
                     self._inline.append(_Place("", line, numbers))
                     return self._inline[-1:]

@@ -128,6 +128,23 @@ def literals(tree: Tree, *lengths: int) -> list[list[Literal]] | None:
     return rows
 
 
+def why_unread(tree: Tree) -> str:
+    """What keeps an aggregate from being a target in numbers, as words behind its name."""
+    parts: list[Tree] = [tree]
+    texts = []
+    while parts:
+        part = parts.pop()
+        if isinstance(part, list):
+            parts += part
+        elif isinstance(part, Other):
+            texts.append(part.text)
+    if "" in texts:
+        return "lacks a number"
+    if texts:
+        return "has expressions in place of numbers"
+    return f"has {'a quaternion of zero' if has_shape(tree, 3, 4, 4, 6) else 'too few or too many numbers'}"
+
+
 def has_shape(tree: Tree, *lengths: int) -> bool:
     """Whether it is an aggregate of aggregates of these lengths, whatever these hold."""
     if not isinstance(tree, list) or len(tree) != len(lengths):

@@ -12,6 +12,9 @@ from robots.programs.pose_table import read_pose_table
 from robots.programs.program import (
     DEGREE,
     JOINTS,
+    MILLIMETRE,
+    POSITION,
+    Literal,
     Note,
     Program,
     ProgramContext,
@@ -28,7 +31,9 @@ _READERS = {
     **dict.fromkeys(_TABLE, read_pose_table),
 }
 SUFFIXES = tuple(_READERS)
-_ROWS = 2  # of a table, from which on its values say something of their unit
+_ROWS = 2  # of a table of joints, from which on its values say something of their unit
+_TURN = 2.0 * np.pi  # rad
+_FARTHEST = 5.0  # m, that a robot reaches; in mm nothing so near to its base axis
 _SHORTEST_TOOL = 2e-3  # m; one of up to 2 m whose numbers are in m and not in mm is shorter
 
 
@@ -57,10 +62,11 @@ def parse_program(source: Source, context: ProgramContext | None = None) -> Prog
     return replace(program, notes=(*program.notes, *_doubtful_tools(source, program)))
 
 
-def joints_in_doubt(path: str | Path) -> str:
-    """Why a table of joints seems to be in another unit than it says; empty if it does not, or is no table.
+def unit_in_doubt(path: str | Path) -> str:
+    """Why a table seems to be in another unit than it says; empty if it does not, or is no table.
 
-    Radians below heads of degrees are all within a turn of 6.28, and hardly any is a whole number.
+    Radians below heads of degrees are all within a turn of 6.28, metres below heads of millimetres within the
+    reach of any robot in m, and hardly any is a whole number.
 
     Raises:
         ProgramError: as of `read_program`.
@@ -68,18 +74,27 @@ def joints_in_doubt(path: str | Path) -> str:
     if Path(path).suffix.lower() not in _TABLE:
         return ""
     program = read_program(path)
-    if len(program.targets) < _ROWS or not all(each.has_joints for each in program.targets):
-        return ""
-    joints = [target.numbers[role] for target in program.targets for role in JOINTS]
-    values = np.array([joint.value for joint in joints])
-    is_small = all(joint.unit == DEGREE for joint in joints) and np.abs(values).max() <= 2.0 * np.pi
-    broken = np.count_nonzero(values != np.round(values))
-    if not is_small or 2 * broken <= np.count_nonzero(values):
-        return ""
-    return (
-        f"{program.name}: all joints are within 6.28 degrees of zero; if they are in rad, its columns are "
-        "q1_rad to q6_rad"
-    )
+    joints = [[each.numbers[role] for role in JOINTS] for each in program.targets if each.has_joints]
+    places = [[each.numbers[role] for role in POSITION] for each in program.targets if not each.has_joints]
+    if len(joints) >= _ROWS and _are_small(joints, DEGREE, _TURN):
+        return (
+            f"{program.name}: all joints are within {_TURN:.2f} degrees of zero; if they are in rad, its "
+            "columns are q1_rad to q6_rad"
+        )
+    if _are_small(places, MILLIMETRE, _FARTHEST):
+        return (
+            f"{program.name}: all numbers of x_mm, y_mm and z_mm are within {_FARTHEST:g} mm of zero; if "
+            "they are in m, its columns are x_m, y_m and z_m"
+        )
+    return ""
+
+
+def _are_small(rows: Sequence[Sequence[Literal]], unit: float, most: float) -> bool:
+    """Whether all numbers are in a unit, none is beyond a value, and most but zeros are broken."""
+    values = np.array([each.value for row in rows for each in row])
+    if np.abs(values).max(initial=0.0) > most or any(each.unit != unit for row in rows for each in row):
+        return False
+    return bool(2 * np.count_nonzero(values != np.round(values)) > np.count_nonzero(values))
 
 
 def _doubtful_tools(source: Source, program: Program) -> list[Note]:

@@ -126,3 +126,14 @@ def test_a_program_in_utf_16_is_refused_and_not_written_without_a_correction(fol
     )
     assert "wide.mod: saved as UTF-16, which controllers do not read" in refusal(result)
     assert files(tmp_path) == {"wide.mod"}
+
+
+def test_a_table_of_metres_below_heads_of_millimetres_is_doubted_before_it_is_corrected(
+    folder: Path, tmp_path: Path
+):
+    table = tmp_path / "m.csv"
+    table.write_text("x_mm,y_mm,z_mm,qw,qx,qy,qz\n0.4,0.1,0.5,0,0,1,0\n0.45,-0.1,0.55,0,0,1,0\n")
+    changes = {"out": tmp_path / "new.csv", "report": tmp_path / "page.html"}
+    result = truetip("compensate", table, *options(folder, **changes))
+    assert result.exit_code == 0, result.output
+    assert "if they are in m, its columns are x_m, y_m and z_m" in " ".join(result.output.split())

@@ -18,9 +18,9 @@ KR16 = load_robot("kr16")
 HEAD = "q1_deg,q2_deg,q3_deg,q4_deg,q5_deg,q6_deg"
 POSES = "x_mm,y_mm,z_mm,qw,qx,qy,qz"
 UNREADABLE = {
-    "no number": (HEAD, "10,nan,90,0,30,0", "q2 is not a number: 'nan'"),
-    "typing error": (HEAD, "10,-80,9o,0,30,0", "q3 is not a number: '9o'"),
-    "short row": (HEAD, "10,-80", "q3 is not a number: ''"),
+    "no number": (HEAD, "10,nan,90,0,30,0", "q2_deg is not a number: 'nan'"),
+    "typing error": (HEAD, "10,-80,9o,0,30,0", "q3_deg is not a number: '9o'"),
+    "short row": (HEAD, "10,-80", "the number of q3_deg is missing"),
     "long row": (HEAD, "10,-80,90,0,30,0,5", "there are 7 values for 6 columns"),
     "beyond all numbers": (HEAD, "1e999,-80,90,0,30,0", "a number is infinite"),
     "no rotation": (POSES, "1100,0,900,0,0,0,0", "the quaternion is zero"),
