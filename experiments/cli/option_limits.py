@@ -32,6 +32,16 @@ def at_least(option: str, least: int, given: int | None) -> None:
         raise ValueError(f"{option} must be at least {least}, got {given}")
 
 
+def at_most(option: str, most: float, unit: str, given: float | None) -> None:
+    """Refuses a number that is negative, not finite or beyond the most; None is an option that was not given.
+
+    Raises:
+        ValueError: if it is; with the unit, in which it may not have been meant.
+    """
+    if given is not None and not 0.0 <= given <= most:
+        raise ValueError(f"{option} must be between 0 and {most:g} {unit}, got {given:g} {unit}")
+
+
 def not_negative(option: str, given: float) -> None:
     """Refuses a number that is negative or not finite.
 

@@ -11,6 +11,7 @@ from rich.markup import escape
 
 from experiments.cli.command_app import command_app
 from experiments.cli.console import print_list, print_note, refusing
+from experiments.cli.option_limits import at_most
 from experiments.cli.staging import YAML, staged_file
 from experiments.report.files import write_text
 from robots.configuration.nodes import ConfigurationError
@@ -62,8 +63,6 @@ def import_command(
         float | None,
         typer.Option(
             metavar="KG",
-            min=0.0,
-            max=_HEAVIEST,
             help="Of the whole robot, from its data sheet, where links do not say theirs or all the same.",
         ),
     ] = None,
@@ -71,8 +70,6 @@ def import_command(
         float | None,
         typer.Option(
             metavar="KG",
-            min=0.0,
-            max=_HEAVIEST,
             help="The largest that it carries.",
             show_default="a seventh of the mass that moves",
         ),
@@ -82,6 +79,8 @@ def import_command(
     """Make a robot file of a URDF, and say what is assumed in it."""
     console = Console()
     with refusing(ValueError, OSError), ExitStack() as stack:
+        at_most("--mass", _HEAVIEST, "kg", mass)
+        at_most("--payload", _HEAVIEST, "kg", payload)
         target = stack.enter_context(staged_file(write, *YAML)) if write else None
         if not is_urdf(urdf):
             raise ConfigurationError(f"'{urdf}' is no URDF: its name must end in .urdf or .xacro")

@@ -4,7 +4,7 @@ import math
 
 import pytest
 
-from experiments.cli.option_limits import at_least, positive
+from experiments.cli.option_limits import at_least, at_most, positive
 
 
 def test_the_least_is_allowed_and_one_less_refused():
@@ -20,3 +20,11 @@ def test_only_positive_and_finite_numbers_are_positive(number: float):
         positive("--pace", allowed)
     with pytest.raises(ValueError, match=rf"^--pace must be positive, got {number:g}$"):
         positive("--pace", number)
+
+
+@pytest.mark.parametrize("number", [-0.5, 30.5, math.inf, math.nan])
+def test_what_is_more_than_the_most_or_negative_is_refused_with_its_unit(number: float):
+    for allowed in (0.0, 30.0, None):
+        at_most("--mass", 30.0, "kg", allowed)
+    with pytest.raises(ValueError, match=rf"^--mass must be between 0 and 30 kg, got {number:g} kg$"):
+        at_most("--mass", 30.0, "kg", number)
