@@ -32,7 +32,7 @@ def print_study(console: Console, study: CamerasStudy) -> None:
     table = Table(title="Standard deviation of the position on the path along an axis", **_TABLE)
     for head in ("what", "changed", "in µm", "best µm", "at"):
         table.add_column(head, justify="left" if head in ("what", "changed", "at") else "right", no_wrap=True)
-    for name, points in study.sweeps.items():
+    for name, points in study.varied.items():
         first, last = points[0], points[-1]
         best = min(points, key=lambda point: np.nan_to_num(point.path.position, nan=np.inf))
         unit = SWEEPS[name].unit
@@ -69,7 +69,7 @@ def write_study_page(path: Path, title: str, study: CamerasStudy) -> None:
         Section("Along the path", note, ellipsoids, 620),
         Section("Over the workspace", note_workspace, dots, 620),
     ]
-    for name, points in study.sweeps.items():
+    for name, points in study.varied.items():
         sweep = SWEEPS[name]
         sections.append(Section(sweep.title, sweep.note, sweep_figure(sweep, points), 320))
         if any(

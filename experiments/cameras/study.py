@@ -40,6 +40,11 @@ class CamerasStudy:
         """Of the cell as it is, along the path."""
         return accuracy(self.covariance_on_path)
 
+    @property
+    def varied(self) -> Mapping[str, Sequence[SweepPoint]]:
+        """The sweeps that compare something: two cameras are one number of cameras."""
+        return {name: points for name, points in self.sweeps.items() if len(points) > 1}
+
 
 def study_setup(prepared: Prepared) -> SweepSetup:
     """The cell, the body and the noise of a scenario, and where they are looked at.

@@ -1,12 +1,16 @@
 """What limits a pose from cameras: the sweeps of a study obey the laws that geometry and light impose."""
 
 from functools import cache
+from io import StringIO
+from pathlib import Path
 
 import numpy as np
 import pytest
+from rich.console import Console
 
 from experiments.cameras.accuracy import accuracy, centroid_errors, information, pose_covariance
-from experiments.cameras.study import covariances, study_setup
+from experiments.cameras.report import print_study, write_study_page
+from experiments.cameras.study import CamerasStudy, covariances, study_json, study_setup
 from experiments.cameras.sweeps import SWEEPS, SweepPoint, SweepSetup
 from experiments.cameras.variations import best_subsets, ring, with_markers
 from experiments.cli.prepare import prepare
@@ -52,6 +56,20 @@ def test_exposure_has_an_optimum():
     assert right.pixel_sigma < 0.5 * dark.pixel_sigma
     assert right.pixel_sigma < 0.7 * long.pixel_sigma
     assert dark.found <= right.found == 1.0
+
+
+def test_a_sweep_of_one_value_has_no_row_and_no_picture(tmp_path: Path):
+    """As of the number of cameras of a cell that has two."""
+    noise, cameras = swept("pixel_noise", 0.05, 0.1), swept("cameras", 2)
+    known = covariances(setup())
+    console = Console(width=120, record=True, file=StringIO())
+    study = CamerasStudy(setup(), *known, {"pixel_noise": noise, "cameras": cameras}, [])
+    print_study(console, study)
+    write_study_page(tmp_path / "study.html", "two cameras", study)
+    for text in (console.export_text(), (tmp_path / "study.html").read_text()):
+        assert "Noise of the pixels" in text
+        assert "Number of cameras" not in text
+    assert list(study_json(study)["sweeps"]) == ["pixel_noise", "cameras"]
 
 
 def test_what_no_camera_can_do_is_a_value_without_a_result():
