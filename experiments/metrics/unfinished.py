@@ -1,6 +1,6 @@
 """Runs in which the guard did not let a law lead the tip to the end of its path."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 from diagrams.record.log import RunLog
 
@@ -46,3 +46,16 @@ def unfinished_cycles(cycles: Sequence[RunLog]) -> str:
         f"cycle{'s' if len(each) > 1 else ''} {', '.join(map(str, each))}: {ending}"
         for ending, each in numbers.items()
     )
+
+
+def never_finished(failures: Mapping[str, Sequence[str | None]]) -> str:
+    """Which laws have no run that came to its end, in words; empty where each has one.
+
+    Args:
+        failures: of each law by its name: why a run failed, empty or None where it did not.
+    """
+    lost = [law for law, reasons in failures.items() if all(reasons)]
+    if not lost:
+        return ""
+    which = f" of {', '.join(lost)}" if len(lost) < len(failures) else ""
+    return f"no run{which} came to its end"

@@ -15,6 +15,7 @@ from experiments.cli.json_output import human_console, json_output
 from experiments.cli.option_limits import at_least, one_of
 from experiments.cli.options import JobsOption, JsonOption, RobotOption, SchedulerOption, SetOption
 from experiments.metrics.laps import SLOWED
+from experiments.metrics.unfinished import never_finished
 from experiments.robustness.cases import CASES
 from experiments.robustness.contenders import contenders
 from experiments.robustness.study import Case, judged, run_trials, trials, with_calibrated_robots
@@ -92,8 +93,9 @@ def robustness_command(
             numbers = {"scenario": scenario, "robot": robot, "results": results, "runs": rows}
             output.write(numbers | ({"assumed": assumed} if assumed else {}))
     _print(human, scenario, results, {contender.text: contender.title for contender in compared})
-    if all(row["failure"] for row in rows):
-        fail("no run came to its end", BROKEN_OFF)
+    failures = {each.text: [row["failure"] for row in rows if row["law"] == each.text] for each in compared}
+    if lost := never_finished(failures):
+        fail(lost, BROKEN_OFF)
 
 
 def _each_once(option: str, text: str) -> list[str]:

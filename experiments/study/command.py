@@ -32,6 +32,7 @@ from experiments.cli.options import JobsOption, JsonOption, SchedulerOption
 from experiments.cli.staging import staged_file
 from experiments.cli.workers import Executor, SimulationError
 from experiments.metrics.single_figures import FIGURES
+from experiments.metrics.unfinished import never_finished
 from experiments.report.plot_page import Section, html_table, write_plot_page
 from experiments.report.style import law_title
 from experiments.study.analysis import Rows, of_law, spread, strongest_factor, study_json, worst_row
@@ -97,8 +98,8 @@ def study_command(
         output.write(numbers | {"seconds": time.perf_counter() - start})
     _print(human, study, found)
     print_files(human, folder / _PAGE, folder / TABLE)
-    if (found["failure"] != "").all():
-        fail("no run came to its end", BROKEN_OFF)
+    if lost := never_finished({law: of_law(found, law)["failure"].tolist() for law in study.laws}):
+        fail(lost, BROKEN_OFF)
 
 
 def _run(store: StudyStore, where: Executor, todo: Sequence[StudyRow], total: int) -> None:

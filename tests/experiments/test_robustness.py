@@ -189,20 +189,31 @@ def test_what_is_left_after_an_event_is_told(tmp_path: Path):
     assert judged_case["recovered_mm"][0] > 5.0
 
 
-@pytest.mark.parametrize(("failing", "code"), [("all", 1), ("one", 0)])
-def test_a_command_of_which_nothing_came_to_its_end_has_failed(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, failing: str, code: int
+@pytest.mark.parametrize(
+    ("failing", "code", "says"),
+    [
+        ([], 0, ""),
+        ([("pbvs", 1001)], 0, ""),
+        ([("pbvs", 1000), ("pbvs", 1001)], 1, "truetip: no run of pbvs came to its end\n"),
+        ([(law, seed) for law in ("open_loop", "pbvs") for seed in (1000, 1001)], 1,
+         "truetip: no run came to its end\n"),
+    ],
+    ids=("none", "one run", "one law", "all"),
+)  # fmt: skip
+def test_a_command_of_which_no_run_of_a_law_came_to_its_end_has_failed(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, failing: list, code: int, says: str
 ):
     """As a comparison has that lacks a law; among many robots one may fail, and is named."""
     file = tmp_path / "numbers.json"
-    done = row(1000, [1.0]) | {"case": "plain", "law": "open_loop"}
-    failed = row(1001, [], "ran away") | {"case": "plain", "law": "open_loop"}
-    rows = [failed, failed] if failing == "all" else [done, failed]
+    rows = [
+        row(seed, [1.0], "ran away" if (law, seed) in failing else None) | {"case": "plain", "law": law}
+        for law in ("open_loop", "pbvs")
+        for seed in (1000, 1001)
+    ]
     monkeypatch.setattr(command, "run_trials", lambda *_: rows)
-    result = truetip("robustness", "--laws", "open_loop", "--seeds", 2, "--json", file)
-    assert result.exit_code == code
-    assert json.loads(file.read_text())["results"][0]["failures"][-1].endswith("ran away")
-    assert ("truetip: no run came to its end" in result.stderr) == (code == 1)
+    result = truetip("robustness", "--laws", "open_loop,pbvs", "--seeds", 2, "--json", file)
+    assert (result.exit_code, result.stderr) == (code, says)
+    assert sum(len(each["failures"]) for each in json.loads(file.read_text())["results"]) == len(failing)
 
 
 @pytest.mark.parametrize(

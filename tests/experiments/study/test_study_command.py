@@ -24,8 +24,8 @@ from experiments.cli.workers import in_order
 from experiments.study import command as study_command
 from experiments.study import rows
 from experiments.study.command import study_verdict
-from experiments.study.rows import first_run, prepared_of, run_row, study_rows
-from experiments.study.store import TABLE, alone_in
+from experiments.study.rows import StudyRow, first_run, prepared_of, run_row, study_rows
+from experiments.study.store import TABLE, StudyStore, alone_in
 from experiments.study.study_file import Factor, Levels, Names, Study, load_study
 from robots.description.model import load_robot
 from tests.experiments.commands import refusal, truetip
@@ -267,6 +267,25 @@ def test_a_law_that_has_failed_is_not_the_best_for_what_it_leaves_out():
     }
     laws = Study(laws=["open_loop", "pbvs"], factors={"station.payload": Levels([0.0, 1.0])})
     assert study_verdict(laws, table).startswith("Over 4 runs Open loop has the best worst run")
+
+
+@pytest.mark.parametrize(("failing", "says"), [(["pbvs"], " of pbvs"), (["open_loop", "pbvs"], "")])
+def test_a_study_of_which_no_run_of_a_law_came_to_its_end_has_failed(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, failing: list[str], says: str
+):
+    def run(store: StudyStore, where: object, todo: list[StudyRow], total: int) -> None:
+        monkeypatch.setattr(rows, "run", lambda *_, **__: comparison(period=0.1)["pbvs"][0])
+        for each in todo:
+            line = run_row(each, lambda share: None)
+            store.add(line | ({"failure": "ran away"} if each.law in failing else {}))
+        store.flush()
+
+    monkeypatch.setattr(study_command, "_run", run)
+    file = tmp_path / "study.yaml"
+    file.write_text("laws: [open_loop, pbvs]\nfactors: {station.payload: {values: [0, 1]}}\n")
+    result = truetip("study", file, "--out", tmp_path / "out")
+    assert (result.exit_code, result.stderr) == (1, f"truetip: no run{says} came to its end\n")
+    assert (tmp_path / "out" / TABLE).exists()
 
 
 @pytest.mark.parametrize(
