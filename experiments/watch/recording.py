@@ -25,13 +25,12 @@ _VIDEOS, _PICTURES = (".mp4", ".avi", ".mkv"), {".png", ".jpg", ".jpeg", ".bmp",
 class Recording:
     """Images and joints that were recorded together."""
 
-    def __init__(self, folder: str | Path, cameras: Sequence[str], size: tuple[int, int]) -> None:
+    def __init__(self, folder: str | Path, cameras: Sequence[str]) -> None:
         """Opens a folder.
 
         Args:
             folder: that holds the recording, or a single video.
             cameras: names of the cameras of the cell, in its order.
-            size: width and height of an image in px.
 
         Raises:
             ValueError: if something is missing or cannot be read; one line that says what and where.
@@ -45,7 +44,7 @@ class Recording:
             )
         table = _joints(folder.with_suffix(".csv") if is_video else folder / JOINTS)
         self.times, self.joints = table[:, 0], table[:, 1:]
-        self._cameras, self._size = list(cameras), size
+        self._cameras = list(cameras)
         self._video = folder if is_video else None
         self._sources = [] if is_video else [_source(folder, name) for name in cameras]
         self.ended: dict[str, int] = {}  # cameras whose images ended before the joints, with their number
@@ -53,15 +52,18 @@ class Recording:
     def __len__(self) -> int:
         return len(self.times)
 
-    def sets(self) -> Iterator[np.ndarray]:
+    def sets(self, size: tuple[int, int]) -> Iterator[np.ndarray]:
         """The sets of images one after the other, (n, height, width, 3) of uint8 each.
+
+        Args:
+            size: width and height that an image has to have in px.
 
         Raises:
             ValueError: if an image has another size or cannot be read.
         """
-        width, height = self._size
+        width, height = size
         if self._video is not None:
-            yield from self._tiles(self._video)
+            yield from self._tiles(self._video, size)
             return
         streams = [_frames(source) for source in self._sources]
         for number in range(len(self)):
@@ -80,9 +82,9 @@ class Recording:
                 images[i] = image
             yield images
 
-    def _tiles(self, video: Path) -> Iterator[np.ndarray]:
+    def _tiles(self, video: Path, size: tuple[int, int]) -> Iterator[np.ndarray]:
         """The sets of a single video; after its end all cameras are blind."""
-        width, height = self._size
+        width, height = size
         frames, n = _frames(video), len(self._cameras)
         for number in range(len(self)):
             found = next(frames, None)

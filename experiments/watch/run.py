@@ -184,14 +184,15 @@ def watch_recorded(
     Raises:
         ValueError: if the recording cannot be read or is too short.
     """
-    cell = watched_cell(scenario, robot, Blind())
     names = [camera.name for camera in load_cell(scenario.station.overview.cell).cameras]
-    recording = Recording(folder, names, cell.size)
+    # Before the cell is built, which takes long: it may be another folder.
+    recording = Recording(folder, names)
     if not 0 < empty < len(recording):
         raise ValueError(
             f"--empty must be between 1 and {len(recording) - 1}, one less than the sets, got {empty}"
         )
-    sets, detector = recording.sets(), cell.detector
+    cell = watched_cell(scenario, robot, Blind())
+    sets, detector = recording.sets(cell.size), cell.detector
     memory = detector.learn([next(sets) for _ in range(empty)], list(recording.joints[:empty]))
     people = scenario.servo.people
     follower, diary = PeopleFollower(detector, people.tracks, people.lasting), WatchDiary(detector.arm)

@@ -7,6 +7,7 @@ import cv2
 import numpy as np
 import pytest
 
+from experiments.watch import run as watch_run
 from experiments.watch.recording import COLUMNS, Recording
 from systems.cell.overview.person import gap
 from tests.experiments.commands import files, refusal, truetip
@@ -75,13 +76,12 @@ def test_a_single_video_has_all_cameras_side_by_side_and_row_by_row(tmp_path: Pa
     video.release()
     rows = [",".join(map(str, [0.05 * number, *np.zeros(6)])) for number in range(3)]
     (tmp_path / "all.csv").write_text("\n".join([",".join(COLUMNS), *rows]))
-    recording = Recording(tmp_path / "all.avi", ["a", "b", "c"], (64, 48))
-    means = [images.mean(axis=(1, 2, 3)) for images in recording.sets()]
+    recording = Recording(tmp_path / "all.avi", ["a", "b", "c"])
+    means = [images.mean(axis=(1, 2, 3)) for images in recording.sets((64, 48))]
     np.testing.assert_allclose(means, [*greys, [0, 0, 0]], atol=4.0)
     assert recording.ended == {"a": 2, "b": 2, "c": 2}
-    wrong = Recording(tmp_path / "all.avi", ["a", "b", "c"], (60, 48))
     with pytest.raises(ValueError, match="must be made of 3 images of 60 x 48 px, got 128 x 96 px"):
-        next(wrong.sets())
+        next(recording.sets((60, 48)))
 
 
 def test_videos_are_read_image_by_image_and_end_when_they_end(tmp_path: Path):
@@ -92,10 +92,22 @@ def test_videos_are_read_image_by_image_and_end_when_they_end(tmp_path: Path):
     video.release()
     rows = [",".join(map(str, [0.05 * number, *np.zeros(6)])) for number in range(4)]
     (tmp_path / "joints.csv").write_text("\n".join([",".join(COLUMNS), *rows]))
-    recording = Recording(tmp_path, ["left"], (64, 48))
-    means = [images.mean() for images in recording.sets()]
+    recording = Recording(tmp_path, ["left"])
+    means = [images.mean() for images in recording.sets((64, 48))]
     np.testing.assert_allclose(means, [40, 80, 120, 0], atol=2.0)
     assert recording.ended == {"left": 3}
+
+
+def test_a_folder_without_a_recording_is_refused_before_the_cell_is_built(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+):
+    monkeypatch.setattr(watch_run, "watched_cell", lambda *_: pytest.fail("the cell was built"))
+    empty, out = tmp_path / "empty", tmp_path / "out"
+    for folder in (empty, out):
+        folder.mkdir()
+    assert "joints.csv: no such file or directory" in refusal(watch(empty, out))
+    (empty / "joints.csv").write_text(",".join(COLUMNS) + "\n" + "0,0,0,0,0,0,0\n1,0,0,0,0,0,0\n")
+    assert f"no pictures of camera {NAMES[0]}" in refusal(watch(empty, out))
 
 
 @pytest.mark.slow
