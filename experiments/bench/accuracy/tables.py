@@ -70,7 +70,10 @@ def read_results(file: Path) -> list[dict[str, Any]]:
 
 def _lap(lap: dict[str, tuple[float, float]]) -> str:
     (worst, median), (angle, _) = lap["max_norm_mm"], lap["max_angle_deg"]
-    said, (longest, usual) = f"{worst:.3f} ({median:.3f}), {angle:.3f}", lap["times_planned"]
+    said = f"{worst:.3f} ({median:.3f}), {angle:.3f}"
+    if "times_planned" not in lap:  # measured before it was kept: unknown
+        return said
+    longest, usual = lap["times_planned"]
     return f"{said}, × {longest:.2f} ({usual:.2f})" if longest > SLOWED else said
 
 

@@ -64,6 +64,12 @@ def test_a_table_has_a_line_for_each_case_with_the_worst_and_the_median():
     assert "| 0.030 (0.020) |" in lines[4]
 
 
+def test_a_row_that_was_measured_before_times_were_kept_says_nothing_of_them():
+    older = [{name: lap[name] for name in ("max_norm_mm", "max_angle_deg")} for lap in result()["laps"]]
+    line = table([(Row("a", "--cases plain"), [result(laps=older)])]).splitlines()[-1]
+    assert "| 0.040 (0.020), 0.006 | 0.010 (0.007), 0.001 |" in line
+
+
 def test_a_run_that_broke_off_is_no_row(tmp_path: Path):
     file = tmp_path / "row.json"
     file.write_text(json.dumps({"results": [result(failures=["seed 3, circle: out of reach"])]}))
