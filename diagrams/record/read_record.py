@@ -2,16 +2,17 @@
 
 import json
 import struct
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import Any, BinaryIO
 
 import numpy as np
 from mcap.exceptions import EndOfFile, InvalidMagic, McapError
+from mcap.opcode import Opcode
 from mcap.reader import make_reader
-from mcap.records import Attachment, Channel, DataEnd, Footer, Message, Metadata
-from mcap.stream_reader import StreamReader
+from mcap.records import Attachment, Channel, Chunk, DataEnd, Footer, McapRecord, Message, Metadata
+from mcap.stream_reader import StreamReader, breakup_chunk
 from mcap.writer import MCAP0_MAGIC
 
 from diagrams.record.run_record import RUN, SCENARIO
@@ -60,9 +61,9 @@ def read_record(path: str | Path) -> Contents:
         if not head or not MCAP0_MAGIC.startswith(head):
             raise ValueError(f"{path}: not an MCAP file{'' if head else ', it is empty'}")
         file.seek(0)
-        damage, has_all = "", False
+        damage, has_all, stream = "", False, _Stream(file)
         try:
-            for record in StreamReader(file, validate_crcs=True).records:
+            for record in stream.records():
                 if isinstance(record, Channel):
                     if record.message_encoding != "json":
                         raise _OtherEncodingError(
@@ -90,11 +91,11 @@ def read_record(path: str | Path) -> Contents:
             ValueError,
         ):  # of the decompression, of JSON, of a checksum
             damage = f"is damaged before byte {file.tell()}"
-    if damage and not has_all:
-        number = sum(map(len, times.values()))
-        contents.cut = f"{damage}, {f'after {number} messages' if number else 'before its first message'}"
-        if not channels and not contents.scenario and not contents.run:
-            raise ValueError(f"{path}: the MCAP file {contents.cut}")
+        if damage and not has_all:
+            number = sum(map(len, times.values()))
+            contents.cut = f"{damage}, {f'after {number} messages' if number else stream.before_all()}"
+            if not channels and not contents.scenario and not contents.run:
+                raise ValueError(f"{path}: the MCAP file {contents.cut}")
     for topic, rows in messages.items():
         at = 1e-9 * np.array(times[topic], dtype=float)
         try:
@@ -116,6 +117,29 @@ def recorded_topics(path: str | Path) -> set[str]:
         except (McapError, OSError, struct.error, ValueError):
             return set()
     return {channel.topic for channel in found.channels.values()} if found else set()
+
+
+class _Stream:
+    """The records of a file; messages stand in blocks that are packed and checked as a whole."""
+
+    def __init__(self, file: BinaryIO) -> None:
+        self._file, self._begun = file, len(MCAP0_MAGIC)  # where a record or a block begins
+
+    def records(self) -> Iterator[McapRecord]:
+        """All of them, those of a block once the whole of it is there."""
+        for record in StreamReader(self._file, emit_chunks=True, validate_crcs=True).records:
+            if isinstance(record, Chunk):
+                yield from breakup_chunk(record, validate_crc=True)
+            else:
+                yield record
+            self._begun = self._file.tell()
+
+    def before_all(self) -> str:
+        """Where the file ended for want of any message, in words."""
+        self._file.seek(self._begun)
+        if self._file.read(1) != bytes([Opcode.CHUNK]):
+            return "before its first message"
+        return "within its first block of messages, of which none can be read without the rest"
 
 
 class _OtherEncodingError(ValueError):

@@ -48,9 +48,8 @@ def log_command(
     if how == PATH:
         how = "ran its path to the end"
     if not contents.is_complete:
-        how = (
-            f"was cut off: it {contents.cut or 'ends behind its last message'}; what follows is what is there"
-        )
+        how = f"was cut off: it {contents.cut or 'ends behind its last message'}"
+        how += "; what follows is what is there" if contents.topics else ""
     law = f"law {said['law']}, " if "law" in said else ""
     console.print(escape(f"{file}: {law}{how}"), soft_wrap=True)
     if contents.topics:

@@ -54,7 +54,12 @@ def test_a_record_that_was_cut_off_is_summarised_and_said_to_be_so(log, tmp_path
     ("kept", "says"),
     [
         (lambda whole: whole[:5], "run.mcap: the MCAP file ends early at byte 5, before its first message"),
-        (lambda whole: whole[:500], "was cut off: it ends early at byte 500, before its first message"),
+        (lambda whole: whole[:70], "run.mcap: the MCAP file ends early at byte 70, before its first message"),
+        (
+            lambda whole: whole[:500],
+            "was cut off: it ends early at byte 500, within its first block of messages, of which none can "
+            "be read without the rest\n",
+        ),
         (lambda whole: whole[:-20_000], "was cut off: it ends early at byte"),
         (lambda whole: whole[:9000] + b"?" + whole[9001:], "was cut off: it is damaged before byte"),
     ],
