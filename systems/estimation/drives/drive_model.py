@@ -47,6 +47,7 @@ _DOUBT = 30.0  # times what a motor was off by while it hung: by that its follow
 _ROTOR_SPREAD = 0.3  # of what a robot's file says of rotors
 _VISCOUS_SPREAD, _COULOMB_SPREAD = 0.3, 0.5  # likewise of friction
 _MOVED = 2e-4  # rad, slack of a joint whose motor is off by friction more than by all else; assumed
+_BY_TORQUE, _BEGUN = 6e-4, 1e-3  # rad, slack of a joint whose friction torques take over; begun with a share
 _SLACK = 0.3  # of Coulomb's friction, by which it may be off while little is known of it
 _STEEPEST = 0.5  # rad/s, what learning may add to the speed of a joint
 _RESTS = {"cascade": 1e-5, "velocity": 1e-5, "position": 3e-5}  # rad, where a motor rests beside its command
@@ -86,10 +87,11 @@ class DriveModel:
     `GainSearch` finds others, see `prepare_gains` and `take_gains`.
 
     Where drives take torques, these are sent ahead by the dead time that was learnt, as positions are; of
-    Coulomb friction, which turns over in an instant, its mean over the period that they will last. Where they
-    are not taken, commands run ahead of the plan by G w, which is late, too: to the speed of the plan belongs
-    the rate of G w. And the planner of the robot's controller is between, which follows references with a
-    gain and may smooth their speeds, by a time T, as that of EGM does: it is behind by T a / (s + gain).
+    Coulomb friction, which turns over in an instant, its mean over the period that they will last. What was
+    learnt of rotors and friction positions make up for, and torques after `give_by_torque`. Where they are
+    not taken, commands run ahead of the plan by G w, which is late, too: to the speed of the plan belongs the
+    rate of G w. And the planner of the robot's controller is between, which follows references with a gain
+    and may smooth their speeds, by a time T, as that of EGM does: it is behind by T a / (s + gain).
     Cascades that take torques have the same column, with the gain p of their position loop: they may know
     their speed late, by a time -T, as encoders' steps are filtered, and push until p holds against it.
     """
@@ -169,6 +171,7 @@ class DriveModel:
             ),
             wound=(3, 6),  # of what drives wound up meanwhile: integral and error; for how long, s
             aside=(3, 6),  # rad and rad/s, of commands what is beside the plan, see `DriveMemory`
+            by_torque=(3, 6),  # likewise: of what was learnt what torques make up for
             gains=gains_layout,
             coming=gains_layout,  # gains that were found and not taken yet; factors of 0: there are none
         )
@@ -208,7 +211,6 @@ class DriveModel:
             motion: planned position, velocity and acceleration of the motors, (6,) each.
             loads: of the gears as motors feel them, (5, 6) or wider, in the order of `ArmLoads.at`.
             mass: of the payload as the drives' own gravity compensation has it in kg.
-
         """
         filters = memory.started, memory.z, memory.w
         known = DriveMemory(
@@ -220,6 +222,7 @@ class DriveModel:
             memory.hung,
             memory.wound,
             memory.aside,
+            memory.by_torque,
         )
         out, regressors = np.empty((4, 6)), np.empty(REGRESSORS)
         limits = _LED_IN, _STEEPEST
@@ -317,6 +320,14 @@ class DriveModel:
             # Until now they had to make up for friction that turns over sharply.
             P[_DIAGONAL[_VISCOUS], _DIAGONAL[_VISCOUS]] += _VISCOUS_SPREAD**2
             P[_DIAGONAL[_COULOMB], _DIAGONAL[_COULOMB]] += _COULOMB_SPREAD**2
+
+    def give_by_torque(self, memory: SimpleNamespace) -> None:
+        """From now on torques take over what was learnt of rotors and friction, if drives take them.
+
+        So it is where friction moves a motor by far. Before, positions do it: they show gains.
+        """
+        if self._drives.takes_torque:
+            memory.by_torque[0] = np.maximum(memory.by_torque[0], _BEGUN * (self._drives.slack > _BY_TORQUE))
 
     def widen(
         self, memory: SimpleNamespace, is_told_otherwise: bool = False, is_on_path: bool = True

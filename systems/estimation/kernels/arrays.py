@@ -141,6 +141,9 @@ class DriveMemory(NamedTuple):
     wound: np.ndarray  # (3, 6), integral and error left of what drives wound up; s, that motors hang
     # (3, 6), what was commanded beside the plan: rad; rad/s, mean speed until then and the commanded one
     aside: np.ndarray
+    # (3, 6), of what was learnt the share that torques make up for; rad, the following error that they leave
+    # out; and N m, of these torques what changes evenly
+    by_torque: np.ndarray
 
 
 class Gap(NamedTuple):

@@ -46,6 +46,7 @@ def _renewed(memory: SimpleNamespace) -> list[np.ndarray]:
         drives.smoothed,
         drives.wound.ravel(),
         drives.aside.ravel(),
+        drives.by_torque.ravel(),
         drives.gains.all,
         drives.coming.all,
         delay.delay,

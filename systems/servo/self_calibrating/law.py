@@ -320,6 +320,8 @@ class SelfCalibrating(SampledSystem):
         forecast = self._forecast
         if coming.begins_path[0] or coming.is_led_in[0]:
             self._drives.open_low_speeds(memory.drives, is_early=not coming.begins_path[0])
+        if coming.begins_path[0]:
+            self._drives.give_by_torque(memory.drives)
         if coming.begins_path[0] and forecast and forecast.sigma > self._config.probe.vague:
             event = Event(PATH_UNSEEN, forecast.sigma, forecast.sigma)
             self._learning.events.note(memory.events, time, event)

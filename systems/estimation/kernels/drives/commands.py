@@ -18,6 +18,10 @@ from systems.estimation.kernels.plan import follow
 
 _WINDS = 0.5  # s, longer at rest than that, steps of an encoder may be taken for it
 _MOST_PERIODS = 1.5  # by which torques are sent ahead or held back
+# Of the believed Coulomb friction, what may turn over sharply: all of it, a fifth more than believed, and a
+# hump. What is learnt first, of motors that hang, may be some times as much, and would push them to and fro.
+_MOST_SHARP = 1.5
+_HANDED_OVER = 0.3  # s, in which torques take over what positions have made up for
 
 
 @inner
@@ -108,6 +112,33 @@ def _log_cosh(x):
     return abs(x) + math.log1p(math.exp(-2.0 * abs(x)))  # less log 2
 
 
+@inner
+def _possible(led):
+    """Parameters of the regression, with no more friction that turns over sharply than there can be."""
+    possible = led.copy()
+    for i in range(6):
+        sharp = min(led[at.SHARP + i], _MOST_SHARP)
+        possible[at.SHARP + i], possible[at.THIRD + i] = sharp, min(led[at.THIRD + i], _MOST_SHARP - sharp)
+    return possible
+
+
+@inner
+def _turning(drives, led, v, turn, turned, i):
+    """The torque of one joint that Coulomb friction needs unlike belief, as it was learnt.
+
+    Args:
+        led: (75,), parameters of the regression.
+        v, turn: in the middle of a period, and by how much it changes in it, rad/s.
+        turned: the mean of what is believed over this period, N m.
+        i: which joint.
+    """
+    coulomb, width, f = drives.coulomb[i], drives.width[i], at.FRICTION + at.OF_FRICTION * i
+    at_once = coulomb * _mean_sign(v, turn, SHARP_WIDTH * width) - turned
+    within = coulomb * _mean_sign(v, turn, THIRD_WIDTH * width) - turned
+    scaled = (led[f + 2] + led[f + 3] * math.exp(-abs(v) / drives.slow)) * turned
+    return scaled + led[at.SHARP + i] * at_once + led[at.THIRD + i] * within
+
+
 @compiled
 def command(drives, arm, masses, memory, motion, loads, mass, limits, out, rows):
     """What to command so that motors move as planned, see `DriveModel.command`.
@@ -138,6 +169,7 @@ def command(drives, arm, masses, memory, motion, loads, mass, limits, out, rows)
         for k in range(len(led)):
             led[k], rate[k] = memory.beta[k], 0.0
     follow(memory.beta, limits[0], drives.period, led, rate)
+    led = _possible(led)
     # Periods that a torque has to be sent ahead: it arrives late by what was learnt, and is held for a period
     # in whose middle it should be right. A dead time that is wrong by more is corrected by the plan.
     late = drives.period * min(max(led[at.DEAD_TIME] / drives.period, -_MOST_PERIODS), _MOST_PERIODS)
@@ -162,6 +194,13 @@ def command(drives, arm, masses, memory, motion, loads, mass, limits, out, rows)
         if drives.takes_torque:
             turned = drives.coulomb[i] * _mean_sign(v[i] + late * a[i], turn, drives.width[i])
             out[2, i] = needed if is_first else even + ahead * (even - last[at.W_MISSING]) + turned
+            f = at.FRICTION + at.OF_FRICTION * i
+            share, known = memory.by_torque[0, i], led[f] * w[at.W_ROTOR] + led[f + 1] * w[at.W_VISCOUS]
+            if share > 0.0:
+                learnt = known + ahead * (known - memory.by_torque[2, i])
+                out[2, i] += share * (learnt + _turning(drives, led, v[i] + late * a[i], turn, turned, i))
+                memory.by_torque[0, i] = min(1.0, share + drives.period / _HANDED_OVER)
+            memory.by_torque[2, i] = known
             last[at.W_MISSING] = w[at.W_MISSING] = 0.0  # nothing is missing
         if is_first:
             for gains in range(4):
@@ -188,7 +227,8 @@ def command(drives, arm, masses, memory, motion, loads, mass, limits, out, rows)
             other = memory.z[1 + k, :, i]
             rows[at.ROW_OTHER_GAINS + k, i] = _missing(other, led, i) - missing
             if drives.takes_torque:
-                rows[at.ROW_OTHER_GAINS + k, i] += _learnt(other, led, i) - _learnt(z, led, i)
+                by_position = 1.0 - memory.by_torque[0, i]
+                rows[at.ROW_OTHER_GAINS + k, i] += by_position * (_learnt(other, led, i) - _learnt(z, led, i))
         settled = a[i] / drives.following
         memory.smoothed[i] = settled + fading * (memory.smoothed[i] - settled)
         rows[at.ROW_SMOOTHED, i] = memory.smoothed[i]
@@ -199,9 +239,13 @@ def command(drives, arm, masses, memory, motion, loads, mass, limits, out, rows)
         # Nobody tells both shapes apart at a stop, and a motor that creeps does not stay off.
         off, sticks = memory.hung[1, i], led[at.SHARP + i] + led[at.THIRD + i]
         unwound, speed = _unwound(drives, v[i], a[i], off, sticks, memory.wound, i)
+        # Of what the motor would be behind by, torques that are sent leave nothing: as if it were commanded.
         out[3, i] = correction + unwound
-        out[0, i] += out[3, i]
-        out[1, i] += (correction - before) / drives.period + speed
+        sent = memory.by_torque[0, i] * _learnt(z, led, i)
+        change = correction - before - (sent - memory.by_torque[1, i])
+        memory.by_torque[1, i] = sent
+        out[0, i] += out[3, i] - sent
+        out[1, i] += change / drives.period + speed
         wanted = out[0, i] - theta[i], out[1, i] - v[i]
         position, speed = _bounded(drives, a[i], *wanted, is_first, memory.aside, i)
         if position != wanted[0] or speed != wanted[1]:

@@ -5,6 +5,7 @@ import pytest
 from scipy.signal import lsim
 
 from systems.estimation.drives.drive_model import SHARP, THIRD
+from systems.estimation.kernels.drive_columns import CONSTANT, FRICTION, OF_FRICTION
 from systems.estimation.kernels.drives.regression import SHARP_WIDTH, THIRD_WIDTH
 from tests.systems.estimation.drives.motors import LOADS, PERIOD, drives, motion
 
@@ -113,6 +114,49 @@ def test_motors_that_hung_do_not_start_with_what_their_drives_wound_up_meanwhile
         model.open_low_speeds(memory)
         farthest.append(moved_with_sticking_friction(model, memory, is_known)[-3:, 3:])
     assert (farthest[0] < 0.6 * farthest[1]).all()  # of the wrist, which friction moves most
+
+
+def test_on_the_path_torques_take_over_what_positions_have_made_up_for():
+    """What torques are sent beyond those of a model without them moves motors as positions did before."""
+    learnt = {0: 0.2, 1: -0.1, 2: 0.3, 3: 0.1}  # of rotor, viscous and Coulomb friction, and its hump
+    times, told = PERIOD * np.arange(2000), []
+    for on_path in (True, False):
+        model, memory = drives(robot="kr16")
+        for k, share in learnt.items():
+            memory.beta[FRICTION + k : CONSTANT : OF_FRICTION] = share
+        memory.beta[SHARP] = 0.5
+        told.append([])
+        for time in times:
+            if on_path and time > 2.0:
+                model.give_by_torque(memory)
+            plan = tuple(0.05 * each for each in motion(time))
+            issued = model.command(memory, plan, LOADS, 7.0)
+            told[-1].append((issued.position - plan[0], issued.torque, issued.beside))
+    (position, torque, beside), (before, without, same) = (np.array(each).swapaxes(0, 1) for each in told)
+    np.testing.assert_array_equal(beside, same)  # what is learnt from is the same
+    assert not (torque - without)[times <= 2.0].any()
+    others, moved_most, gains = [0, 1, 2, 4], [3, 5], model._drives
+    assert not (torque - without)[:, others].any()
+    np.testing.assert_allclose(position[-1000:, moved_most], 0.0, atol=1e-9)  # these have nothing left to do
+    for joint in moved_most:
+        drive = [1.0, 0.0], [gains.kd[joint], gains.kp[joint], gains.ki[0, joint]]
+        moved = lsim(drive, (torque - without)[:, joint], times, interp=False)[1]
+        off = (moved - (before - position)[:, joint])[-1000:]
+        assert np.abs(off).max() < 0.1 * np.abs(before[-1000:, joint]).max()
+
+
+def test_no_more_friction_is_made_up_for_than_there_can_be():
+    """What is learnt of motors that hang may be some times Coulomb's friction, and would push them about."""
+
+    def beside(sharp: float, within: float) -> np.ndarray:
+        model, memory = drives(robot="kr16")
+        memory.beta[SHARP], memory.beta[THIRD] = sharp, within
+        plans = [tuple(0.05 * each for each in motion(PERIOD * k)) for k in range(1000)]
+        return np.array([model.command(memory, plan, LOADS, 7.0).beside for plan in plans])
+
+    np.testing.assert_array_equal(beside(4.0, 0.5), beside(1.5, 0.0))
+    np.testing.assert_array_equal(beside(0.5, 3.0), beside(0.5, 1.0))
+    assert not np.array_equal(beside(1.4, 0.0), beside(1.5, 0.0))
 
 
 @pytest.mark.parametrize("robot", ["irb1200", "kr16-realistic"])
