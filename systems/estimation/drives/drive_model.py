@@ -139,7 +139,7 @@ class DriveModel:
         self.finds_gains = kind == "cascade"
         self.search = GainSearch(gains, *self._gains, model.load_scale, period, model.takes_torque)
         self._moved_by_friction = self._drives.slack > _MOVED
-        self.is_fed_back = bool(self._moved_by_friction.any()) or not model.takes_torque
+        self.is_fed_back = bool(self._moved_by_friction.any()) or not (model.takes_torque or has_play)
         # The arm as the drives know it, which hold it against gravity.
         drawn = ArmGeometry(robot, np.array([], dtype=int))
         self._held = drawn.constants(np.zeros(NUM_PARAMETERS)), ArmLoads(robot).masses
@@ -182,7 +182,7 @@ class DriveModel:
         All of it where friction moves a motor first of all, and shows it. Where no torques are sent, what is
         commanded in their place goes through a controller that nobody knows well: as far as the rotor has
         become known, without which a motor rings with its drive, and feedback, late as it is, adds to it.
-        Of other motors nothing: what was learnt leaves little, and with feedback first laps were no better.
+        Of other motors nothing: what was learnt leaves little, less than what gears with play err by.
         """
         shares = self._moved_by_friction.astype(float)
         if self.is_fed_back and not (self._drives.takes_torque or shares.any()):

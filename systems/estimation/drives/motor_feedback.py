@@ -26,23 +26,19 @@ class MotorFeedback:
     of two in a row motors creep to and fro in friction that sticks, further each time.
     """
 
-    def __init__(
-        self, config: DriveModelConfig, kind: str, has_play: bool, has_shares: bool, period: float
-    ) -> None:
+    def __init__(self, config: DriveModelConfig, kind: str, has_shares: bool, period: float) -> None:
         """Takes its gain.
 
         Args:
             config: what is believed of the drives.
             kind: of the drives; those that follow positions alone ring, and those that follow speeds alone
                 are brought back otherwise: of both nothing is fed back here.
-            has_play: whether gears may have gaps. Then they err by more than their motors, and with feedback
-                robots came no nearer to their path: nothing is fed back either.
             has_shares: whether there are motors of which something is fed back, ever.
             period: between commands, s.
         """
         # A lag of more than two over the period would grow from step to step.
         gain = min(config.feedback, 1.0 / period)
-        self._gain = gain if kind == "cascade" and not has_play else 0.0
+        self._gain = gain if kind == "cascade" else 0.0
         self.acts = self._gain > 0.0 and has_shares  # else it changes no command
         self._period = period
         self.layout = Layout(beside=(NUM_JOINTS,))  # rad

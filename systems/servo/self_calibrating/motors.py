@@ -74,8 +74,8 @@ class MotorLearning:
         self._period, self._delay, self._on_upset = model.period, delay, on_upset
         self._held_to_plan = config.drives.held_to_plan
         self._half = max(1, round(_DIFFERENCE / model.period))
-        of_drives = config.drives, config.drive, has_play
-        self.drives = DriveModel(model, *of_drives)
+        of_drives = config.drives, config.drive
+        self.drives = DriveModel(model, *of_drives, has_play)
         self.feedback = MotorFeedback(*of_drives, self.drives.is_fed_back, model.period)
         self.plan, self.encoders = History(PLAN.size, length), History(2 * NUM_JOINTS, length)
         self.steps = EncoderSteps()

@@ -3,8 +3,10 @@
 import numpy as np
 import pytest
 
+from robots.description.model import load_robot
+from systems.controller_model import ControllerModel
 from systems.estimation.drives.drive_config import DriveModelConfig
-from systems.estimation.drives.drive_model import REGRESSORS, DriveCommand
+from systems.estimation.drives.drive_model import REGRESSORS, DriveCommand, DriveModel
 from systems.estimation.drives.motor_feedback import MotorFeedback
 from tests.systems.estimation.drives.motors import LOADS, PERIOD, drives, motion
 
@@ -12,8 +14,8 @@ STEP, STILL, ALL = 5e-4, np.zeros(6), np.ones(6)  # s
 POSITION, SPEED, INTEGRAL = 25.0, 100.0, 10.0  # 1/s, of a cascade
 
 
-def part(kind="cascade", has_play=False, **config):
-    feedback = MotorFeedback(DriveModelConfig(**config), kind, has_play, True, PERIOD)
+def part(kind="cascade", **config):
+    feedback = MotorFeedback(DriveModelConfig(**config), kind, True, PERIOD)
     return feedback, feedback.layout.view(np.zeros(feedback.layout.size))
 
 
@@ -79,17 +81,16 @@ def test_a_motor_that_sticks_does_not_move_in_steps():
     assert np.abs(fed_back[500:]).max() < 1e-5
 
 
-def test_nothing_is_fed_back_that_encoders_do_not_show_nor_to_drives_that_ring_or_gears_with_play():
+def test_nothing_is_fed_back_that_encoders_do_not_show_nor_to_drives_that_ring():
     command = some_command()
     behind, step = STILL + 1e-3, STILL + 1e-5
-    for of_drives, off, rounding in (
-        (("cascade", False), np.full(6, np.nan), STILL),
-        (("cascade", False), 1.7 * step, step),  # less than half a step of the encoder
-        (("cascade", True), behind, STILL),
-        (("position", False), behind, STILL),
-        (("velocity", False), behind, STILL),
+    for kind, off, rounding in (
+        ("cascade", np.full(6, np.nan), STILL),
+        ("cascade", 1.7 * step, step),  # less than half a step of the encoder
+        ("position", behind, STILL),
+        ("velocity", behind, STILL),
     ):
-        feedback, memory = part(*of_drives)
+        feedback, memory = part(kind)
         told = feedback.add(memory, command, off, rounding, ALL, 0.0)
         np.testing.assert_array_equal(np.array(told[:4]), np.array(command[:4]))
 
@@ -115,8 +116,20 @@ def test_of_motors_that_friction_moves_less_than_all_else_nothing_is_fed_back_wh
         shares = model.shares_fed_back(memory)
         assert np.isin(shares, (0.0, 1.0)).all()
         assert shares.sum() == fed_back
-        acts = MotorFeedback(DriveModelConfig(), "cascade", False, model.is_fed_back, PERIOD).acts
+        acts = MotorFeedback(DriveModelConfig(), "cascade", model.is_fed_back, PERIOD).acts
         assert acts == (fed_back > 0)
+
+
+@pytest.mark.parametrize(("robot", "fed_back"), [("irb1200", 0), ("kr16", 3)])
+@pytest.mark.parametrize("takes_torque", [True, False])
+def test_of_motors_whose_gears_have_play_it_is_where_friction_moves_them_by_more(
+    robot: str, fed_back: int, takes_torque: bool
+):
+    belief = ControllerModel(load_robot(robot), 7.0, PERIOD, takes_torque=takes_torque)
+    model = DriveModel(belief, DriveModelConfig(), has_play=True)
+    memory = model.layout.view(np.zeros(model.layout.size))  # as if all were known of it
+    assert model.shares_fed_back(memory).sum() == fed_back
+    assert model.is_fed_back == (fed_back > 0)
 
 
 @pytest.mark.parametrize("robot", ["ur10", "irb1200"])
