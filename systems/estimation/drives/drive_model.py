@@ -47,7 +47,7 @@ _DOUBT = 30.0  # times what a motor was off by while it hung: by that its follow
 _ROTOR_SPREAD = 0.3  # of what a robot's file says of rotors
 _VISCOUS_SPREAD, _COULOMB_SPREAD = 0.3, 0.5  # likewise of friction
 _MOVED = 2e-4  # rad, slack of a joint whose motor is off by friction more than by all else; assumed
-_BY_TORQUE, _BEGUN = 6e-4, 1e-3  # rad, slack of a joint whose friction torques take over; begun with a share
+_BY_TORQUE = 1e-3  # rad, slack of a joint whose friction torques take over if it sticks
 _SLACK = 0.3  # of Coulomb's friction, by which it may be off while little is known of it
 _STEEPEST = 0.5  # rad/s, what learning may add to the speed of a joint
 _RESTS = {"cascade": 1e-5, "velocity": 1e-5, "position": 3e-5}  # rad, where a motor rests beside its command
@@ -322,12 +322,12 @@ class DriveModel:
             P[_DIAGONAL[_COULOMB], _DIAGONAL[_COULOMB]] += _COULOMB_SPREAD**2
 
     def give_by_torque(self, memory: SimpleNamespace) -> None:
-        """From now on torques take over what was learnt of rotors and friction, if drives take them.
+        """Has torques take over what was learnt of motors that friction moves by far, once they stick.
 
-        So it is where friction moves a motor by far. Before, positions do it: they show gains.
+        Before, positions make up for it, which show gains. Drives that take no torques go on so.
         """
-        if self._drives.takes_torque:
-            memory.by_torque[0] = np.maximum(memory.by_torque[0], _BEGUN * (self._drives.slack > _BY_TORQUE))
+        begins = (self._drives.slack > _BY_TORQUE) & (memory.by_torque[0] == 0.0)
+        memory.by_torque[0, begins & self._drives.takes_torque] = kernels.drives.WAITING
 
     def widen(
         self, memory: SimpleNamespace, is_told_otherwise: bool = False, is_on_path: bool = True

@@ -22,6 +22,8 @@ _MOST_PERIODS = 1.5  # by which torques are sent ahead or held back
 # hump. What is learnt first, of motors that hang, may be some times as much, and would push them to and fro.
 _MOST_SHARP = 1.5
 _HANDED_OVER = 0.3  # s, in which torques take over what positions have made up for
+WAITING = 1e-3  # share with which that is to begin, as soon as so much of Coulomb friction is sharp:
+_STICKS = 0.3  # what else is learnt may stand in for gains that are not as believed
 
 
 @inner
@@ -123,6 +125,16 @@ def _possible(led):
 
 
 @inner
+def _taken_over(memory, led, period, i):
+    """The share that torques make up for of what was learnt of a joint; it grows once its motor sticks."""
+    share = memory.by_torque[0, i]
+    if share == 0.0 or (share <= WAITING and led[at.SHARP + i] + led[at.THIRD + i] < _STICKS):
+        return 0.0
+    memory.by_torque[0, i] = min(1.0, share + period / _HANDED_OVER)
+    return share
+
+
+@inner
 def _turning(drives, led, v, turn, turned, i):
     """The torque of one joint that Coulomb friction needs unlike belief, as it was learnt.
 
@@ -191,15 +203,15 @@ def command(drives, arm, masses, memory, motion, loads, mass, limits, out, rows)
         rows[at.ROW_RATE, i] = 0.0
         out[0, i], out[1, i], out[2, i] = theta[i], v[i], 0.0
         even = needed - coulomb  # what changes evenly
+        share = _taken_over(memory, led, drives.period, i)
         if drives.takes_torque:
             turned = drives.coulomb[i] * _mean_sign(v[i] + late * a[i], turn, drives.width[i])
             out[2, i] = needed if is_first else even + ahead * (even - last[at.W_MISSING]) + turned
             f = at.FRICTION + at.OF_FRICTION * i
-            share, known = memory.by_torque[0, i], led[f] * w[at.W_ROTOR] + led[f + 1] * w[at.W_VISCOUS]
+            known = led[f] * w[at.W_ROTOR] + led[f + 1] * w[at.W_VISCOUS]
             if share > 0.0:
                 learnt = known + ahead * (known - memory.by_torque[2, i])
                 out[2, i] += share * (learnt + _turning(drives, led, v[i] + late * a[i], turn, turned, i))
-                memory.by_torque[0, i] = min(1.0, share + drives.period / _HANDED_OVER)
             memory.by_torque[2, i] = known
             last[at.W_MISSING] = w[at.W_MISSING] = 0.0  # nothing is missing
         if is_first:
@@ -227,8 +239,9 @@ def command(drives, arm, masses, memory, motion, loads, mass, limits, out, rows)
             other = memory.z[1 + k, :, i]
             rows[at.ROW_OTHER_GAINS + k, i] = _missing(other, led, i) - missing
             if drives.takes_torque:
-                by_position = 1.0 - memory.by_torque[0, i]
-                rows[at.ROW_OTHER_GAINS + k, i] += by_position * (_learnt(other, led, i) - _learnt(z, led, i))
+                rows[at.ROW_OTHER_GAINS + k, i] += (1.0 - share) * (
+                    _learnt(other, led, i) - _learnt(z, led, i)
+                )
         settled = a[i] / drives.following
         memory.smoothed[i] = settled + fading * (memory.smoothed[i] - settled)
         rows[at.ROW_SMOOTHED, i] = memory.smoothed[i]
@@ -241,7 +254,7 @@ def command(drives, arm, masses, memory, motion, loads, mass, limits, out, rows)
         unwound, speed = _unwound(drives, v[i], a[i], off, sticks, memory.wound, i)
         # Of what the motor would be behind by, torques that are sent leave nothing: as if it were commanded.
         out[3, i] = correction + unwound
-        sent = memory.by_torque[0, i] * _learnt(z, led, i)
+        sent = share * _learnt(z, led, i)
         change = correction - before - (sent - memory.by_torque[1, i])
         memory.by_torque[1, i] = sent
         out[0, i] += out[3, i] - sent
