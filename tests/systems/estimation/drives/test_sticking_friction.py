@@ -147,6 +147,20 @@ def test_on_the_path_torques_take_over_what_positions_have_made_up_for():
         assert np.abs(off).max() < 0.1 * np.abs(before[-1000:, joint]).max()
 
 
+@pytest.mark.parametrize(("sharp", "sticks"), [(0.1, False), (0.5, True)])
+def test_torques_take_over_only_where_a_motor_is_seen_to_stick(sharp: float, sticks: bool):
+    """What else is learnt of friction may stand in for gains that are not as believed."""
+    torque = []
+    for on_path in (True, False):
+        model, memory = drives(robot="kr16")
+        memory.beta[SHARP], memory.beta[FRICTION + 2 : CONSTANT : OF_FRICTION] = sharp, 0.5
+        if on_path:
+            model.give_by_torque(memory)
+        plans = (motion(PERIOD * k) for k in range(200))
+        torque.append([model.command(memory, (q, v, a), LOADS, 7.0).torque for q, v, a in plans])
+    assert np.array_equal(*torque) != sticks
+
+
 def test_no_more_friction_is_made_up_for_than_there_can_be():
     """What is learnt of motors that hang may be some times Coulomb's friction, and would push them about."""
 
