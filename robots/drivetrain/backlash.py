@@ -9,8 +9,8 @@ from robots.drivetrain.monotone import monotone_inverse
 from robots.drivetrain.stiffness import GearSpring
 
 # rad beyond the gap, within which teeth take up their damping. With a jump the equations of an implicit
-# integrator have no solution in a step that ends at contact, and it makes hundreds of steps in their place;
-# the tip does not notice.
+# integrator have no solution in a step that ends at contact, and it makes hundreds of steps in their place.
+# The largest errors of six robots were up to 3 micrometres more or less for it, as with other noise.
 CONTACT_DEPTH = 1e-7
 
 

@@ -22,8 +22,10 @@ _MOST_PERIODS = 1.5  # by which torques are sent ahead or held back
 # hump. What is learnt first, of motors that hang, may be some times as much, and would push them to and fro.
 _MOST_SHARP = 1.5
 _HANDED_OVER = 0.3  # s, in which torques take over what positions have made up for
-WAITING = 1e-3  # share with which that is to begin, as soon as so much of Coulomb friction is sharp:
-_STICKS = 0.3  # what else is learnt may stand in for gains that are not as believed
+WAITING = 1e-3  # the share with which that begins, once the motor is seen to stick
+# Of Coulomb friction, what turns over sharply where a motor sticks. What is learnt of one that does not may
+# stand in for gains that are not as believed, and would be multiplied by how much softer the drive is.
+_STICKS = 0.3
 
 
 @inner
