@@ -17,7 +17,9 @@ from systems.reference.cartesian_path import OutOfReachError
 
 _BLEND = 1.5  # s, in which the robot is led from where it starts onto the path
 _NEWTON_STEP = 1e-5  # rad; what a step of this size leaves is its square
-_GEOMETRY_STEP = 1e-4  # m or rad, within which poses are linear in the parameters
+# m or rad, by which parameters move until the geometry is worked out anew. As it is, velocities go on by a
+# share of this size, and torques are made of their differences in a tick: of 1e-4 drives felt each.
+_GEOMETRY_STEP = 1e-6
 _LOST = 0.02  # rad, a last step of Newton's method on an arm that is not on the path
 
 

@@ -97,6 +97,20 @@ def test_parameters_that_move_do_not_reach_the_loads(model):
     assert np.abs(one.velocity - other.velocity).max() > 1e-4
 
 
+@pytest.mark.parametrize("share", [0.0, 0.02, 0.05, 0.2])
+def test_a_plan_does_not_jerk_while_parameters_are_led_in(share: float):
+    """Learning by some of its spread in a second asks motors for no more than the path does."""
+    model = tip_model()
+    x = true_unknowns(model, 5)
+    session = Session(x, model)
+    session.rate, theta = share * model.sigma, []
+    while session.time < 3.0:
+        session.x = x + session.time * session.rate
+        theta.append(session.step()[0].theta)
+    accelerations = np.diff(theta, 2, axis=0)[400:] / PERIOD**2  # after it has been led onto the path
+    assert np.abs(np.diff(accelerations, axis=0)).max() < 0.03  # rad/s^2 in a tick; 0.01 by the path
+
+
 def test_what_turns_faster_takes_more_torque(model):
     # Without losses motors and gears have the same power: torque goes with the speed of joint for motor.
     x = true_unknowns(model, 3)
