@@ -159,6 +159,10 @@ def look_back(drives, planned, beside, rows, actual, deviation, dv, hung, misfit
             by which its following error may be due to that; rad, that may be unexplained if there shall be
             something to learn.
 
+    Of a motor that moves no more is due to what it hung by than friction may be off by, its slack. Else a
+    motor that moves to and fro about its plan, as friction does not turn over as sharply as was learnt, would
+    never show that it does not.
+
     Returns:
         By how much the positions are off at most at the beta from before, beyond the slack, rad.
     """
@@ -172,9 +176,13 @@ def look_back(drives, planned, beside, rows, actual, deviation, dv, hung, misfit
         off, width = theta[i] - actual[i], drives.width[i]
         is_slow = abs(v[i]) < _STILL * width + 0.5 * drives.period * abs(a[i])
         hung[1, i] = off if is_slow else 0.0
-        if is_slow or abs(v[i] + dv[i]) < _STUCK * width:  # its friction is whatever keeps it there
+        hangs = abs(v[i] + dv[i]) < _STUCK * width  # then its friction is whatever keeps it there
+        if is_slow or hangs:
             hung[0, i] = max(hung[0, i], abs(off))
-        variances[i] = variance + (doubt * hung[0, i]) ** 2
+        doubted = doubt * hung[0, i]
+        if not hangs:  # what moves has the friction of its speed, and what it hung by is gone soon
+            doubted = min(doubted, drives.slack[i])
+        variances[i] = variance + doubted**2
         # Rotors and friction go by how motors move, not by how they should.
         for k in range(at.OF_FRICTION):
             Phi[i, at.FRICTION + at.OF_FRICTION * i + k] += deviation[1 + k, i]

@@ -179,16 +179,21 @@ def test_no_more_friction_is_made_up_for_than_there_can_be():
 
 
 @pytest.mark.parametrize("robot", ["irb1200", "kr16-realistic"])
-def test_of_motors_that_hung_less_is_learnt(robot: str):
-    def learnt(hung: float) -> float:
+def test_of_motors_that_hang_less_is_learnt_and_of_those_that_move_again_more(robot: str):
+    """A motor at rest has whatever friction holds it; one that moves that of its speed."""
+
+    def learnt(hung: float, hangs: bool) -> np.ndarray:
         model, memory = drives(robot=robot)
         memory.hung[0] = hung
         theta, v, a = motion(1.0)
         regressors = model.command(memory, (theta, v, a), LOADS, 7.0).regressors
+        memory.deviation.faster[:] = -hangs * v
         model.look_back(memory, (theta, v, a), regressors, np.zeros(6), theta - 1e-4)
         return np.abs(memory.beta).sum()
 
-    assert 0.0 < learnt(1e-3) < 0.1 * learnt(0.0)
+    assert 0.0 < learnt(1e-3, True) < 0.1 * learnt(1e-4, True)
+    assert learnt(1.0, True) < 1e-3 * learnt(1.0, False)
+    assert learnt(1.0, False) == learnt(0.1, False)
 
 
 @pytest.mark.parametrize(("speed", "hangs"), [(0.0, True), (2e-3, True), (5e-3, False), (0.02, False)])
