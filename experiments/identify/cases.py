@@ -63,16 +63,21 @@ class MotionCases:
         """All motions: those of `starts`, then the further ones.
 
         Raises:
-            ValueError: as `starts`, or if a further motion leaves the range of a joint.
+            ValueError: as `starts`, if a further motion is none or leaves the range of a joint, or if there
+                is no motion at all.
         """
         found = [PlannedMotion(q, angle) for q, angle in self.starts(robot)]
         for number, each in enumerate(self.further):
+            if each.angle_deg == 0.0:
+                raise ValueError(f"further[{number}]: an angle of 0 degrees is no motion")
             q, angle = np.deg2rad(each.position_deg), float(np.deg2rad(each.angle_deg))
             if not has_room(robot, q, angle):
                 raise ValueError(
                     f"further[{number}]: no room for {each.angle_deg:g} degrees from {each.position_deg}"
                 )
             found.append(PlannedMotion(q, angle, each.payload))
+        if not found:
+            raise ValueError("there is no motion: angles_deg, or further, must have one")
         return found
 
     def starts(self, robot: RobotModel) -> list[tuple[np.ndarray, float]]:
@@ -81,9 +86,11 @@ class MotionCases:
         An angle that would leave the range of a joint is turned the other way.
 
         Raises:
-            ValueError: if a position is not six numbers, or there is no room for a motion.
+            ValueError: if a position is not six numbers, an angle is 0, or there is no room for a motion.
         """
         positions = [np.deg2rad(each) for each in self.positions_deg] or _chosen(robot)
+        if not all(self.angles_deg):
+            raise ValueError("cases: an angle of 0 degrees is no motion")
         found = []
         for q in positions:
             if q.shape != (NUM_JOINTS,):
@@ -101,7 +108,13 @@ class MotionCases:
 
 def load_cases(path: Path, robot: RobotModel) -> MotionCases:
     """Reads a file. Raises ConfigurationError, with file and line, if it is missing or wrong."""
-    return _with_sensors(typed(read_nodes(path, f"--motions {path}"), MotionCases), robot)
+    node = read_nodes(path, f"--motions {path}")
+    cases = typed(node, MotionCases)
+    try:
+        cases.planned(robot)
+    except ValueError as error:
+        raise node.refuse(str(error)) from error
+    return _with_sensors(cases, robot)
 
 
 def default_cases(robot: RobotModel) -> MotionCases:

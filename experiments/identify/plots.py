@@ -19,6 +19,7 @@ _MEASURED, _BEFORE, _AFTER = "#7a8696", "#e0a43a", "#2f7fd0"
 _UNITS = {"gyro": "rad/s", "accelerometer": "m/s<sup>2</sup>"}
 _SHOWN_CASES = 4
 _ROW = 120  # px, of a sensor
+_FEW = 4  # motions, or less: they say too little of what is wrong with each of them
 _NAMED = 6  # springs and dampers in the first lines of the page; more are in its table
 
 
@@ -57,9 +58,9 @@ def _error(value: float, true: float) -> str:
 def verdict(study: IdentifyStudy) -> str:
     """What was found, in a few sentences."""
     springs = [each for each in study.parameters if each.name.startswith("stiffness_")]
-    known = sum(each.identifiable for each in springs)
+    known, motions = sum(each.identifiable for each in springs), len(study.found.cases)
     said = [
-        f"{known} of {len(springs)} springs are identifiable from {len(study.found.cases)} motions, in "
+        f"{known} of {len(springs)} springs are identifiable from {count(motions, 'motion')}, in "
         f"{study.seconds:.0f} s and {study.found.fit.evaluations} evaluations."
     ]
     if study.plant is not None and known:
@@ -74,6 +75,11 @@ def verdict(study: IdentifyStudy) -> str:
         said.append(f"Not identifiable: {', '.join(study.weak)}.")
     if known < len(springs):
         said.append(_reason(study, len(springs) - known))
+    if motions <= _FEW:
+        said.append(
+            f"Sigma counts on motions that disagree with each other; with {motions} it is too small, "
+            "above all that of dampers."
+        )
     if study.rectangle_ratio is not None:
         said.append(
             f"On a rectangle the inverse model leaves {study.rectangle_ratio['identified']:.2f} of the "

@@ -15,6 +15,8 @@ from robots.pose import rotation_from_zyx, zyx_from_rotation
 
 _UNEVEN = 0.01  # of the period, by which samples of the robot may be off an even grid
 _LEAST = 50  # samples of a case
+_SLOWEST = 0.5  # s, between samples: beyond it a time is in ms
+_FARTHEST = 10.0  # m, of a sensor from the frame of its body: beyond it a place is in mm
 _COMMANDS = ("position", "speed", "torque")
 
 
@@ -25,7 +27,7 @@ class RecordedSensor:
     name: str = ""
     kind: str = choice("gyro", KINDS)
     body: str = ""
-    position: list[float] = numbers((0.0, 0.0, 0.0), (3,), unit="m")
+    position: list[float] = numbers((0.0, 0.0, 0.0), (3,), -_FARTHEST, _FARTHEST, unit="m")
     zyx_deg: list[float] = numbers((0.0, 0.0, 0.0), (3,), unit="deg")
     bandwidth: float = positive(200.0, "Hz")
     noise_sigma: float = positive(2e-3)  # rad/s or m/s^2
@@ -109,11 +111,13 @@ def places(plan: RecordingMap) -> list[SensorPlace]:
 
 
 def check_map(plan: RecordingMap, node: Node, needs_sensors: bool) -> None:
-    """Refuses a map that lacks columns.
+    """Refuses a map that lacks columns, names one twice, or makes nothing of them.
 
     Raises:
         ConfigurationError: that names the place.
     """
+    if plan.angle_factor == 0.0:
+        raise node.at(["angle_factor"]).refuse("angle_factor must not be 0")
     for name, wanted in (
         ("position", (NUM_JOINTS,)),
         ("speed", (0, NUM_JOINTS)),
@@ -130,10 +134,23 @@ def check_map(plan: RecordingMap, node: Node, needs_sensors: bool) -> None:
             )
     if not plan.sensors and needs_sensors:
         raise node.refuse("sensors: needs one or more, each with name, kind, body and three columns")
+    taken = [(name, node.at([name])) for name in ("position", "speed", "torque", "command")]
+    groups = [(getattr(plan, name), name, place) for name, place in taken]
     for i, sensor in enumerate(plan.sensors):
+        place = node.at(["sensors", i])
         if len(sensor.columns) != 3:
-            place = node.at(["sensors", i])
             raise place.refuse(f"sensor '{sensor.name}': columns must be 3, got {len(sensor.columns)}")
+        if sensor.factor == 0.0:
+            raise place.refuse(f"sensor '{sensor.name}': factor must not be 0")
+        if sensor.name in [each.name for each in plan.sensors[:i]]:
+            raise place.refuse(f"sensor '{sensor.name}': two have this name")
+        groups.append((sensor.columns, f"sensor '{sensor.name}'", place))
+    known: dict[str, str] = {}
+    for columns, what, place in groups:
+        for column in columns:
+            if column in known:
+                raise place.refuse(f"{what}: column '{column}' is that of {known[column]} already")
+            known[column] = what
 
 
 def check_payloads(path: Path, plan: RecordingMap, cases: list[RecordedCase]) -> None:
@@ -163,6 +180,10 @@ def check_times(where: Callable[[int], str], time: np.ndarray, stamps: np.ndarra
             raise RecordingError(f"{where(int(np.argmin(steps)) + 1)}: the {name} does not go on")
     steps = np.diff(time)
     period = float(np.median(steps))
+    if period > _SLOWEST:
+        raise RecordingError(
+            f"{where(1)}: samples of the robot are {period:g} s apart; the time must be in s"
+        )
     off = np.abs(steps - period)
     if off.max() > _UNEVEN * period:
         raise RecordingError(

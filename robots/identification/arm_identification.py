@@ -26,8 +26,10 @@ from robots.identification.recording import (
     RecordedCase,
     check_axes,
     check_excitation,
+    check_gravity,
     check_range,
     check_sizes,
+    check_speeds,
     lag_of,
 )
 
@@ -242,15 +244,18 @@ def identify_arm(
     """
     tell = progress or (lambda share: None)
     check_range(recorded, robot.lower, robot.upper)
+    check_speeds(recorded)
     arms = _Arms(robot, payload, sensors)
     arm = arms.carrying()
     floor, some = sensor_floor(sensors), few(len(recorded))
     everything = list(range(len(recorded)))
     first = _Data(arms, [recorded[i] for i in some], sensors, lambda share: tell(0.1 * share))
-    check_excitation([case.at_lag(0.0) for case in first.recorded], first.rigid, sensors)
+    as_stamped = [case.at_lag(0.0) for case in first.recorded]
+    check_excitation(as_stamped, first.rigid, sensors)
+    check_gravity(as_stamped, first.rigid, sensors)
     first.align(first.rigid)
-    check_axes(first.cases, first.rigid, sensors)
     check_sizes(first.cases, first.rigid, sensors)
+    check_axes(first.cases, first.rigid, sensors)
 
     # Linear gears first: where the springs are far off, play only makes valleys to be lost in.
     plain = ElasticParameters(arm, gear_parts=False)

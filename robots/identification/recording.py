@@ -16,6 +16,10 @@ _ALIKE = 0.7  # correlation of a sensor with what motors make of it, above which
 _LARGER = 5.0  # times as large as it should be, or as small: another unit
 _BEYOND = 2.0 * np.pi  # rad, beyond the range of a joint: another unit
 _EXCITED = 3.0  # times the noise, what a channel has to show to be compared
+_SAME = 1.2  # the most by which sizes of gyros may differ where all of them seem to be in another unit
+_UPRIGHT = 0.95  # correlation with gravity, above which an accelerometer is taken to show it
+_NOTHING = 1e-9  # of what a sensor should show: rounding
+_OFFSET = 0.05  # of gravity: what a sensor without it may be off by at rest
 
 
 class RecordingError(ValueError):
@@ -75,7 +79,10 @@ def lag_of(case: RecordedCase, modelled: np.ndarray, sensors: Sequence[SensorPla
     try:
         return before + align(first, second, case.period, WINDOW).lag
     except AlignmentError as error:
-        raise RecordingError(f"case {case.name}: the clocks of robot and sensors: {error}") from error
+        raise RecordingError(
+            f"case {case.name}: the clocks of robot and sensors: {error}; if they are closer, some joint's "
+            "column is another one's or has the other sign"
+        ) from error
 
 
 def check_excitation(
@@ -118,37 +125,117 @@ def check_range(cases: Sequence[RecordedCase], lower: np.ndarray, upper: np.ndar
             )
 
 
+def check_speeds(cases: Sequence[RecordedCase]) -> None:
+    """Refuses speeds that are not those of the positions: another unit or sign of one of them or of the time.
+
+    Raises:
+        RecordingError: that names case and joint.
+    """
+    for case in cases:
+        derived = CubicSpline(case.time, case.theta).derivative()(case.time)
+        joint = int(np.argmax(np.abs(derived).max(0) * np.abs(case.rate).max(0)))
+        size, correlation = _size(derived[:, joint], case.rate[:, joint])
+        if abs(correlation) > _ALIKE and not 1.0 / _LARGER < size < _LARGER:
+            raise RecordingError(
+                f"case {case.name}: the speed of joint {joint + 1} is {size:.3g} times what its positions "
+                "and the time make of it; angle_factor is for positions and speeds alike, the time is in s"
+            )
+
+
 def check_sizes(
     cases: Sequence[MotionCase], modelled: Sequence[np.ndarray], sensors: Sequence[SensorPlace]
 ) -> None:
-    """Refuses sensors whose readings are many times as large or small as the motors make them.
+    """Refuses sensors that show nothing, or many times as much or little as the motors make of them.
 
     Raises:
-        RecordingError: if one resembles what it should show, but in another unit; names it.
+        RecordingError: if one resembles what it should show, but in another unit, or is dead; names it.
     """
+    off: dict[str, float] = {}  # sizes of sensors by their names, as they are told
+    gyros: list[float] = []
     for i, sensor in enumerate(sensors):
         should, shown = _without_means(cases, modelled, i)
         if not (should.std(0) > _EXCITED * sensor.sigma).any():
             continue
-        product, square = float((should * shown).sum()), float((should**2).sum())
-        correlation = product / np.sqrt(square * max(float((shown**2).sum()), np.finfo(float).tiny))
-        size = product / square
+        changes = max(float(np.ptp(_shown(case, i), axis=0).max()) for case in cases)
+        if changes <= _NOTHING * float(np.abs(should).max()):
+            raise RecordingError(f"{_named(sensor)}: it shows nothing but one value; is its factor 0?")
+        size, correlation = _size(should, shown)
+        # Axes that are swapped do not make a sensor less of one kind.
+        overall = float(np.sqrt(np.square(shown).sum() / np.square(should).sum()))
+        gyros += [overall] if sensor.kind == "gyro" else []
         if correlation > _ALIKE and not 1.0 / _LARGER < size < _LARGER:
-            unit = "rad/s" if sensor.kind == "gyro" else "m/s^2"
-            raise RecordingError(
-                f"{sensor.kind} '{sensor.name}': it shows {size:.3g} times what the motors make of it; "
-                f"in which unit are its columns? factor brings them to {unit}"
-            )
+            off[sensor.name] = size
+    if len(gyros) > 1 and max(gyros) < _SAME * min(gyros) and not 1.0 / _LARGER < gyros[0] < _LARGER:
+        raise RecordingError(
+            f"all gyros show some {np.median(gyros):.2g} times what the motors make of them: positions and "
+            "speeds are in another unit than angle_factor says, or the gyros than their factor says"
+        )
+    for sensor in sensors:
+        if sensor.name in off:
+            raise _other_unit(sensor, off[sensor.name], "the motors make of it")
+
+
+def check_gravity(
+    cases: Sequence[MotionCase], modelled: Sequence[np.ndarray], sensors: Sequence[SensorPlace]
+) -> None:
+    """Refuses accelerometers that show gravity in another unit, whatever else they show.
+
+    Args:
+        cases: with readings from which nothing was taken.
+        modelled: what sensors should show, (n, sensors, 3) each.
+        sensors: in the order of the readings.
+
+    Raises:
+        RecordingError: that names the sensor.
+    """
+    for i, sensor in enumerate(sensors):
+        if sensor.kind != "accelerometer":
+            continue
+        # Means of the motions, which are free of ringing. One that shows changes alone is off by some offset.
+        both = [_both([case], [each], i) for case, each in zip(cases, modelled, strict=True)]
+        means = [(should.mean(0), shown.mean(0)) for should, shown in both if len(shown)]
+        if not means:  # the clocks have nothing in common
+            continue
+        size, correlation = _size(*np.moveaxis(np.array(means), 1, 0))
+        if correlation > _UPRIGHT and (_OFFSET < size < 1.0 / _LARGER or size > _LARGER):
+            raise _other_unit(sensor, size, "gravity makes of it")
+
+
+def _size(should: np.ndarray, shown: np.ndarray) -> tuple[float, float]:
+    """How many times as large something is as it should be, and the correlation of the two."""
+    wanted, got = (max(float(np.linalg.norm(each)), np.finfo(float).tiny) for each in (should, shown))
+    cosine = float((should / wanted * (shown / got)).sum())
+    return cosine * got / wanted, cosine
+
+
+def _named(sensor: SensorPlace) -> str:
+    return f"{sensor.kind} '{sensor.name}'"
+
+
+def _other_unit(sensor: SensorPlace, size: float, against: str) -> RecordingError:
+    unit = "rad/s" if sensor.kind == "gyro" else "m/s^2"
+    return RecordingError(
+        f"{_named(sensor)}: it shows {size:.3g} times what {against}; "
+        f"in which unit are its columns? factor brings them to {unit}"
+    )
 
 
 def _without_means(
+    cases: Sequence[MotionCase], modelled: Sequence[np.ndarray], sensor: int
+) -> tuple[np.ndarray, np.ndarray]:
+    """What a sensor should show and what it does beyond their means, where both are known, (n, 3) each."""
+    should, shown = _both(cases, modelled, sensor)
+    return should - should.mean(0), shown - shown.mean(0)
+
+
+def _both(
     cases: Sequence[MotionCase], modelled: Sequence[np.ndarray], sensor: int
 ) -> tuple[np.ndarray, np.ndarray]:
     """What a sensor should show and what it does, where both are known, (n, 3) each."""
     should = np.concatenate([each[:, sensor] for each in modelled])
     shown = np.concatenate([case.readings[:, sensor] for case in cases])
     known = np.isfinite(shown).all(1) & np.isfinite(should).all(1)
-    return should[known] - should[known].mean(0), shown[known] - shown[known].mean(0)
+    return should[known], shown[known]
 
 
 def check_axes(
@@ -175,6 +262,12 @@ def check_axes(
                     f"{_AXES[axis]} is on {sign}{_AXES[best]} (correlation {abs(fits[axis, best]):.2f} "
                     f"against {fits[axis, axis]:.2f}); correct its columns or zyx_deg"
                 )
+
+
+def _shown(case: MotionCase, sensor: int) -> np.ndarray:
+    """Readings of a sensor where it was read, (n, 3)."""
+    shown = case.readings[:, sensor]
+    return shown[np.isfinite(shown).all(1)]
 
 
 def _spread(modelled: Sequence[np.ndarray], sensor: int) -> np.ndarray:

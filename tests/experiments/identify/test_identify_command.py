@@ -204,6 +204,50 @@ def test_wrong_column_maps_are_refused(tmp_path: Path):
     assert "has no body 'link_9'" in refusal(run(tmp_path, f"--recording={path}"))
 
 
+@pytest.mark.parametrize(
+    ("old", "new", "said"),
+    [
+        ("factor: 1.0\nposition", "factor: 0\nposition", "line 6: angle_factor must not be 0"),
+        ("  factor: 1.0", "  factor: 0", "sensor 'hand': factor must not be 0"),
+        ("hand_y", "hand_x", "sensor 'hand': column 'hand_x' is that of sensor 'hand' already"),
+        ("hand_y", "speed_2", "sensor 'hand': column 'speed_2' is that of speed already"),
+        ("[position_1, position_2", "[position_1, position_1", "position: column 'position_1' is that of"),
+        ("position: [0.1,", "position: [100,", "position[0] must be between -10 and 10 m, got 100"),
+    ],
+)
+def test_maps_that_make_nothing_of_a_column_or_two_things_are_refused(
+    tmp_path: Path, old: str, new: str, said: str
+):
+    path = resting(tmp_path)
+    changed(path.with_suffix(".yaml"), old, new)
+    assert said in refusal(run(tmp_path, f"--recording={path}"))
+
+
+def test_times_in_milliseconds_are_refused(tmp_path: Path):
+    path = resting(tmp_path)
+    head, *rows = [line.split(",") for line in path.read_text().splitlines()]
+    late = [",".join([case, f"{1e3 * float(time):g}", *more]) for case, time, *more in rows]
+    path.write_text("\n".join([",".join(head), *late]))
+    assert "line 3: samples of the robot are 1 s apart; the time must be in s" in refusal(
+        run(tmp_path, f"--recording={path}")
+    )
+
+
+@pytest.mark.parametrize(
+    ("motions", "said"),
+    [
+        ("angles_deg: []", "line 1: there is no motion: angles_deg, or further, must have one"),
+        ("angles_deg: [5, 0]", "line 1: cases: an angle of 0 degrees is no motion"),
+        ("further: [{angle_deg: 0}]", "line 1: further[0]: an angle of 0 degrees is no motion"),
+        ("positions_deg: [[0, -90]]", "line 1: cases: a position needs 6 angles, got [0.0, -90.0]"),
+    ],
+)
+def test_files_of_motions_without_any_are_refused(tmp_path: Path, motions: str, said: str):
+    path = tmp_path / "motions.yaml"
+    path.write_text(motions)
+    assert f"--motions {path}, {said}" in refusal(run(tmp_path, f"--motions={path}"))
+
+
 @pytest.mark.slow
 def test_slow_motions_of_a_recording_give_load_spring_and_friction(tmp_path: Path):
     robot = load_robot("kr210")

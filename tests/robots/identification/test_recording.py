@@ -11,8 +11,10 @@ from robots.identification.recording import (
     RecordingError,
     check_axes,
     check_excitation,
+    check_gravity,
     check_range,
     check_sizes,
+    check_speeds,
     lag_of,
 )
 
@@ -85,6 +87,42 @@ def test_a_sensor_in_another_unit_is_named(factor: float, said: str):
     scaled = replace(case, readings=factor * case.readings)
     with pytest.raises(RecordingError, match=rf"gyro 'hand': it shows {said} times .* brings them to rad/s"):
         check_sizes([scaled], [MODELLED], [GYRO])
+
+
+def test_gyros_that_are_all_off_alike_tell_of_the_positions():
+    case, pair = recorded(noise=0.0).at_lag(0.0), [GYRO, replace(GYRO, name="arm")]
+    many = replace(case, readings=np.rad2deg(np.repeat(case.readings, 2, axis=1)))
+    with pytest.raises(RecordingError, match=r"all gyros show some 57 times .* than angle_factor says"):
+        check_sizes([many], [np.repeat(MODELLED, 2, axis=1)], pair)
+
+
+def test_a_sensor_that_shows_nothing_is_named():
+    case = recorded().at_lag(0.0)
+    with pytest.raises(RecordingError, match="gyro 'hand': it shows nothing but one value"):
+        check_sizes([replace(case, readings=0.0 * case.readings + 0.1)], [MODELLED], [GYRO])
+
+
+def test_an_accelerometer_in_g_is_named_and_one_of_changes_alone_is_not():
+    """Ringing hides in which unit what it shows beyond its mean is; gravity does not."""
+    sensor = replace(GYRO, kind="accelerometer", sigma=0.05)
+    up = np.array([0.0, 0.6, 0.8]) * 9.81
+    case = recorded().at_lag(0.0)
+    ringing = 9.0 * np.sin(300.0 * case.times)[:, None, None] * np.ones(3)
+    modelled = MODELLED + up
+    measured = replace(case, readings=case.readings + up + ringing)
+    check_gravity([measured], [modelled], [sensor])
+    check_gravity([replace(measured, readings=measured.readings - up + 0.1)], [modelled], [sensor])
+    with pytest.raises(RecordingError, match=r"accelerometer 'hand': it shows 0.10\d times what gravity"):
+        check_gravity([replace(measured, readings=measured.readings / 9.81)], [modelled], [sensor])
+    check_gravity([replace(measured, readings=np.nan * measured.readings)], [modelled], [sensor])
+
+
+@pytest.mark.parametrize(("factor", "said"), [(np.rad2deg(1.0), "57.3"), (-1.0, "-1"), (1e3, "1e.03")])
+def test_speeds_that_are_not_those_of_the_positions_are_named(factor: float, said: str):
+    case = recorded()
+    check_speeds([case])
+    with pytest.raises(RecordingError, match=rf"case 1: the speed of joint 1 is {said} times what its posit"):
+        check_speeds([case, replace(case, rate=factor * case.rate)])
 
 
 def test_positions_in_degrees_are_named():
