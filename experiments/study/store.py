@@ -53,7 +53,8 @@ class StudyStore:
         columns: name -> "number", "text" or "count", in the order of the table.
 
     Raises:
-        ValueError: if the folder holds rows of another study, or of another version of truetip or Drake.
+        ValueError: if the folder holds rows of another study, or of another version of truetip or Drake, or
+            a damaged file; so do the methods that read.
         OSError: if it cannot be read or written.
     """
 
@@ -72,7 +73,7 @@ class StudyStore:
         tables = [self._folder / TABLE] if (self._folder / TABLE).exists() else []
         rows: dict[int, str] = {}
         for path in (*tables, *self._parts()):
-            found = pq.read_table(path, columns=["row", "failure"])
+            found = _read(path, ["row", "failure"])
             rows |= dict(zip(found["row"].to_pylist(), found["failure"].to_pylist(), strict=True))
         return {row for row, failure in rows.items() if with_failures or not failure}
 
@@ -113,7 +114,7 @@ class StudyStore:
 
     def _merged(self, name: str, schema: pa.Schema) -> pa.Table:
         paths = [self._folder / name, *self._parts()]
-        tables = [pq.read_table(path, columns=schema.names) for path in paths if path.exists()]
+        tables = [_read(path, schema.names) for path in paths if path.exists()]
         if not tables:
             return schema.empty_table()
         rows = pa.concat_tables(tables)
@@ -126,7 +127,7 @@ class StudyStore:
     def _agree_on(self, plan: dict[str, Any]) -> None:
         path = self._folder / _PLAN
         if path.exists():
-            before = json.loads(path.read_text(encoding="utf-8"))
+            before = _plan_before(path)
             different = [key for key in sorted({*before, *plan}) if before.get(key) != plan.get(key)]
             if different:
                 what = ", ".join(_with_keys(key, before.get(key), plan.get(key)) for key in different)
@@ -136,6 +137,19 @@ class StudyStore:
                 )
             return
         _replace(path, (json.dumps(plan, indent=1, sort_keys=True) + "\n").encode())
+
+
+def _plan_before(path: Path) -> dict[str, Any]:
+    try:
+        before = json.loads(path.read_text(encoding="utf-8"))
+    except ValueError:
+        before = None
+    if not isinstance(before, dict):
+        raise ValueError(
+            f"{path} is damaged, so that nobody knows which study the rows beside it are of: choose another "
+            "--out, or remove the folder"
+        )
+    return before
 
 
 def _with_keys(name: str, before: Any, now: Any) -> str:
@@ -149,6 +163,16 @@ _WALL_TIME = pa.field("wall_s", pa.float64())
 _TYPES = {"number": pa.float64(), "text": pa.string(), "count": pa.int64()}
 
 
+def _read(path: Path, columns: list[str]) -> pa.Table:
+    try:
+        return pq.read_table(path, columns=columns)
+    except (pa.ArrowException, OSError) as error:
+        if isinstance(error, OSError) and error.errno:  # of the system; what is packed wrongly has none
+            raise
+        lost = "wall times alone are lost" if path.name == TIMES else "what it had is run again"
+        raise ValueError(f"{path} is damaged: remove it, and {lost}") from error
+
+
 def _write(table: pa.Table, path: Path) -> None:
     sink = pa.BufferOutputStream()
     pq.write_table(table, sink, compression="zstd")
@@ -156,9 +180,12 @@ def _write(table: pa.Table, path: Path) -> None:
 
 
 def _replace(path: Path, content: Any) -> None:
-    """Puts a file in its place when it is complete."""
+    """Puts a file in its place when it is complete, and on the disk, should the power fail then."""
     unfinished = path.with_suffix(".unfinished")
-    unfinished.write_bytes(content)
+    with unfinished.open("wb") as file:
+        file.write(content)
+        file.flush()
+        os.fsync(file.fileno())
     os.replace(unfinished, path)
 
 

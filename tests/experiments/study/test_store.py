@@ -50,6 +50,23 @@ def test_the_table_does_not_depend_on_order_and_interruptions(tmp_path_factory, 
     assert complete(tmp_path_factory.mktemp("broken"), list(order), stops) == straight
 
 
+def test_a_damaged_file_is_named_with_what_to_do(tmp_path):
+    store = StudyStore(tmp_path, {"study": 1}, COLUMNS)
+    store.add(line(0))
+    store.flush()
+    part = tmp_path / "parts" / "000000.parquet"
+    whole = part.read_bytes()
+    spoiled = whole[:8] + bytes(200) + whole[208:]
+    for damaged in (b"", whole[:100], spoiled):
+        part.write_bytes(damaged)
+        with pytest.raises(ValueError, match=r"000000.parquet is damaged: remove it, and what it had"):
+            store.finished()
+    for text in ("", "[]", '{"study": '):
+        (tmp_path / "plan.json").write_text(text)
+        with pytest.raises(ValueError, match=r"plan.json is damaged, so that nobody knows which study"):
+            StudyStore(tmp_path, {"study": 1}, COLUMNS)
+
+
 def test_a_finished_row_is_known_and_a_failed_one_can_be_done_again(tmp_path):
     store = StudyStore(tmp_path, {}, COLUMNS)
     store.add(line(0))
