@@ -98,9 +98,11 @@ class DaskCluster:
     def _client(self) -> Any:
         try:
             from distributed import Client
+            from distributed.comm.addressing import resolve_address
         except ModuleNotFoundError as error:
             raise ValueError("--scheduler: needs dask: pip install 'truetip[cluster]'") from error
         try:
+            resolve_address(self.address)  # a client of an address that is none waits 20 s for its own end
             return Client(self.address, timeout=_PATIENCE, set_as_default=False)
         except (OSError, ValueError, TimeoutError) as error:
             reason = " ".join(str(error).split())

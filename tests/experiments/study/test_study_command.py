@@ -18,7 +18,7 @@ import pyarrow.parquet as pq
 import pytest
 
 from diagrams.record.log import GuardEvent
-from experiments.cli.cluster import DaskCluster
+from experiments.cli.cluster import DaskCluster, executor
 from experiments.cli.console import fail
 from experiments.cli.workers import in_order
 from experiments.study import command as study_command
@@ -154,6 +154,16 @@ def test_a_scheduler_that_is_not_there_is_one_line(tmp_path, monkeypatch):
     file.write_text(STUDY)
     result = truetip("study", file, "--out", tmp_path / "out", "--scheduler", "tcp://127.0.0.1:9")
     assert "no Dask scheduler at tcp://127.0.0.1:9" in refusal(result)
+
+
+@pytest.mark.parametrize(
+    ("address", "reason"), [("nonsense", "missing port number"), ("http://127.0.0.1:8787", "unknown address")]
+)
+def test_an_address_that_no_scheduler_has_is_refused_before_a_client_is_made(monkeypatch, address, reason):
+    """A client of it would wait twenty seconds for its own end, and show a traceback."""
+    monkeypatch.setattr("distributed.Client", None)
+    with pytest.raises(ValueError, match=f"no Dask scheduler at {address}: {reason}"):
+        executor(address)
 
 
 @contextlib.contextmanager
