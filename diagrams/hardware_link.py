@@ -128,20 +128,22 @@ class HardwareLink:
 
     def connect(self, needs_camera: bool) -> None:
         """Waits for the controller to follow commands, and for the camera. Raises StationError."""
-        link, deadline = self._link, self._now() + self._link.connect
-        if self.wait_until_ready(link.connect) is None:
-            if self._is_asked_to_end():
-                raise EndedOnRequest
-            why = self._client.why_not_ready()
-            raise StationError(f"{why}: waited {link.connect:g} s on {self._client.place}")
-        while needs_camera and self._has_camera and not self.poses.newest.valid:
-            if self._is_asked_to_end():
-                raise EndedOnRequest
-            if self._now() > deadline:
-                why = self.poses.problem()
-                raise StationError(f"no pose from the camera within {link.connect:g} s: {why}")
-            self.next_report()
-        self._check_cycle()
+        wait, began, has_its_cycle = self._link.connect, self._now(), False
+        deadline = began + wait
+        while not has_its_cycle:
+            if self.wait_until_ready(deadline - self._now()) is None:
+                if self._is_asked_to_end():
+                    raise EndedOnRequest
+                why = f"{self._client.why_not_ready()}: waited {wait:g} s on {self._client.place}"
+                raise StationError(why + self.host.reason(began))
+            while needs_camera and self._has_camera and not self.poses.newest.valid:
+                if self._is_asked_to_end():
+                    raise EndedOnRequest
+                if self._now() > deadline:
+                    raise StationError(f"no pose from the camera within {wait:g} s: {self.poses.problem()}")
+                self.next_report()
+            # A controller that was left without answers by a run before has ended, and begins again.
+            has_its_cycle = self._has_its_cycle()
 
     def wait_for(self, other: Starting, what: str) -> None:
         """Hears the controller until something else of the station is ready.
@@ -164,15 +166,15 @@ class HardwareLink:
                 raise StationError(f"{what} within {_LONGEST_START:g} s")
             self.next_report()
 
-    def _check_cycle(self) -> None:
-        """Measures the cycle on a hundred messages. Raises StationError if it is not the scenario's."""
+    def _has_its_cycle(self) -> bool:
+        """Measures it on a hundred messages; False if they do not come. StationError if it is another."""
         began = self._now()
         first = last = self.next_report()
         before, count = self._client.counters(), 0
         while count < 100 and (report := self.next_report()) is not None and last is not None:
             count, last = count + (report.seqno - last.seqno) % 2**32, report
         if first is None or last is None or count < 100:
-            raise StationError("the controller fell silent" + self.host.reason(began))
+            return False
         cycle = (last.time - first.time) / count
         # Numbers that are made of stamps say nothing of the cycle; how many messages there were does.
         now = self._client.counters()
@@ -184,6 +186,7 @@ class HardwareLink:
                 f"the controller sends every {1e3 * cycle:.3f} ms, "
                 f"station.period is {1e3 * self._period:g} ms{self.host.reason(began)}"
             )
+        return True
 
     def wait_until_ready(self, within: float) -> RobotReport | None:
         """The first report of a robot that follows commands; None if it does not come in time."""

@@ -76,6 +76,31 @@ def test_a_controller_with_the_other_cycle_of_rsi_is_refused(true: int, told: in
         link.connect(needs_camera=False)
 
 
+def follower(*settings: str) -> tuple[HardwareLink, RsiLockstep]:
+    """A link that follows another one, whose last answer was followed by none."""
+    scenario = load_scenario("cell-kuka", list(settings))
+    wire, robot = RsiLockstep(scenario), load_robot(scenario.robot)
+    first, second = (HardwareLink(wire.link, None, scenario, robot, False, wire.now) for _ in range(2))
+    first.connect(needs_camera=False)
+    report = first.next_report()
+    assert report is not None
+    first.send_command(report.position, np.zeros(6))
+    return second, wire
+
+
+def test_a_run_that_follows_another_waits_for_rsi_to_be_run_again():
+    """Nobody answers between the two, nor while the cycle is measured, so RSI ends after ten telegrams."""
+    link, wire = follower()
+    link.connect(needs_camera=False)
+    assert wire.controller.counters()["restarts"] == 1
+
+
+def test_rsi_that_is_not_run_again_ends_the_wait_by_name():
+    link, _ = follower("station.link.run.restart_after=-1", "station.link.connect=1")
+    with pytest.raises(StationError, match="the controller does not run RSI: waited 1 s"):
+        link.connect(needs_camera=False)
+
+
 @pytest.mark.parametrize(
     ("setting", "reason"),
     [
