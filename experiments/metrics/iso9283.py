@@ -29,13 +29,12 @@ def iso_9283(cycles: Sequence[RunLog], source: str) -> dict[str, Any]:
       the scatter along it and is never smaller.
 
     Repeatability is None for a single cycle. ``source`` is "true" or "measured"; where a cycle has no
-    measurement the time is left out for all of them.
-
-    Raises:
-        ValueError: if the cycles were not sampled at the same times, though none of them was slowed.
+    measurement the time is left out for all of them. A cycle that a station broke off counts among
+    ``cycles``, and in nothing else as long as another one came to its end.
     """
-    first = cycles[0]
-    time, X_WE_desired, X = _in_step(cycles, source)
+    whole = [log for log in cycles if not log.ended_early] or cycles[:1]
+    first = whole[0]
+    time, X_WE_desired, X = _in_step(whole, source)
     path_start, dwell_start, path_end = np.interp(
         (first.path_start, first.dwell_start, first.path_end), first.time, _on_path(first)
     )
@@ -49,13 +48,13 @@ def iso_9283(cycles: Sequence[RunLog], source: str) -> dict[str, Any]:
         e = pose_error(X_WE_desired[at_end], X[:, at_end]).mean(axis=1)
         result["AP_mm"] = 1e3 * float(np.linalg.norm(e[:, 3:].mean(axis=0)))
         result["AP_deg"] = float(np.rad2deg(np.linalg.norm(e[:, :3].mean(axis=0))))
-        if len(cycles) > 1:
+        if len(whole) > 1:
             result["RP_mm"] = 1e3 * float(repeatability(e[:, 3:]))
     if usable.any():
         p = X[:, usable][..., :3, 3]
         distances = path_distance(time[usable], p.mean(axis=0), time[on_path], X_WE_desired[on_path, :3, 3])
         result["AT_mm"] = 1e3 * float(distances.max())
-        if len(cycles) > 1:
+        if len(whole) > 1:
             result["RT_mm"] = 1e3 * float(repeatability(p).max())
     return result
 
@@ -68,14 +67,12 @@ def _on_path(log: RunLog) -> np.ndarray:
 def _in_step(cycles: Sequence[RunLog], source: str) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Times on the path in s, (n,), wanted poses then, (n, 4, 4), and those of the cycles, (cycles, n, 4, 4).
 
-    A cycle that was slowed came to a place at another time, between two samples perhaps: it is off the first
-    cycle's wanted pose by what it was off its own at its next sample.
+    A cycle that was slowed or interrupted came to a place at another time, between two samples perhaps: it is
+    off the first cycle's wanted pose by what it was off its own at its next sample.
     """
     first = cycles[0]
     poses = [log.X_WE_true if source == "true" else log.X_WE_measured for log in cycles]
-    if all(log.path_time is None for log in cycles):
-        if any(not np.array_equal(log.time, first.time) for log in cycles[1:]):
-            raise ValueError(f"law '{first.law}': ISO 9283 needs cycles sampled at the same times")
+    if all(log.path_time is None and np.array_equal(log.time, first.time) for log in cycles):
         return first.time, first.X_WE_desired, np.stack(poses)
     period = float(np.median(np.diff(first.time)))
     times = np.arange(_on_path(first)[0], min(_on_path(log)[-1] for log in cycles) + 0.5 * period, period)

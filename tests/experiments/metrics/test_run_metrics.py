@@ -178,11 +178,35 @@ def test_cycles_that_were_slowed_are_compared_at_the_same_places_of_the_path():
         assert numbers["RT_mm"] == pytest.approx(0.1, abs=ROUNDING)
 
 
-def test_cycles_of_different_length_are_refused():
+def test_cycles_of_different_length_are_compared_as_far_as_all_of_them_go():
     X = straight(TIME)
-    shorter = make_log(TIME[:-5], X[:-5], X[:-5])
-    with pytest.raises(ValueError, match="sampled at the same times"):
-        iso_9283([make_log(TIME, X, X), shorter], "true")
+    shorter = make_log(TIME[:-5], X[:-5], displaced(X[:-5], np.array([0, 0, 0, 0, 2e-4, 0])))
+    for cycles in ([make_log(TIME, X, X), shorter], [shorter, make_log(TIME, X, X)]):
+        numbers = iso_9283(cycles, "true")
+        assert numbers["AT_mm"] == pytest.approx(0.1, abs=1e-3)
+        assert numbers["RT_mm"] == pytest.approx(0.1, abs=ROUNDING)
+
+
+@pytest.mark.parametrize("number", [0, 1, 2])
+def test_a_cycle_that_a_station_broke_off_spoils_none_of_the_others(number: int):
+    X = straight(TIME)
+    whole = [make_log(TIME, X, displaced(X, np.array([0, 0, 0, 0, e, 0]))) for e in (1e-4, 3e-4)]
+    half = len(TIME) // 2
+    broken = make_log(TIME[:half], X[:half], displaced(X[:half], np.array([0, 0, 0, 0, 5e-2, 0])))
+    cycles = list(whole)
+    cycles.insert(number, dataclasses.replace(broken, ended_early="the controller stopped"))
+    numbers = iso_9283(cycles, "true")
+    assert numbers == iso_9283(whole, "true") | {"cycles": 3}
+    result = summary("x", {"pbvs": cycles})["runs"]["pbvs"]
+    assert result["unfinished"] == f"cycle {number + 1}: the controller stopped"
+
+
+def test_a_law_of_which_every_cycle_was_broken_off_has_the_figures_of_its_first():
+    X = straight(TIME)
+    broken = dataclasses.replace(make_log(TIME[:40], X[:40], X[:40]), ended_early="the controller stopped")
+    numbers = iso_9283([broken, broken], "true")
+    assert numbers["cycles"] == 2
+    assert numbers["RP_mm"] is None
 
 
 def test_the_same_logs_give_the_same_bytes_and_no_wall_time(tmp_path):
