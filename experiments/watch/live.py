@@ -43,6 +43,7 @@ class Decision:
     def text(self) -> str:
         """In words."""
         near = f"somebody at {self.distance:.2f} m" if self.distance < FAR else "nobody"
+        near = near if self.distance > 0.0 else "somebody at the robot"
         old = f", images are {self.age:.1f} s old" if self.age < FAR else ", no image is trusted yet"
         return f"{self.time:.1f} s: {self.zone}, {near}, {100.0 * self.share:.0f} % of the speed{old}"
 

@@ -4,10 +4,11 @@ Or a single video in which every frame is a set: the images of all cameras side 
 order of the cell, with the joints in a table of its name, NAME.csv.
 
 ``joints.csv`` has the columns ``time_s`` and ``q1_rad`` to ``q6_rad`` and a line for each set of images. A
-camera is a folder of its name with pictures in the order of their names, or a video NAME.mp4, .avi or .mkv. A
-camera that ends before the joints do is blind from then on.
+camera is a folder of its name with pictures in the order of their names, in which numbers count as such (2
+before 10), or a video NAME.mp4, .avi or .mkv. A camera that ends before the joints do is blind from then on.
 """
 
+import re
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 
@@ -42,12 +43,31 @@ class Recording:
                 f"--images {folder}: must be a folder with {JOINTS} and a folder of pictures or a video of "
                 "each camera, or a video of all of them"
             )
-        table = _joints(folder.with_suffix(".csv") if is_video else folder / JOINTS)
+        self._table = folder.with_suffix(".csv") if is_video else folder / JOINTS
+        table = _joints(self._table)
         self.times, self.joints = table[:, 0], table[:, 1:]
         self._cameras = list(cameras)
         self._video = folder if is_video else None
         self._sources = [] if is_video else [_source(folder, name) for name in cameras]
         self.ended: dict[str, int] = {}  # cameras whose images ended before the joints, with their number
+
+    def check_range(self, lower: np.ndarray, upper: np.ndarray) -> None:
+        """Refuses joints that the robot cannot have, such as degrees.
+
+        Args:
+            lower: limits of the joints in rad, (6,).
+            upper: likewise.
+
+        Raises:
+            ValueError: if one is more than a turn beyond its range; names set and joint.
+        """
+        beyond = np.maximum(lower - self.joints, self.joints - upper)
+        row, joint = np.unravel_index(int(np.argmax(beyond)), beyond.shape)
+        if beyond[row, joint] > 2.0 * np.pi:
+            raise ValueError(
+                f"{self._table}: {COLUMNS[1 + joint]} of set {row + 1} is {self.joints[row, joint]:.4g}, its "
+                f"range is {lower[joint]:.4g} to {upper[joint]:.4g} rad; is it in degrees?"
+            )
 
     def __len__(self) -> int:
         return len(self.times)
@@ -110,12 +130,18 @@ def _source(folder: Path, name: str) -> Path | list[Path]:
         if (folder / f"{name}{ending}").is_file():
             return folder / f"{name}{ending}"
     inside = folder / name
-    pictures = sorted(each for each in inside.glob("*") if each.suffix.lower() in _PICTURES)
+    pictures = sorted((each for each in inside.glob("*") if each.suffix.lower() in _PICTURES), key=_in_order)
     if not pictures:
         raise ValueError(
             f"--images {folder}: no pictures of camera {name}, neither in {inside} nor as {name}{_VIDEOS[0]}"
         )
     return pictures
+
+
+def _in_order(picture: Path) -> list[tuple[int, str]]:
+    """What pictures are sorted by: 2.png is before 10.png."""
+    parts = re.findall(r"[0-9]+|[^0-9]+", picture.name)
+    return [(int(part), "") if part[0] in "0123456789" else (-1, part) for part in parts]
 
 
 def _frames(source: Path | list[Path]) -> Iterator[tuple[str, np.ndarray | None]]:

@@ -191,6 +191,7 @@ def watch_recorded(
         raise ValueError(
             f"--empty must be between 1 and {len(recording) - 1}, one less than the sets, got {empty}"
         )
+    recording.check_range(robot.lower, robot.upper)
     cell = watched_cell(scenario, robot, Blind())
     sets, detector = recording.sets(cell.size), cell.detector
     memory = detector.learn([next(sets) for _ in range(empty)], list(recording.joints[:empty]))

@@ -68,6 +68,12 @@ def watched(cell: Any, seconds: float, tell: Any = lambda decision: None) -> tup
     return live.run(cell, empty=2), live
 
 
+def test_who_is_within_the_margins_of_the_robot_is_at_it_not_behind_it():
+    assert Decision(1.0, -0.01, 1.9, 0.0, "stop", 0.1).text == (
+        "1.0 s: stop, somebody at the robot, 0 % of the speed, images are 0.1 s old"
+    )
+
+
 def test_a_stop_is_advised_while_somebody_is_near_and_nobody_has_to_acknowledge_it():
     told: list[Decision] = []
     cell = Clock(near=(2.0, 3.0))

@@ -110,6 +110,30 @@ def test_a_folder_without_a_recording_is_refused_before_the_cell_is_built(
     assert f"no pictures of camera {NAMES[0]}" in refusal(watch(empty, out))
 
 
+def test_pictures_are_read_in_the_order_of_their_numbers(tmp_path: Path):
+    (tmp_path / "left").mkdir()
+    for number in range(1, 12):
+        grey = np.full((48, 64, 3), 20 * number, np.uint8)
+        cv2.imwrite(str(tmp_path / "left" / f"set{number}.png"), grey)
+    rows = [",".join(map(str, [0.05 * number, *np.zeros(6)])) for number in range(11)]
+    (tmp_path / "joints.csv").write_text("\n".join([",".join(COLUMNS), *rows]))
+    means = [images.mean() for images in Recording(tmp_path, ["left"]).sets((64, 48))]
+    assert means == [20.0 * number for number in range(1, 12)]
+
+
+def test_joints_in_degrees_are_refused_before_the_cell_is_built(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+):
+    monkeypatch.setattr(watch_run, "watched_cell", lambda *_: pytest.fail("the cell was built"))
+    for name in NAMES:
+        (tmp_path / name).mkdir()
+        (tmp_path / name / "1.png").touch()
+    rows = [f"{0.1 * number:g},0,30,0,-80.5,0,0" for number in range(5)]
+    (tmp_path / "joints.csv").write_text("\n".join([",".join(COLUMNS), *rows]))
+    said = refusal(watch(tmp_path, tmp_path))
+    assert f"{tmp_path}/joints.csv: q4_rad of set 1 is -80.5, its range is -4.712 to 4.712 rad" in said
+
+
 @pytest.mark.slow
 def test_what_is_wrong_with_a_recording_is_said_in_one_line(recording: Path, tmp_path: Path):
     broken, out = tmp_path / "broken", tmp_path / "out"
