@@ -16,10 +16,10 @@ def advised(advice: Advice) -> str:
     if not advice.weak:
         return "All springs and dampers are identifiable: no further motion is needed."
     tried = f"{count(advice.motions, 'motion')} and {count(advice.sensors, 'sensor')} that were looked at"
-    hidden = [row.name for row in advice.weak if row.verdict == "nothing"]
+    better = [row.name for row in advice.weak if advice.proposed and row.proposed < row.limit]
+    hidden = [row.name for row in advice.weak if row.verdict == "nothing" and row.name not in better]
     said = []
     if advice.proposed:
-        better = [row.name for row in advice.weak if row.proposed < row.limit]
         shown = f" would make {', '.join(better)} identifiable" if better else " would help most"
         said.append(f"Of {tried} {'; '.join(map(told, advice.proposed))}{shown}.")
     if hidden:

@@ -119,6 +119,13 @@ def test_a_report_says_what_helps_and_what_nothing_shows():
     assert "no further motion is needed" in advised(Advice(210.0))
 
 
+def test_what_only_all_of_the_proposed_show_is_not_said_to_be_shown_by_none():
+    """No few for it alone suffice, but what is proposed for others comes to it, too."""
+    row = replace(weak("stiffness_bearing_3_b", 0.025), proposed=0.01)
+    said = advised(Advice(210.0, [row], [row.reach.options[0]], 96, 4))
+    assert said.endswith("would make stiffness_bearing_3_b identifiable.")
+
+
 def test_a_further_motion_that_leaves_its_range_is_refused():
     robot = load_robot("kr210")
     motions = replace(default_cases(robot), further=[FurtherMotion([0.0, 80.0, 0.0, 0.0, 0.0, 0.0])])
