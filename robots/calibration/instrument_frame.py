@@ -18,6 +18,7 @@ from robots.pose import zyx_from_rotation
 
 _ROUNDS = 15
 _NEAREST = 0.1  # of the median distance: no point weighs more than one at that distance
+_APART = 5.0  # medians of the distances from the middle, beyond which a point is likely a slip
 _POINTS = 3  # that a registration takes
 _ELSEWHERE = (0.1, float(np.deg2rad(10.0)))  # m, rad: farther is no error of the base but another frame
 
@@ -27,7 +28,8 @@ def instrument_frame(
 ) -> np.ndarray | None:
     """The motion that brings predicted positions to measured ones with the least sum of distances.
 
-    Least squares with weights of one over the distance, again and again, so that gross errors do not count.
+    Least squares with weights of one over the distance, again and again, so that gross errors do not count;
+    what is far from all other points is left out before.
 
     Args:
         predicted: of the tool by the nominal robot in m, shape (n, 3).
@@ -41,6 +43,8 @@ def instrument_frame(
     Raises:
         UndeterminedError: if the points are too few, on one line, mirrored, or of different size.
     """
+    together = _together(measured)
+    predicted, measured = predicted[together], measured[together]
     weights, X = np.ones(len(predicted)), None
     for _ in range(_ROUNDS):
         found = register_points(predicted, measured, weights)
@@ -53,6 +57,17 @@ def instrument_frame(
         weights = 1.0 / np.maximum(distances, _NEAREST * np.median(distances) + 1e-12)
         weights /= weights.max()
     return X
+
+
+def _together(measured: np.ndarray) -> np.ndarray:
+    """Which points (n,) are not far from all others, as a coordinate that lost its decimal point is.
+
+    Kilometres would decide how far apart the points are, whatever they weigh.
+    """
+    if not len(measured):
+        return np.zeros(0, dtype=bool)
+    away = np.linalg.norm(measured - np.median(measured, axis=0), axis=1)
+    return np.asarray(away <= _APART * np.median(away))
 
 
 def _is_elsewhere(X: np.ndarray, far: float, turned: float) -> bool:

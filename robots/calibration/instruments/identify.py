@@ -27,6 +27,8 @@ from robots.metrology.least_squares import UndeterminedError
 _FIRST_SIGMA = 3e-4  # m, of an instrument of which nothing is known, to begin with
 _BELIEVED = float(np.sqrt(BELIEVED[POSITION]))  # m, of such a one where lines are too few to tell it
 _L1_ROUNDS, _NEAREST = 8, 0.3  # of the median residual: no line weighs more than one at that distance
+_SLIP = 10.0, 1.0  # medians and m, beyond which a line is left out until the others are explained
+_LONG = 5.0  # medians, beyond which a distance says nothing of where its anchor is
 _RISK = 1e-3  # that a clean table loses a line
 _MANY = 10  # numbers per parameter, from which a bad line cannot hide in a fit
 _SEARCHES = 8
@@ -162,6 +164,8 @@ def _start(model: ErrorModel, seen: Observations, cell: MeasuringCell) -> Start:
 
 def _anchor(p: np.ndarray, distance: np.ndarray) -> np.ndarray:
     """The point from which points (n, 3) have these distances (n,), by differences of their squares, m."""
+    kept = distance <= _LONG * np.median(distance)
+    p, distance = p[kept], distance[kept]
     A = 2.0 * (p - p.mean(axis=0))
     squares = np.sum(p**2, axis=1) - distance**2
     return np.linalg.lstsq(A, squares - squares.mean(), rcond=None)[0]
@@ -303,11 +307,16 @@ class _Adjustment:
         """Parameters to begin with, and the lines without gross errors, (m,) bool.
 
         The least sum of distances, by weights that fall with the residual, is not moved by a few bad lines;
-        then lines are left out that are farther off than the others explain, until nothing changes.
+        then lines are left out that are farther off than the others explain, until nothing changes. What is
+        metres off to begin with, such as a number that lost its decimal point, would move even that.
         """
         problem = self._problem
         noise = instrument_noise(problem, self._theta, self._everything)
-        u = self._fit(np.zeros(len(problem.columns)), noise, is_rough=True).u
+        start = np.zeros(len(problem.columns))
+        size = self._sizes(start, np.ones((1, 1)))
+        usual = self._medians(size)[problem.observations.instrument]
+        problem.active = self._everything & (size <= np.maximum(_SLIP[0] * usual, _SLIP[1]))[:, None]
+        u = self._fit(start, instrument_noise(problem, self._theta, problem.active), is_rough=True).u
         scale = problem.gathered(np.sqrt(noise.shape * np.append(noise.theta[1:], 1.0)[noise.instrument]))
         is_believed = self._belief() is not None
         is_long = self._everything.sum() > _MANY * len(problem.columns)

@@ -140,6 +140,21 @@ def test_lines_with_gross_errors_are_named_and_the_rest_of_their_configuration_i
     assert worst_error(found, true) < 5e-4
 
 
+@pytest.mark.parametrize("factor", [1e3, -1e6])
+def test_a_number_that_lost_its_decimal_point_is_left_out_wherever_it_stands(factor: float):
+    """Of a tracker, of a camera and of a bar: kilometres say nothing of where an instrument stands."""
+    _, seen = observed(noise=2e-5, joint=1e-5)
+    robot, position, distance = load_robot("irb1200"), seen.position.copy(), seen.distance.copy()
+    whole = np.isfinite(position).all(axis=1)
+    bad = [int(np.flatnonzero(whole & (seen.instrument == i))[5]) for i in (0, 1)]
+    position[bad, 1] *= factor
+    bad.append(int(np.flatnonzero(np.isfinite(distance))[5]))
+    distance[bad[-1]] *= abs(factor)
+    found = identify_with_instruments(robot, replace(seen, position=position, distance=distance))
+    assert set(found.outliers) == set(map(int, seen.lines[bad]))
+    assert found.iterations < 3 * identify_with_instruments(robot, seen).iterations
+
+
 @pytest.mark.slow
 def test_a_thousand_positions_of_three_targets_tell_their_noise():
     _, seen = observed(count=1000, noise=5e-5, instruments=("tracker",))
