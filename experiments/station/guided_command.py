@@ -262,6 +262,7 @@ def print_link(console: Console, link: dict[str, Any]) -> None:
             pauses = "".join(
                 f"; stood still for {pause:.2f} s at {at:.2f} s" for at, pause in run["pauses_s"]
             )
+            pauses += _for_people(run)
             end = "" if run["ended"] == "path" else f"; ended early: {run['ended']}"
             times = (
                 f"{turn['median']:.2f} ms (99 %: {turn['99%']:.2f}, largest {turn['largest']:.2f})"
@@ -275,6 +276,20 @@ def print_link(console: Console, link: dict[str, Any]) -> None:
             f"cell: {cell['late']} of {cell['cycles']} messages more than 1 ms late, "
             f"worst {1e3 * cell['worst_lateness']:.1f} ms"
         )
+
+
+def _for_people(run: Mapping[str, Any]) -> str:
+    """How often and for how long a run was stopped for people, in words; empty where it never was."""
+    since, stood, stops = None, 0.0, 0
+    for time, kind, _ in run["events"]:
+        if kind == "stopped_for_people":
+            since, stops = time, stops + 1
+        elif kind == "goes_on" and since is not None:
+            since, stood = None, stood + time - since
+    if not stops:
+        return ""
+    last = ", and then until the end" if since is not None else ""
+    return f"; stopped for people {count(stops, 'time')}, for {stood:.1f} s{last}"
 
 
 _WORTH_SAYING = (
