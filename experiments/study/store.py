@@ -53,8 +53,8 @@ class StudyStore:
         columns: name -> "number", "text" or "count", in the order of the table.
 
     Raises:
-        ValueError: if the folder holds rows of another study, or of another version of truetip or Drake, or
-            a damaged file; so do the methods that read.
+        ValueError: if the folder holds rows of another study, of another version of truetip or Drake, or
+            without their plan, or a damaged file; so do the methods that read.
         OSError: if it cannot be read or written.
     """
 
@@ -136,6 +136,8 @@ class StudyStore:
                     "or remove the folder"
                 )
             return
+        if any((self._folder / name).exists() for name in (TABLE, TIMES)) or self._parts():
+            raise _of_unknown_study(path, "missing")
         _replace(path, (json.dumps(plan, indent=1, sort_keys=True) + "\n").encode())
 
 
@@ -145,11 +147,16 @@ def _plan_before(path: Path) -> dict[str, Any]:
     except ValueError:
         before = None
     if not isinstance(before, dict):
-        raise ValueError(
-            f"{path} is damaged, so that nobody knows which study the rows beside it are of: choose another "
-            "--out, or remove the folder"
-        )
+        raise _of_unknown_study(path, "damaged")
     return before
+
+
+def _of_unknown_study(plan: Path, fault: str) -> ValueError:
+    """The refusal of rows whose plan cannot be read."""
+    return ValueError(
+        f"{plan} is {fault}, so that nobody knows which study the rows beside it are of: choose another "
+        "--out, or remove the folder"
+    )
 
 
 def _with_keys(name: str, before: Any, now: Any) -> str:

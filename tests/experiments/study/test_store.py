@@ -67,6 +67,25 @@ def test_a_damaged_file_is_named_with_what_to_do(tmp_path):
             StudyStore(tmp_path, {"study": 1}, COLUMNS)
 
 
+@pytest.mark.parametrize("is_complete", [False, True])
+def test_rows_without_their_plan_are_not_taken_for_those_of_this_study(tmp_path: Path, is_complete: bool):
+    store = StudyStore(tmp_path, {"study": 1}, COLUMNS)
+    store.add(line(0))
+    if is_complete:
+        store.finish()
+    store.flush()
+    (tmp_path / "plan.json").unlink()
+    with pytest.raises(ValueError, match=r"plan.json is missing, so that nobody knows which study"):
+        StudyStore(tmp_path, {"study": 2}, COLUMNS)
+    assert not (tmp_path / "plan.json").exists()
+
+
+def test_a_folder_in_which_no_row_was_finished_needs_no_plan(tmp_path: Path):
+    StudyStore(tmp_path, {"study": 1}, COLUMNS)
+    (tmp_path / "plan.json").unlink()
+    assert StudyStore(tmp_path, {"study": 2}, COLUMNS).finished() == set()
+
+
 def test_a_finished_row_is_known_and_a_failed_one_can_be_done_again(tmp_path):
     store = StudyStore(tmp_path, {}, COLUMNS)
     store.add(line(0))
