@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 import plotly.graph_objects as go
 
+from experiments.cli.console import count
 from experiments.compensate.study import CompensationStudy
 from experiments.report.plot_page import Section, html_table, sortable_table, write_plot_page
 from experiments.report.robot_plot import joint_origins
@@ -55,14 +56,17 @@ def verdict(study: CompensationStudy) -> str:
     """What was reached, in words."""
     if not study.results:
         return f"{study.program.name}: no target was corrected."
-    left = len(study.corrected.notes)
+    moved, left = len(study.results), len(study.corrected.notes)
     text = (
-        f"{len(study.results)} targets are moved by up to {_worst(study.shifts):.3f} mm and "
-        f"{_worst_deg(study.shifts):.3f} degrees. Run through the model of the robot, the error at the "
-        f"targets falls from {_worst(study.errors_before):.3f} mm to {_worst(study.errors_after):.1e} mm, "
-        f"and to {_worst(study.errors_stored):.1e} mm where the controller keeps numbers in single precision."
+        f"{count(moved, 'target')} {'is' if moved == 1 else 'are'} moved by up to "
+        f"{_worst(study.shifts):.3f} mm and {_worst_deg(study.shifts):.3f} degrees. Run through the "
+        f"model of the robot, the error at the targets falls from {_worst(study.errors_before):.3f} mm to "
+        f"{_worst(study.errors_after):.1e} mm, and to {_worst(study.errors_stored):.1e} mm where the "
+        "controller keeps numbers in single precision."
     )
-    return text + (f" {left} places are left alone or to be looked at." if left else "")
+    if not left:
+        return text
+    return f"{text} {count(left, 'place')} {'is' if left == 1 else 'are'} left alone or to be looked at."
 
 
 def write_compensation_page(page: Path, study: CompensationStudy) -> None:

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
+from experiments.cli.console import count
 from robots.description.model import RobotModel
 from robots.programs.compensation import Compensation, FalseTarget, Refusal
 from robots.programs.program import Program, ProgramContext, ProgramError, Source, edited, read_source
@@ -130,7 +131,8 @@ def _notes(program: Program, compensation: Compensation, payload: float | None) 
         )
     silent = [each for each in program.targets if not each.payloads]
     if compensation.is_compliant and payload is None and silent:
-        notes.append(f"The load of {len(silent)} targets is not said and taken as zero; --payload says it.")
+        of = count(len(silent), "target")
+        notes.append(f"The load of {of} is not said and taken as zero; --payload says it.")
     return tuple(notes)
 
 

@@ -10,6 +10,8 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 
 _ROBOT, _CAMERAS, _POSES, _CALIBRATION = b"robot", b"cameras", b"poses_rad", b"calibration_of_cameras"
+_PARQUET = b"PAR1"  # at both ends of a file
+_REMEDY = "put a copy in its place, or begin another with --history"
 
 
 @dataclass(frozen=True)
@@ -74,9 +76,10 @@ def read_history(path: Path) -> History:
     """Reads what `write_history` has written.
 
     Raises:
-        ValueError: if it is no such file.
+        ValueError: if it is no such file, was cut off or is damaged.
         OSError: if it cannot be read.
     """
+    _refuse_cut_off(path)
     try:
         table = pq.read_table(path)
         head = table.schema.metadata or {}
@@ -93,5 +96,21 @@ def read_history(path: Path) -> History:
         calibration = None if calibrated is None else np.array(json.loads(calibrated))
         robot, time = head[_ROBOT].decode(), data["time_s"]
         return History(robot, cameras, q, time, X, rotations, alarms, calibration)
-    except (pa.ArrowInvalid, KeyError) as error:
+    except KeyError as error:
         raise ValueError(f"history {path}: not a history of truetip health") from error
+    except (pa.ArrowException, OSError, ValueError) as error:
+        if isinstance(error, OSError) and error.errno:  # of the system; what is packed wrongly has none
+            raise
+        raise ValueError(f"history {path}: the file is damaged: {_REMEDY}") from error
+
+
+def _refuse_cut_off(path: Path) -> None:
+    """Raises ValueError for a file without the end of a Parquet file, where its index stands."""
+    content = path.read_bytes()
+    if not _PARQUET.startswith(content[: len(_PARQUET)]):
+        raise ValueError(f"history {path}: not a history of truetip health")
+    if len(content) < 3 * len(_PARQUET) or not content.endswith(_PARQUET):
+        raise ValueError(
+            f"history {path}: the file is cut off after {len(content)} bytes, and without its end no check "
+            f"in it can be read: {_REMEDY}"
+        )

@@ -54,6 +54,18 @@ def test_from_a_module_to_a_corrected_one(folder: Path):
     assert "to limit" in page
 
 
+def test_one_target_and_one_place_are_counted_as_such(folder: Path, tmp_path: Path):
+    text = rapid_module(load_robot("irb1200"), configurations(1, 7))
+    own = "CONST robtarget own:=[[reach+10,0,500],[1,0,0,0],[0,0,0,0],[9E9,9E9,9E9,9E9,9E9,9E9]];"
+    text = text.replace("  PROC main()", f"{own}\r\n  PROC main()\r\n    MoveL own,v100,z10,tool0\\WObj:=w;")
+    (tmp_path / "one.mod").write_bytes(text.encode())
+    changes = {"out": tmp_path / "new.mod", "report": tmp_path / "page.html"}
+    result = truetip("compensate", tmp_path / "one.mod", *options(folder, **changes))
+    said = " ".join(result.output.split())
+    assert "1 target is moved by up to" in said
+    assert "1 place is left alone or to be looked at." in said
+
+
 def test_a_target_may_stay_as_it_is(folder: Path):
     found = json.loads(truetip("compensate", folder / "m.mod", *options(folder, json="-", keep="p3")).stdout)
     assert len(found["targets"]) == 19

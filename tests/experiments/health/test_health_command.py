@@ -9,7 +9,7 @@ import pyarrow.parquet as pq
 import pytest
 
 from diagrams.scenario.scenario import load_scenario
-from experiments.health.history import read_history, write_history
+from experiments.health.history import new_history, read_history, write_history
 from experiments.health.study import HealthStudy
 from robots.description.model import load_robot
 from systems.vision.camera_rig import load_cell
@@ -137,6 +137,28 @@ def test_a_history_is_that_of_the_cameras_and_not_of_their_names(tmp_path: Path)
         moved.refuse(read_history(path), is_simulated=True)
     # One from before cameras were kept goes on.
     moved.refuse(replace(read_history(path), calibration=None), is_simulated=True)
+
+
+def of_one_check(path: Path) -> Path:
+    nothing = new_history("irb1200", ("01", "02"), np.zeros((6, 6)), np.zeros((2, 9)))
+    write_history(path, nothing.appended(0.0, np.tile(np.eye(4), (6, 1, 1)), np.zeros((2, 3)), []))
+    return path
+
+
+@pytest.mark.parametrize("kept", [0, 3, 2000, -10])
+def test_a_history_that_was_cut_off_is_told_so(tmp_path: Path, kept: int):
+    path = of_one_check(tmp_path / "h.parquet")
+    path.write_bytes(path.read_bytes()[:kept])
+    with pytest.raises(ValueError, match=r"h.parquet: the file is cut off .*: put a copy in its place, or"):
+        read_history(path)
+
+
+def test_a_history_with_other_bytes_within_is_told_to_be_damaged(tmp_path: Path):
+    path = of_one_check(tmp_path / "h.parquet")
+    whole = path.read_bytes()
+    path.write_bytes(whole[:100] + bytes(300) + whole[400:])
+    with pytest.raises(ValueError, match=r"h.parquet: the file is damaged: put a copy in its place, or"):
+        read_history(path)
 
 
 @pytest.mark.slow
