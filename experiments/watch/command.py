@@ -144,6 +144,7 @@ def watch_command(
                     )
             if people is not None and run.snapshot is not None:
                 run = replace(run, boxes=seen_by_network(people, run))
+            print_note(human, escape("; ".join(run.notes)) if images else "")
             verdict = run_verdict(run)
             rates = data_rates(chosen)
             write_run_page(page, title, run, run.cell.detector.cameras, ground, rates)

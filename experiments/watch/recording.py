@@ -15,12 +15,14 @@ from pathlib import Path
 import cv2
 import numpy as np
 
+from experiments.cli.console import count
 from robots.description.model import NUM_JOINTS
 from robots.text_table import TextTableError, finite_number, parse_fields, read_text
 
 COLUMNS = ("time_s", *(f"q{number}_rad" for number in range(1, NUM_JOINTS + 1)))
 JOINTS = "joints.csv"
 _VIDEOS, _PICTURES = (".mp4", ".avi", ".mkv"), {".png", ".jpg", ".jpeg", ".bmp", ".tif", ".tiff"}
+_SLOWEST = 4.0  # s, between sets of images: beyond it a time is in ms
 
 
 class Recording:
@@ -50,6 +52,7 @@ class Recording:
         self._video = folder if is_video else None
         self._sources = [] if is_video else [_source(folder, name) for name in cameras]
         self.ended: dict[str, int] = {}  # cameras whose images ended before the joints, with their number
+        self._beyond: dict[str, int] = {}  # images beyond the last set, by what they are of
 
     def check_range(self, lower: np.ndarray, upper: np.ndarray) -> None:
         """Refuses joints that the robot cannot have, such as degrees.
@@ -71,6 +74,18 @@ class Recording:
 
     def __len__(self) -> int:
         return len(self.times)
+
+    @property
+    def notes(self) -> list[str]:
+        """Cameras that ended before the joints did or went on behind them, once all sets were taken."""
+        return [
+            *(f"camera {name} ended after {count(number, 'set')}" for name, number in self.ended.items()),
+            *(
+                f"{count(number, 'image')} of {name} {'is' if number == 1 else 'are'} beyond the last line "
+                f"of {self._table.name} and left out"
+                for name, number in self._beyond.items()
+            ),
+        ]
 
     def sets(self, size: tuple[int, int]) -> Iterator[np.ndarray]:
         """The sets of images one after the other, (n, height, width, 3) of uint8 each.
@@ -101,6 +116,8 @@ class Recording:
                     raise ValueError(f"{where}: images must be {width} x {height} px, got {seen} px")
                 images[i] = image
             yield images
+        for name, source, stream in zip(self._cameras, self._sources, streams, strict=True):
+            self._count_beyond(f"camera {name}", source, stream)
 
     def _tiles(self, video: Path, size: tuple[int, int]) -> Iterator[np.ndarray]:
         """The sets of a single video; after its end all cameras are blind."""
@@ -122,6 +139,13 @@ class Recording:
                 )
             tiles = image.reshape(rows, height, columns, width, 3).swapaxes(1, 2)
             yield np.ascontiguousarray(tiles.reshape(-1, height, width, 3)[:n])
+        self._count_beyond(video.name, video, frames)
+
+    def _count_beyond(self, name: str, source: Path | list[Path], stream: Iterator[object]) -> None:
+        """Notes what is left of a stream behind the last set; pictures are not read for that."""
+        left = len(source) - len(self) if isinstance(source, list) else sum(1 for _ in stream)
+        if left > 0:
+            self._beyond[name] = left
 
 
 def _source(folder: Path, name: str) -> Path | list[Path]:
@@ -188,4 +212,9 @@ def _joints(path: Path) -> np.ndarray:
     times = np.array(rows, dtype=float)
     if not np.all(np.diff(times[:, 0]) > 0.0):
         raise TextTableError(f"{path}: time_s must increase from line to line")
+    period = float(np.median(np.diff(times[:, 0])))
+    if period > _SLOWEST:
+        raise TextTableError(
+            f"{path}: sets of images are {period:g} s apart by time_s, which must be in s; is it in ms?"
+        )
     return times

@@ -214,8 +214,7 @@ def watch_recorded(
         stopped,
         seen.place,
     )
-    notes = [f"camera {name} ended after {number} sets" for name, number in recording.ended.items()]
-    notes += untrusted_note(seen)
+    notes = recording.notes + untrusted_note(seen)
     return WatchRun(line, cell, seen.nearest, terms, notes, seen.changes)
 
 

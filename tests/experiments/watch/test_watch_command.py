@@ -42,6 +42,15 @@ def watch(folder: Path, out: Path, *more: str):
     )
 
 
+def video_of(path: Path, frames: list[np.ndarray]) -> Path:
+    height, width, _ = frames[0].shape
+    video = cv2.VideoWriter(str(path), cv2.VideoWriter.fourcc(*"MJPG"), 20.0, (width, height))
+    for frame in frames:
+        video.write(frame)
+    video.release()
+    return path
+
+
 @pytest.mark.slow
 def test_a_person_in_a_recording_stops_the_robot_and_the_page_shows_where(recording: Path, tmp_path: Path):
     network = write(tmp_path, small_yolo())
@@ -58,6 +67,7 @@ def test_a_person_in_a_recording_stops_the_robot_and_the_page_shows_where(record
     assert true - 0.4 < numbers["smallest_distance_m"] < true + 0.1
     assert numbers["stopped_s"] > 0.0
     assert numbers["notes"] == [f"camera {NAMES[1]} ended after {SETS - 1} sets"]
+    assert f"Note: {numbers['notes'][0]}" in result.stdout
     page = (tmp_path / "watch.html").read_text()
     assert "not a safety function" in page
     assert page.count("data:image/jpeg") == 6  # two of them of the change
@@ -67,13 +77,10 @@ def test_a_person_in_a_recording_stops_the_robot_and_the_page_shows_where(record
 def test_a_single_video_has_all_cameras_side_by_side_and_row_by_row(tmp_path: Path):
     """Three cameras in two rows of two; the fourth place is nobody's. JPEG changes levels a little."""
     greys = np.array([[40, 80, 120], [60, 100, 140]])
-    codec = cv2.VideoWriter.fourcc(*"MJPG")
-    video = cv2.VideoWriter(str(tmp_path / "all.avi"), codec, 20.0, (128, 96))
-    for grey in greys:
-        frame = np.zeros((96, 128, 3), np.uint8)
+    frames = [np.zeros((96, 128, 3), np.uint8) for _ in greys]
+    for frame, grey in zip(frames, greys, strict=True):
         frame[:48, :64], frame[:48, 64:], frame[48:, :64] = grey[0], grey[1], grey[2]
-        video.write(frame)
-    video.release()
+    video_of(tmp_path / "all.avi", frames)
     rows = [",".join(map(str, [0.05 * number, *np.zeros(6)])) for number in range(3)]
     (tmp_path / "all.csv").write_text("\n".join([",".join(COLUMNS), *rows]))
     recording = Recording(tmp_path / "all.avi", ["a", "b", "c"])
@@ -82,20 +89,26 @@ def test_a_single_video_has_all_cameras_side_by_side_and_row_by_row(tmp_path: Pa
     assert recording.ended == {"a": 2, "b": 2, "c": 2}
     with pytest.raises(ValueError, match="must be made of 3 images of 60 x 48 px, got 128 x 96 px"):
         next(recording.sets((60, 48)))
+    (tmp_path / "all.csv").write_text("\n".join([",".join(COLUMNS), *rows[:2]]))
+    more = video_of(tmp_path / "all.avi", [np.full((96, 128, 3), 90, np.uint8)] * 3)
+    recording = Recording(more, ["a", "b", "c"])
+    assert len(list(recording.sets((64, 48)))) == 2
+    assert recording.notes == ["1 image of all.avi is beyond the last line of all.csv and left out"]
 
 
 def test_videos_are_read_image_by_image_and_end_when_they_end(tmp_path: Path):
-    codec = cv2.VideoWriter.fourcc(*"MJPG")
-    video = cv2.VideoWriter(str(tmp_path / "left.avi"), codec, 20.0, (64, 48))
-    for grey in (40, 80, 120):
-        video.write(np.full((48, 64, 3), grey, np.uint8))
-    video.release()
+    video_of(tmp_path / "left.avi", [np.full((48, 64, 3), grey, np.uint8) for grey in (40, 80, 120)])
     rows = [",".join(map(str, [0.05 * number, *np.zeros(6)])) for number in range(4)]
     (tmp_path / "joints.csv").write_text("\n".join([",".join(COLUMNS), *rows]))
     recording = Recording(tmp_path, ["left"])
     means = [images.mean() for images in recording.sets((64, 48))]
     np.testing.assert_allclose(means, [40, 80, 120, 0], atol=2.0)
     assert recording.ended == {"left": 3}
+    assert recording.notes == ["camera left ended after 3 sets"]
+    (tmp_path / "joints.csv").write_text("\n".join([",".join(COLUMNS), *rows[:2]]))
+    recording = Recording(tmp_path, ["left"])
+    assert len(list(recording.sets((64, 48)))) == 2
+    assert recording.notes == ["1 image of camera left is beyond the last line of joints.csv and left out"]
 
 
 def test_a_folder_without_a_recording_is_refused_before_the_cell_is_built(
@@ -119,6 +132,35 @@ def test_pictures_are_read_in_the_order_of_their_numbers(tmp_path: Path):
     (tmp_path / "joints.csv").write_text("\n".join([",".join(COLUMNS), *rows]))
     means = [images.mean() for images in Recording(tmp_path, ["left"]).sets((64, 48))]
     assert means == [20.0 * number for number in range(1, 12)]
+
+
+def test_pictures_beyond_the_last_line_of_joints_are_counted(tmp_path: Path):
+    for name, pictures in (("left", 5), ("right", 2), ("top", 5)):
+        (tmp_path / name).mkdir()
+        for number in range(pictures):
+            cv2.imwrite(str(tmp_path / name / f"{number}.png"), np.zeros((48, 64, 3), np.uint8))
+    rows = [",".join(map(str, [0.05 * number, *np.zeros(6)])) for number in range(2)]
+    (tmp_path / "joints.csv").write_text("\n".join([",".join(COLUMNS), *rows]))
+    recording = Recording(tmp_path, ["left", "right", "top"])
+    assert len(list(recording.sets((64, 48)))) == 2
+    beyond = "are beyond the last line of joints.csv and left out"
+    assert recording.notes == [f"3 images of camera {name} {beyond}" for name in ("left", "top")]
+
+
+@pytest.mark.parametrize(("period", "said"), [(20.0, "20 s apart"), (50.0, "50 s apart")])
+def test_times_in_milliseconds_are_refused_with_a_hint(tmp_path: Path, period: float, said: str):
+    """A pause in which nothing was recorded says nothing of the unit."""
+    (tmp_path / "left").mkdir()
+    (tmp_path / "left" / "1.png").touch()
+    for unit in (1.0, 1e-3):
+        times = unit * (period * np.arange(6) + [0, 0, 0, 0, 9000.0, 9000.0])
+        rows = [f"{time:g},0,0,0,0,0,0" for time in times]
+        (tmp_path / "joints.csv").write_text("\n".join([",".join(COLUMNS), *rows]))
+        if unit == 1.0:
+            with pytest.raises(ValueError, match=f"joints.csv: sets of images are {said}.* in ms"):
+                Recording(tmp_path, ["left"])
+        else:
+            assert len(Recording(tmp_path, ["left"])) == 6
 
 
 def test_joints_in_degrees_are_refused_before_the_cell_is_built(
