@@ -87,7 +87,7 @@ def parse_fields(text: str, name: str, has_head: bool) -> TextTable:
     if not kept:
         raise TextTableError(f"{name}: the table is empty: there are only comments or blank lines")
     lines = [line.strip() for _, line in kept]
-    separator = _separator(lines[:1] if has_head else lines)
+    separator = _separator_of_names(lines[0]) if has_head else _separator(lines)
     if has_head and separator is None and _has_tabs([line for _, line in kept]):
         separator = "\t"
     else:
@@ -121,6 +121,11 @@ def finite_number(field: str, separator: str | None = None) -> float | None:
 def _has_tabs(lines: Sequence[str]) -> bool:
     """Whether a tabulator stands between any two columns of a head, and the rows below it have some, too."""
     return all("\t" in line for line in lines) and all(name.strip() for name in lines[0].split("\t"))
+
+
+def _separator_of_names(head: str) -> str | None:
+    """What separates the names of a head: blanks may be within one, as in "x [mm],y [mm]"."""
+    return "," if "," in head and not re.search("[;\t]", head) else _separator([head])
 
 
 def _separator(lines: Sequence[str]) -> str | None:

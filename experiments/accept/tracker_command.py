@@ -13,6 +13,7 @@ from diagrams.record.read_record import Contents, read_record
 from diagrams.record.restored import exposures
 from diagrams.record.topics import JOINTS, POSE
 from diagrams.scenario.differences import scenario_tree
+from experiments.accept.tracker_table import FEWEST, UNITS, read_tracker
 from experiments.cli.console import print_files, refusing
 from experiments.cli.json_output import human_console, json_output
 from experiments.cli.option_limits import positive
@@ -22,12 +23,9 @@ from experiments.report.plot_page import Section, html_table, write_plot_page
 from robots.description.model import load_robot
 from robots.kinematics.forward import Kinematics
 from robots.metrology.instrument_comparison import Fit, Followed, Share, fitted, share_of_first
-from robots.metrology.number_table import read_table
 from robots.pose import zyx_from_rotation
 
-_UNITS = {"mm": 1e-3, "m": 1.0}
 _ROBOT = "irb1200"  # of a record that does not say
-_FEWEST = 100  # samples of an instrument
 _SAID = {
     "first": "the camera explains them",
     "second": "the second instrument explains them",
@@ -62,7 +60,7 @@ def accept_tracker_command(
     human = human_console(json_file)
     with json_output(json_file) as output, refusing(ValueError, OSError), ExitStack() as stack:
         positive("--window", window)
-        if unit not in _UNITS:
+        if unit not in UNITS:
             raise ValueError(f"--unit must be mm or m, got '{unit}'")
         contents = read_record(record)
         name = robot or str(scenario_tree(contents.scenario).get("robot", _ROBOT))
@@ -70,7 +68,7 @@ def accept_tracker_command(
         page = stack.enter_context(staged_file(out, *PAGE))
         stack.enter_context(output.staged())
         camera, joints = _recorded(record, contents, kinematics)
-        second = _fitted(f"{record} and {seen} in {unit}", camera, _seen(seen, _UNITS[unit]), window)
+        second = _fitted(f"{record} and {seen} in {unit}", camera, read_tracker(seen, unit), window)
         third = _fitted(f"camera and joints of {record} with --robot {name}", camera, joints, window)
         share = share_of_first(second, third)
         verdict = tracker_verdict(second, share)
@@ -98,25 +96,11 @@ def _recorded(record: str, contents: Contents, kinematics: Kinematics) -> tuple[
     exposed, unique = np.unique(exposed, return_index=True)
     time, rows = np.unique(contents.topics[JOINTS].time, return_index=True)
     for number, what in ((len(exposed), "exposures"), (len(time), "samples of the joints")):
-        if number < _FEWEST:
-            raise ValueError(f"record {record}: {number} {what}, at least {_FEWEST} are needed")
+        if number < FEWEST:
+            raise ValueError(f"record {record}: {number} {what}, at least {FEWEST} are needed")
     X = kinematics.forward(contents.topics[JOINTS].columns["position"][rows])
     seen = X_WE[unique]
     return Followed(exposed, seen[:, :3, 3], seen[:, :3, :3]), Followed(time, X[:, :3, 3])
-
-
-def _seen(name: str, unit: float) -> Followed:
-    """What the second instrument saw. Raises ValueError if the table is no such one."""
-    table = read_table(name)
-    if table.columns != 4:
-        raise table.error(f"four numbers a line are needed, time and x, y, z, there are {table.columns}")
-    if len(table.values) < _FEWEST:
-        raise table.error(f"{len(table.values)} lines, at least {_FEWEST} are needed")
-    time = table.values[:, 0]
-    back = np.flatnonzero(np.diff(time) <= 0.0)
-    if len(back):
-        raise table.error("the time does not rise", back[:1] + 1)
-    return Followed(time, unit * table.values[:, 1:])
 
 
 def tracker_verdict(second: Fit, share: Share) -> str:

@@ -1,8 +1,9 @@
 """Reading text files of numbers; errors are reported with file and line.
 
 A line holds one measurement; its numbers are separated by ``;``, by ``,`` or by blanks, the same in the whole
-file. ``#`` begins a comment. Decimal commas are read where ``;`` or blanks separate; where commas do, "1,5"
-could be one number or two, and a file that could be read both ways is refused.
+file. ``#`` begins a comment; a head line is refused, or kept where the caller wants one. Decimal commas are
+read where ``;`` or blanks separate; where commas do, "1,5" could be one number or two, and a file that could
+be read both ways is refused.
 """
 
 import math
@@ -18,6 +19,7 @@ from robots.text_table import TextTableError, parse_fields, read_text
 _NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?")
 _FRACTION = re.compile(r"\d+([eE][+-]?\d+)?")
 _DECIMAL_COMMA = re.compile(r"[+-]?(\d+,\d*|,\d+)([eE][+-]?\d+)?")
+_WORD = re.compile(r"[\"(\[]*[^\W\d_]")  # a unit may stand apart, in brackets
 
 
 class NumberFileError(ValueError):
@@ -31,6 +33,8 @@ class NumberTable:
     name: str  # of the file
     values: np.ndarray  # (n, columns), as written
     lines: tuple[int, ...]  # of the rows, from one
+    head: tuple[str, ...] = ()  # names of the columns, where a head line has some
+    head_line: int = 0
 
     @property
     def columns(self) -> int:
@@ -49,8 +53,12 @@ class NumberTable:
         return NumberFileError(f"{self.where(rows)}: {message}")
 
 
-def read_table(path: str | Path) -> NumberTable:
+def read_table(path: str | Path, may_have_head: bool = False) -> NumberTable:
     """Reads the numbers of a file.
+
+    Args:
+        path: of the file.
+        may_have_head: whether its first line may name the columns.
 
     Raises:
         NumberFileError: if the file is missing, empty, not text, not rectangular, or holds anything that
@@ -60,26 +68,36 @@ def read_table(path: str | Path) -> NumberTable:
         text = read_text(path)
     except TextTableError as error:
         raise NumberFileError(str(error)) from error
-    return parse_table(text, str(path))
+    return parse_table(text, str(path), may_have_head)
 
 
-def parse_table(text: str, name: str) -> NumberTable:
-    """The numbers of a text; ``name`` is where it came from.
+def parse_table(text: str, name: str, may_have_head: bool = False) -> NumberTable:
+    """The numbers of a text; ``name`` is where it came from, ``may_have_head`` as for `read_table`.
 
     Raises:
         NumberFileError: see `read_table`.
     """
     try:
         table = parse_fields(text, name, has_head=False)
+        has_head = len(table.rows) > 1 and all(map(_is_name, table.rows[0]))
+        if has_head and not may_have_head:
+            raise NumberFileError(
+                f"{table.where(0)}: a head line ('{table.rows[0][0]}') has no meaning here: only numbers, "
+                "# in front of it makes it a comment"
+            )
+        if has_head:
+            table = parse_fields(text, name, has_head=True)
     except TextTableError as error:
         raise NumberFileError(str(error)) from error
     fields, separator = dict(zip(table.lines, table.rows, strict=True)), table.separator
     _refuse_ragged_rows(name, fields)
-    if separator == ",":
+    head_line = table.lines[0] if has_head else 0
+    head = tuple(fields.pop(head_line, ()))
+    if separator == "," and not head:  # whose names say how many numbers there are
         _refuse_hidden_decimal_commas(name, fields)
     _refuse_two_decimal_marks(name, fields)
     values = [[_number(name, line, field) for field in row] for line, row in fields.items()]
-    return NumberTable(name, np.array(values), tuple(fields))
+    return NumberTable(name, np.array(values), tuple(fields), head, head_line)
 
 
 def _refuse_ragged_rows(name: str, fields: dict[int, list[str]]) -> None:
@@ -110,6 +128,11 @@ def _refuse_two_decimal_marks(name: str, fields: dict[int, list[str]]) -> None:
         raise NumberFileError(
             f"{name}, line {max(marked.values())}: decimal points and decimal commas in one file"
         )
+
+
+def _is_name(field: str) -> bool:
+    """Whether a field is a word rather than a number or a slip in one."""
+    return bool(_WORD.match(field)) and field.lower() not in ("nan", "inf", "infinity")
 
 
 def _number(name: str, line: int, field: str) -> float:

@@ -31,6 +31,11 @@ def test_decimal_commas_are_read_where_no_comma_separates(separator: str):
     assert [finite_number(field, table.separator) for field in table.rows[1]] == [1.5, -2.25]
 
 
+def test_names_with_blanks_between_commas_are_names():
+    assert rows("t [s],x [mm], y [mm]", "1,2,3") == [["1", "2", "3"]]
+    assert rows("point, name\tx", "p\t1.5") == [["p", "1.5"]]
+
+
 def test_any_blanks_separate_where_not_every_column_has_its_tabulator():
     assert rows("x_mm\t\ty_mm", "1\t2") == [["1", "2"]]
     assert rows("x_mm\ty_mm", "1 2") == [["1", "2"]]

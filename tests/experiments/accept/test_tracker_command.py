@@ -74,7 +74,11 @@ def test_what_cannot_be_compared_is_refused_in_one_line(files, tmp_path):
     (tmp_path / "three.csv").write_text("0 1 2\n1 2 3\n")
     lines = seen.read_text().splitlines()
     (tmp_path / "back.csv").write_text("\n".join([*lines[:300], lines[100], *lines[300:]]))
+    fields = lines[300].split(";")
+    far = ";".join([fields[0], "7e6", *fields[2:]])
+    (tmp_path / "far.csv").write_text("\n".join(["time;x;y;z", *lines[:300], far, *lines[301:]]))
     for table, message in (
+        ("far.csv", "far.csv, line 302: x is 7e+06 mm, and "),
         ("three.csv", "four numbers a line are needed, time and x, y, z, there are 3"),
         ("back.csv", "back.csv, line 301: the time does not rise"),
         ("none.csv", "none.csv: no such file"),

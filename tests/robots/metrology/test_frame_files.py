@@ -49,7 +49,10 @@ def test_any_text_is_either_read_or_refused(text: str):
 UNREADABLE = {
     "empty": ("# nothing\n\n", "the table is empty"),
     "word": ("1;2;3\n4;x;6", "line 2: 'x' is not a finite number"),
-    "heading": ("x;y;z\n1;2;3", "line 1: 'x' is not a finite number"),
+    "heading": (
+        "x;y;z\n1;2;3",
+        "line 1: a head line .'x'. has no meaning here: only numbers, # in front of it",
+    ),
     "nan": ("1;2;3\n# comment\n4;nan;6", "line 3: 'nan' is not a finite number"),
     "overflow": ("1;2;1e999", "line 1: '1e999' is not a finite number"),
     "hexadecimal": ("1;2;0x1", "'0x1' is not"),
@@ -71,6 +74,17 @@ def test_a_text_that_is_no_table_is_refused_with_its_line(text, reason, tmp_path
     with pytest.raises(NumberFileError, match=reason) as refusal:
         read_table(file)
     assert str(refusal.value).startswith(str(file))
+
+
+@pytest.mark.parametrize(
+    "text", ["t;x\n1;2\n3;4", "t [s],x [m]\n1,2\n3,4", "t x\n1 2\n3 4", "# a\nt;x\n1,0;2\n3;4"]
+)
+def test_a_head_line_is_kept_where_one_may_be(text: str):
+    table = parse_table(text, "a file", may_have_head=True)
+    assert [name[0] for name in table.head] == ["t", "x"]
+    assert table.values.tolist() == [[1.0, 2.0], [3.0, 4.0]]
+    assert table.where([1]) == f"a file, line {len(text.splitlines())}"
+    assert parse_table("1;2\n3;4", "a file", may_have_head=True).head == ()
 
 
 def test_files_that_are_none_are_refused(tmp_path: Path):
