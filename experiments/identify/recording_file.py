@@ -10,10 +10,12 @@ from pathlib import Path
 import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
+import typer
 from pydrake.common.yaml import yaml_dump_typed
 from scipy.interpolate import CubicSpline
 
 from experiments.identify.recording_columns import PARQUET, read_columns
+from experiments.identify.recording_grid import filled_note
 from experiments.identify.recording_map import (
     Recording,
     RecordingMap,
@@ -79,20 +81,22 @@ def read_recording(path: Path, columns: Path | None = None, needs_sensors: bool 
     readings = np.zeros((len(time), len(plan.sensors), 3))
     for i, sensor in enumerate(plan.sensors):
         readings[:, i] = sensor.factor * table.numbers(sensor.columns)
-    cases = []
+    cases, grids = [], []
     for name in dict.fromkeys(names):
         rows = np.flatnonzero(np.array(names) == name)
-        check_times(lambda row, rows=rows: table.where(int(rows[row])), time[rows], stamps[rows])
+        grid = check_times(lambda row, rows=rows: table.where(int(rows[row])), time[rows], stamps[rows])
+        grids.append(grid)
+        times, angles = grid.linear(time[rows]), grid.smooth(theta[rows])
         speed = (
-            rate[rows] if rate is not None else CubicSpline(time[rows], theta[rows]).derivative()(time[rows])
+            grid.smooth(rate[rows]) if rate is not None else CubicSpline(times, angles).derivative()(times)
         )
-        torques = torque[rows] if torque is not None else np.zeros((0, NUM_JOINTS))
-        told = commands[rows] if commands is not None else None
+        torques = grid.linear(torque[rows]) if torque is not None else np.zeros((0, NUM_JOINTS))
+        told = grid.following(commands[rows]) if commands is not None else None
         cases.append(
             RecordedCase(
                 name,
-                time[rows],
-                theta[rows],
+                times,
+                angles,
                 speed,
                 torques,
                 stamps[rows],
@@ -103,6 +107,8 @@ def read_recording(path: Path, columns: Path | None = None, needs_sensors: bool 
         )
     check_payloads(mapped, plan, cases)
     check_periods(path, cases)
+    if note := filled_note(path, grids):
+        typer.echo(f"truetip: recording {note}", err=True)
     return Recording(plan.payload, cases, places(plan), plan.command_period)
 
 

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
+from experiments.identify.recording_grid import UNEVEN, EvenGrid, even_grid
 from robots.configuration.nodes import Node
 from robots.configuration.quantity import choice, numbers, positive, quantity
 from robots.description.model import NUM_JOINTS
@@ -13,7 +14,6 @@ from robots.identification.motion import KINDS, SensorPlace
 from robots.identification.recording import RecordedCase, RecordingError
 from robots.pose import rotation_from_zyx, zyx_from_rotation
 
-_UNEVEN = 0.01  # of the period, by which samples of the robot may be off an even grid
 _LEAST = 50  # samples of a case
 _SLOWEST = 0.5  # s, between samples: beyond it a time is in ms
 _FARTHEST = 10.0  # m, of a sensor from the frame of its body: beyond it a place is in mm
@@ -161,8 +161,8 @@ def check_payloads(path: Path, plan: RecordingMap, cases: list[RecordedCase]) ->
         raise RecordingError(f"{path}: payloads: no case '{unknown[0]}', there are {', '.join(names)}")
 
 
-def check_times(where: Callable[[int], str], time: np.ndarray, stamps: np.ndarray) -> None:
-    """Refuses a motion that is too short, goes back in time or was sampled unevenly.
+def check_times(where: Callable[[int], str], time: np.ndarray, stamps: np.ndarray) -> EvenGrid:
+    """The grid of a motion; refuses one that is too short, goes back in time or was sampled unevenly.
 
     Args:
         where: the place of a row of the motion, for messages.
@@ -184,18 +184,13 @@ def check_times(where: Callable[[int], str], time: np.ndarray, stamps: np.ndarra
         raise RecordingError(
             f"{where(1)}: samples of the robot are {period:g} s apart; the time must be in s"
         )
-    off = np.abs(steps - period)
-    if off.max() > _UNEVEN * period:
-        raise RecordingError(
-            f"{where(int(np.argmax(off)) + 1)}: samples of the robot must be evenly spaced, got "
-            f"{steps.max():g} s after {period:g} s"
-        )
+    return even_grid(where, time)
 
 
 def check_periods(path: Path, cases: list[RecordedCase]) -> None:
     """Refuses motions that were sampled at different rates. Raises RecordingError."""
     periods = [case.period for case in cases]
-    if max(periods) > (1.0 + _UNEVEN) * min(periods):
+    if max(periods) > (1.0 + UNEVEN) * min(periods):
         raise RecordingError(
             f"{path}: all cases must have one period, got {min(periods):g} to {max(periods):g} s"
         )

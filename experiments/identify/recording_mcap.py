@@ -15,6 +15,7 @@ from scipy.interpolate import CubicSpline
 from diagrams.record.read_record import Contents, Topic, read_record
 from diagrams.record.run_record import RunRecord
 from diagrams.record.topics import INERTIAL, JOINTS, MOTION, TOLD
+from experiments.identify.recording_grid import filled_note
 from experiments.identify.recording_map import (
     Recording,
     RecordingMap,
@@ -63,24 +64,28 @@ def read_mcap(path: Path, needs_sensors: bool = True) -> Recording:
             "friction (--slow), but no springs"
         )
     names, bounds = _motions(contents, path, joints)
-    cases = []
+    cases, grids = [], []
     for name, begin, end in zip(names, bounds[:-1], bounds[1:], strict=True):
         inside = _between(joints.time, begin, end)
         stamp = joints.columns["stamp"][inside, 0]
         time = joints.time[inside] if np.isnan(stamp).any() else stamp
         theta = joints.columns["position"][inside]
         torque = joints.columns["effort"][inside]
-        check_times(lambda row, name=name: f"{path}, motion {name}, sample {row + 1}", time, time)
+        grid = check_times(lambda row, name=name: f"{path}, motion {name}, sample {row + 1}", time, time)
         if not np.isfinite(theta).all():
             raise RecordingError(f"{path}, motion {name}: positions of motors are missing")
+        grids.append(grid)
+        time, theta = grid.linear(time), grid.smooth(theta)
         stamps, readings = _readings(shown, begin, end, len(plan.sensors), time)
         rate = CubicSpline(time, theta).derivative()(time)
-        known = torque if np.isfinite(torque).all() else np.zeros((0, NUM_JOINTS))
-        told = _told(contents.topics.get(TOLD), joints.time[inside], begin)
+        known = grid.linear(torque) if np.isfinite(torque).all() else np.zeros((0, NUM_JOINTS))
+        told = _told(contents.topics.get(TOLD), grid.linear(joints.time[inside]), begin)
         load = plan.payloads.get(name)
         cases.append(RecordedCase(name, time, theta, rate, known, stamps, readings, told, load))
     check_payloads(path, plan, cases)
     check_periods(path, cases)
+    if note := filled_note(path, grids):
+        typer.echo(f"truetip: recording {note}", err=True)
     return Recording(plan.payload, cases, places(plan), plan.command_period)
 
 
