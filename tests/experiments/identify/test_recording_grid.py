@@ -14,7 +14,7 @@ from experiments.identify.recording_map import Recording
 from experiments.identify.slow import identify_slow_recording
 from robots.description.model import load_robot
 from robots.identification.recording import RecordedCase, RecordingError
-from tests.experiments.identify.test_identify_command import run_record
+from tests.experiments.identify.test_recording_mcap import run_record
 from tests.robots.identification.test_slow_motion import TRUE_LOAD, slow_motion
 
 PERIOD = 4e-3  # s
