@@ -7,6 +7,7 @@ import numpy as np
 from scipy.linalg import solve_triangular
 
 from robots.dynamics.newton_inverse import inverse_kinematics
+from systems.estimation.arm_geometry import Constants
 from systems.estimation.tip_model import TipModel
 from systems.reference.cartesian_path import CartesianPath
 
@@ -82,6 +83,11 @@ class PathNeeds:
     def prior(self) -> np.ndarray:
         """Information before anything is measured, (size, size)."""
         return self._model.prior
+
+    @property
+    def nominal(self) -> tuple[Constants, np.ndarray]:
+        """The geometry of the nominal robot, and its parameters."""
+        return self._constants, self._model.mean
 
     def jacobian(self, q: np.ndarray) -> np.ndarray:
         """Of the tip of the nominal robot at joints q (rad, (6,)), rotation first, (6, 6)."""

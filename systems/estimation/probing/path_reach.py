@@ -27,6 +27,7 @@ class PathReach:
         self._needs, self._start = needs, path.path_start
         self._times, self._q = needs.times[chosen], needs.q[chosen]
         self._poses = path.sample(self._times)[0]
+        self._missing(*needs.nominal, 0)  # what is compiled is there before a tick asks for it
 
     def look(
         self, constants: Constants, x: np.ndarray, covariance: Callable[[], np.ndarray], tick: int
