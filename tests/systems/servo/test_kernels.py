@@ -1,5 +1,8 @@
 """Compiled functions of laws and guard: no tick waits for the compiler."""
 
+import subprocess
+import sys
+
 import numpy as np
 import pytest
 
@@ -24,6 +27,35 @@ def test_everything_is_compiled_before_the_first_tick(law: str):
     assert before
     experiment.advance(0.02)
     assert compiled() == before
+
+
+_UNTIL_ON_THE_PATH = """
+import sys
+from diagrams.runs.simulation import Experiment
+from diagrams.scenario.scenario import load_scenario
+
+def compiled():
+    modules = {name: vars(each) for name, each in sys.modules.items() if name.startswith("systems.")}
+    found = {(module, name): f for module, every in modules.items() for name, f in every.items()}
+    functions = {name: f for name, f in found.items() if hasattr(f, "signatures")}
+    return {name: len(f.signatures) for name, f in functions.items()}
+
+experiment = Experiment(load_scenario(sys.argv[1]), "self_calibrating")
+before = compiled()
+experiment.advance(until=5.0)
+later = [name for name, count in compiled().items() if before.get(name) != count]
+assert len(before) > 50
+assert not later, later
+"""
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("scenario", ["everything", "everything-realistic"])
+def test_all_of_the_self_calibrating_law_is_compiled_before_the_first_tick(scenario: str):
+    """In a process of its own, in which nothing else has been: from start and probe onto the path."""
+    command = [sys.executable, "-c", _UNTIL_ON_THE_PATH, scenario]
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
 
 
 def test_how_close_a_jacobian_is_to_a_singularity_goes_by_its_smallest_singular_value():
